@@ -1,0 +1,64 @@
+#!/usr/bin/env bash
+# A real Blender on a Debian machine, as root: Debian's own package in a folder of its own.
+#   real_blender.sh install [DIR]       Blender 4.3 with Python 3.13 (about 2 minutes, 1.5 GB)
+#   real_blender.sh blender DIR ARGS    that Blender; sees the current folder, the checkout,
+#                                       the data beside it and Patina's cache, at the same paths
+# Debian's build has no OSL and no USD: those are tested on the bpy wheel.
+set -euo pipefail
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+
+bind() { # DIR FOLDER
+  [ -d "$2" ] || return 0
+  mkdir -p "$1$2"
+  mount --bind "$2" "$1$2"
+}
+
+system() { # DIR
+  for m in proc dev; do mountpoint -q "$1/$m" || mount --bind "/$m" "$1/$m"; done
+}
+
+inside() { # DIR COMMAND ...
+  DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 chroot "$@"
+}
+
+install() { # DIR
+  local dir=$1 mirror
+  if [ ! -x "$dir/usr/bin/blender" ]; then
+    mirror=$(cat /etc/apt/sources.list /etc/apt/sources.list.d/debian.sources 2>/dev/null |
+      sed -nE 's/^(URIs: |deb (\[[^]]*\] )?)([^ ]+).*/\3/p' | sed -n 1p) || true
+    [ -n "$mirror" ] || { echo "no Debian mirror found in /etc/apt" >&2; exit 1; }
+    command -v debootstrap >/dev/null || { apt-get update -qq; apt-get install -y -qq debootstrap >/dev/null; }
+    debootstrap --variant=minbase trixie "$dir" "$mirror" >/dev/null
+    cp -n /etc/apt/apt.conf.d/* "$dir/etc/apt/apt.conf.d/" 2>/dev/null || true
+    cp /etc/resolv.conf /etc/hosts "$dir/etc/"
+    system "$dir"
+    inside "$dir" apt-get update -qq
+    inside "$dir" apt-get install -y -qq --no-install-recommends \
+      blender python3-numpy python3-requests python3-cattr libgl1-mesa-dri >/dev/null
+  fi
+  system "$dir"
+  # Debian's blender only recommends numpy, and a Blender without it cannot run the extension.
+  inside "$dir" python3 -c 'import numpy' 2>/dev/null || {
+    inside "$dir" apt-get update -qq
+    inside "$dir" apt-get install -y -qq --no-install-recommends python3-numpy >/dev/null
+  }
+  inside "$dir" blender -b --version | sed -n 1p
+}
+
+what=${1:-}
+shift || true
+case $what in
+install) install "${1:-/opt/blender-trixie}" ;;
+blender)
+  # In a mount namespace of its own: what is bound here is gone when Blender ends.
+  [ "${IN_NAMESPACE:-}" = 1 ] || IN_NAMESPACE=1 exec unshare --mount bash "${BASH_SOURCE[0]}" blender "$@"
+  unset IN_NAMESPACE
+  dir=$1; shift
+  system "$dir"
+  bind "$dir" "$here"
+  bind "$dir" "$(dirname "$here")/shared"
+  bind "$dir" "${PATINA_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/patina}"
+  bind "$dir" "$PWD"
+  exec chroot "$dir" /bin/bash -c 'cd "$0" && exec blender "$@"' "$PWD" "$@" ;;
+*) sed -n '2,6p' "$0"; exit 2 ;;
+esac

@@ -1,0 +1,33 @@
+"""Patina: measured materials from photo scans. This file only registers."""
+
+from __future__ import annotations
+
+import importlib
+from types import ModuleType
+
+# Every module that has something to register, in order; unregistered the other way round
+MODULES: tuple[str, ...] = (
+    "scene.properties",
+    "scene.osl_files",
+    "scene.lamps",
+    "operators.import_capture",
+    "operators.fit",
+    "operators.look_through",
+    "panels.sidebar",
+)
+
+
+def _modules() -> list[ModuleType]:
+    return [importlib.import_module(f".{name}", __package__) for name in MODULES]
+
+
+def register() -> None:
+    """Add operators, panels, properties and handlers to Blender."""
+    for module in _modules():
+        module.register()
+
+
+def unregister() -> None:
+    """Take everything away again."""
+    for module in reversed(_modules()):
+        module.unregister()

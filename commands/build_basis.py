@@ -1,0 +1,35 @@
+"""``build-basis NBRDF.npz``: make the embedded basis anew (for developers)."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..core.basis import storage
+from ..core.basis.basis import DEFAULT_FILE
+from ..core.basis.build_default import build, write_checksums
+from ..core.basis.merl_folder import CHECKSUMS_FILE
+from ..core.job.job import Step
+from .progress import Progress
+
+HELP = "make the embedded basis anew from neural encodings (for developers)"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("encodings", type=Path, help="nbrdf_merl.npz")
+    parser.add_argument("--checksums", type=Path, help="merl_sha256.csv: rewrite those too")
+    parser.add_argument("--out", type=Path, default=DEFAULT_FILE, help="the .npz to write")
+
+
+def run(arguments: argparse.Namespace) -> None:
+    progress = Progress()
+    basis = build(
+        arguments.encodings, progress=lambda stage, done: progress(Step(stage, done))
+    )
+    arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    storage.save(arguments.out, basis)
+    size = arguments.out.stat().st_size
+    print(f"wrote {arguments.out}: {size / 1e6:.2f} MB, version {storage.load(arguments.out).version}")
+    if arguments.checksums is not None:
+        count = write_checksums(arguments.checksums, CHECKSUMS_FILE)
+        print(f"wrote {CHECKSUMS_FILE}: {count} files")

@@ -1,0 +1,79 @@
+"""``fit CAPTURE --out DIR``: everything from files to materials, headless."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..core.brdf import merl_file
+from ..core.capture import read_capture
+from ..core.job import CaptureResult, FitJob, Stage
+from ..core.job.job import Step, peak_memory
+from ..core.report import result_json, write_report
+from .progress import Progress
+from .staging import staged_folder
+
+HELP = "fit every material of a capture and write them"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("capture", type=Path, help="the capture file (*.capture.toml)")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the results")
+
+
+def run(arguments: argparse.Namespace) -> None:
+    fit_to_folder(arguments.capture, arguments.out)
+
+
+def fit_to_folder(capture_file: Path, out: Path) -> CaptureResult:
+    """Fit a capture and leave result.json, NAME.binary, scene.blend and report/ in ``out``."""
+    progress = Progress(share=0.85)
+    job = FitJob(read_capture(capture_file))
+    job.drain(progress)
+    result = job.result
+    if result is None:  # pragma: no cover - drain raises or finishes
+        raise RuntimeError("the job ended without a result")
+    progress.share = 1.0
+    with staged_folder(out) as folder:
+        stages = [*job.stages]
+        with timed(stages, "tables", progress, 0.9):
+            for material in result.materials:
+                merl_file.write(folder / f"{material.name}.binary", material.fit.brdf.table())
+        with timed(stages, "report", progress, 0.92):
+            for _ in write_report(folder / "report", result):
+                pass
+        with timed(stages, "scene.blend", progress, 0.97):
+            from ..scene.blend_file import write_blend  # needs bpy
+
+            notes = write_blend(folder / "scene.blend", out / "scene.blend", result, stages)
+        result_json.write(folder / "result.json", result, stages, notes)
+    _tell(out, result)
+    return result
+
+
+@contextmanager
+def timed(stages: list[Stage], name: str, progress: Progress, fraction: float) -> Iterator[None]:
+    """Measure a stage of writing."""
+    progress(Step(name, fraction))
+    since = time.perf_counter()
+    yield
+    stages.append(Stage(name, time.perf_counter() - since, peak_memory()))
+
+
+def _tell(out: Path, result: CaptureResult) -> None:
+    for material in result.materials:
+        unseen = (
+            "" if material.held_out is None
+            else f", predicts an unseen photo to {100 * material.held_out.error:.1f} %"
+        )  # fmt: skip
+        print(f"{material.name}: {material.samples:,} samples{unseen}")
+        for warning in material.warnings:
+            print(f"  note: {warning}")
+    print(f"wrote {out / 'result.json'}")
+    for material in result.materials:
+        print(f"      {out / (material.name + '.binary')}")
+    print(f"      {out / 'scene.blend'}")
+    print(f"      {out / 'report' / 'index.html'}")

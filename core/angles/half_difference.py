@@ -1,0 +1,85 @@
+"""Half/difference angles (Rusinkiewicz 1998, "A new change of variables for efficient BRDF
+representation"), both ways, without a tangent frame.
+
+For an isotropic BRDF the azimuth of the half vector carries nothing, so three angles remain:
+θh (normal to half vector), θd (half vector to light) and φd (azimuth of the light around the half
+vector, 0 where the light leans away from the normal). Swapping light and view (Helmholtz
+reciprocity) turns φd by π: φd lives on [0, π).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating]
+
+
+class Angles(NamedTuple):
+    """Half/difference angles in radians, arrays of one common shape."""
+
+    theta_h: Array
+    theta_d: Array
+    phi_d: Array
+
+
+def fold_phi_d(phi_d: Array) -> Array:
+    """φd folded to [0, π) by reciprocity; exact multiples of π (and rounding below 0) give 0."""
+    folded = np.mod(phi_d, np.pi)
+    return np.where(folded >= np.pi, 0.0, folded)
+
+
+def half_difference(normal: Array, light: Array, view: Array) -> Angles:
+    """Angles of unit vectors (..., 3) that point AWAY from the surface, in any common frame.
+
+    Exact at the poles: atan2 of cross and dot products, never acos. Where θh = 0 the azimuth of
+    the half vector is undefined; φd is then measured from an arbitrary but fixed tangent. Where
+    θd = 0, φd is 0.
+    """
+    half = light + view
+    length = np.linalg.norm(half, axis=-1, keepdims=True)
+    # light = -view has no half vector; no surface sees it, but the arithmetic must stay finite
+    half = np.where(length > 1e-12, half / np.maximum(length, 1e-12), normal)
+    binormal = np.cross(normal, half)
+    sin_h = np.linalg.norm(binormal, axis=-1)
+    theta_h = np.arctan2(sin_h, _dot(normal, half))
+    binormal = np.where(
+        sin_h[..., None] > 1e-9, binormal / np.maximum(sin_h, 1e-9)[..., None], _perpendicular(half)
+    )
+    tangent = np.cross(binormal, half)
+    d_x, d_y = _dot(light, tangent), _dot(light, binormal)
+    theta_d = np.arctan2(np.hypot(d_x, d_y), _dot(light, half))
+    return Angles(theta_h, theta_d, fold_phi_d(np.arctan2(d_y, d_x)))
+
+
+def light_view(theta_h: Array, theta_d: Array, phi_d: Array) -> tuple[Array, Array]:
+    """Unit vectors (light, view), each (..., 3), with normal = +z and the half vector in x-z."""
+    theta_h, theta_d, phi_d = np.broadcast_arrays(theta_h, theta_d, phi_d)
+    sh, ch, sd, cd = np.sin(theta_h), np.cos(theta_h), np.sin(theta_d), np.cos(theta_d)
+    half = np.stack([sh, np.zeros_like(sh), ch], axis=-1)
+    # difference vector along the tangent (ch, 0, -sh) and the binormal (0, 1, 0) of the half vector
+    d_x, d_y = sd * np.cos(phi_d), sd * np.sin(phi_d)
+    light = np.stack([d_x * ch, d_y, -d_x * sh], axis=-1) + cd[..., None] * half
+    view = 2.0 * _dot(light, half)[..., None] * half - light
+    return light, view
+
+
+def cosines(theta_h: Array, theta_d: Array, phi_d: Array) -> tuple[Array, Array]:
+    """(cos θi, cos θo) of light and view against the normal; negative below the horizon."""
+    base = np.cos(theta_h) * np.cos(theta_d)
+    lean = np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)
+    return base - lean, base + lean
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.einsum("...i,...i->...", a, b)
+
+
+def _perpendicular(a: Array) -> Array:
+    """Some unit vector perpendicular to each unit vector (Duff et al. 2017, first tangent)."""
+    x, y, z = a[..., 0], a[..., 1], a[..., 2]
+    sign = np.where(z >= 0, 1.0, -1.0)
+    c = -1.0 / (sign + z)
+    return np.stack([1.0 + sign * x * x * c, sign * x * y * c, -sign * x], axis=-1)

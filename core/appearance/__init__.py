@@ -1,0 +1,1 @@
+"""From a BRDF to what Blender can show and other programs can read."""

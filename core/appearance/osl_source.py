@@ -1,0 +1,97 @@
+"""The OSL source for a number of coefficients, and the list of its inputs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..basis import Basis
+from ..basis.mapping import EPSILON
+from . import osl_atlas
+
+TEMPLATE = Path(__file__).parents[2] / "assets" / "osl" / "patina_brdf.osl"
+LAMPS = 8
+
+
+@dataclass(frozen=True)
+class Input:
+    """One input of the shader. kind: string, float, int, vector or color; lamp: written by us."""
+
+    name: str
+    label: str
+    kind: str
+    default: object
+    lamp: bool = False
+
+
+def coefficient_name(component: int) -> str:
+    """Name of the input of component 0, 1, …"""
+    return f"coefficient_{component + 1}"
+
+
+def coefficient_inputs(count: int) -> list[Input]:
+    """R, G and B of every component's coefficient, as the X, Y and Z of a vector."""
+    return [
+        Input(coefficient_name(i), f"Coefficient {i + 1}", "vector", (0.0, 0.0, 0.0))
+        for i in range(count)
+    ]
+
+
+def lamp_inputs() -> list[Input]:
+    """The table of lamps, six inputs a lamp (see the shader's lamp_light)."""
+    parts = (("kind", "int", 0), ("at", "vector", (0.0,) * 3), ("power", "color", (0.0,) * 3),
+             ("axis", "vector", (0.0,) * 3), ("side", "vector", (0.0,) * 3),
+             ("form", "vector", (0.0,) * 3))  # fmt: skip
+    return [
+        Input(f"lamp{i + 1}_{part}", f"Lamp {i + 1} {part}", kind, default, lamp=True)
+        for i in range(LAMPS)
+        for part, kind, default in parts
+    ]
+
+
+def inputs(count: int) -> list[Input]:
+    """All inputs in the order of the shader's parameters."""
+    return [
+        Input("components", "Components", "string", ""),
+        Input("shading_normal", "Normal", "vector", (0.0, 0.0, 0.0)),
+        Input("scale", "Reflectance Scale", "float", 1.0),
+        Input("lobe_roughness", "Sampling Roughness", "float", 0.3),
+        Input("lobe_share", "Sampling Share", "float", 0.5),
+        *coefficient_inputs(count),
+        *lamp_inputs(),
+    ]
+
+
+def source(basis: Basis, count: int) -> str:
+    """OSL text that evaluates ``count`` components of an atlas holding all of the basis."""
+    words = {
+        "COMPONENTS": str(count),
+        "LAMPS": str(LAMPS),
+        "NODES_H": str(basis.grid.n_h),
+        "NODES_D": str(basis.grid.n_d),
+        "NODES_P": str(basis.grid.n_p),
+        "KNEE": repr(float(basis.grid.knee)),
+        "BORDER": str(osl_atlas.BORDER),
+        "GROUPS": str(osl_atlas.groups(count)),
+        "HEIGHT_GROUPS": str(osl_atlas.groups(basis.count)),
+        "EPSILON": repr(EPSILON),
+        "COEFFICIENT_INPUTS": _parameters(coefficient_inputs(count)),
+        "LAMP_INPUTS": _parameters(lamp_inputs()),
+        "COEFFICIENT_NAMES": ", ".join(i.name for i in coefficient_inputs(count)),
+    }
+    plural = {"kind": "KINDS", "at": "ATS", "power": "POWERS", "axis": "AXES", "side": "SIDES",
+              "form": "FORMS"}  # fmt: skip
+    for part, word in plural.items():
+        words[f"LAMP_{word}"] = ", ".join(f"lamp{i + 1}_{part}" for i in range(LAMPS))
+    text = TEMPLATE.read_text(encoding="utf-8")
+    for word, value in words.items():
+        text = text.replace(f"@{word}@", value)
+    return text
+
+
+def _parameters(listed: list[Input]) -> str:
+    lines = []
+    for i in listed:
+        zero = "0" if i.kind == "int" else f"{i.kind}(0)"
+        lines.append(f'  {i.kind} {i.name} = {zero} [[string label = "{i.label}"]],')
+    return "\n".join(lines)

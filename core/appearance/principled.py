@@ -1,0 +1,141 @@
+"""Blender's Principled BSDF as a BRDF: what Cycles 4.2 to 5.x computes with distribution 'GGX'.
+
+Layers from the top: coat (dielectric GGX), metal (GGX with F82 tint, Kutz et al. 2021) mixed with a
+dielectric of GGX over Lambert. Every layer darkens what lies below by 1 − its albedo seen from the
+viewer, so the model is not quite reciprocal. α = roughness², Smith's height-correlated masking
+(Heitz 2014). Left out: transmission, subsurface, sheen, thin film, anisotropy, multiple scattering
+(distribution 'MULTI_GGX'), coat tint.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import Angles, light_view
+from .layer_albedo import (
+    f0_from_ior,
+    fresnel_dielectric,
+    ior_from_f0,
+    rescaled_albedo,
+    rescaled_fresnel,
+)
+
+Array = NDArray[np.floating]
+# Below it Cycles 4.2 takes the lobe for a mirror and evaluates nothing (its test: α² > 5e-7)
+MIN_ROUGHNESS = 0.03
+
+
+@dataclass(frozen=True)
+class Principled:
+    """Inputs of the Principled BSDF node, by the names of its sockets.
+
+    base_color, specular_tint: (3,) linear RGB. roughness, metallic, coat_weight, coat_roughness in
+    [0, 1]; specular_ior_level 0.5 leaves the reflectance at normal incidence as ior has it.
+    """
+
+    base_color: Array = field(default_factory=lambda: np.full(3, 0.8))
+    metallic: float = 0.0
+    roughness: float = 0.5
+    ior: float = 1.5
+    specular_ior_level: float = 0.5
+    specular_tint: Array = field(default_factory=lambda: np.ones(3))
+    coat_weight: float = 0.0
+    coat_roughness: float = 0.03
+    coat_ior: float = 1.5
+
+    def evaluate(self, angles: Angles) -> Array:
+        """f (..., 3) in 1/sr at half/difference angles (radians) of any shape."""
+        light, view = light_view(*angles)
+        return self.reflectance(light, view)
+
+    def reflectance(self, light: Array, view: Array) -> Array:
+        """f (..., 3) in 1/sr for unit vectors (..., 3) in a frame whose z is the normal."""
+        return self.at(Configuration.of(light, view))
+
+    def at(self, where: Configuration) -> Array:
+        """f (..., 3) in 1/sr."""
+        total = np.zeros((*where.cos_i.shape, 3))
+        below = np.ones(where.cos_i.shape)  # what the layers above leave
+        if self.coat_weight > 0:
+            lobe = where.ggx(self.coat_roughness)
+            fresnel = fresnel_dielectric(where.cos_d, self.coat_ior)
+            total += (self.coat_weight * lobe * fresnel)[..., None]
+            f0 = f0_from_ior(self.coat_ior)
+            s = rescaled_albedo(self.coat_roughness, where.cos_o, self.coat_ior)
+            below = below * np.clip(1.0 - self.coat_weight * (f0 + (1.0 - f0) * s), 0.0, 1.0)
+        lobe = where.ggx(self.roughness)
+        tint = np.asarray(self.specular_tint, float)
+        if self.metallic > 0:
+            fresnel_f82 = _f82(where.cos_d, np.clip(self.base_color, 0, 1), np.minimum(tint, 1.0))
+            total += self.metallic * (below * lobe)[..., None] * fresnel_f82
+            below = below * (1.0 - self.metallic)
+        if self.metallic < 1:
+            total += below[..., None] * self._dielectric(where, lobe, tint)
+        return np.where(where.seen[..., None], total, 0.0)
+
+    def _dielectric(self, where: Configuration, lobe: Array, tint: Array) -> Array:
+        ior, scalar_f0 = self.ior, f0_from_ior(self.ior)
+        if self.specular_ior_level != 0.5:
+            scalar_f0 *= 2.0 * self.specular_ior_level
+            ior = ior_from_f0(scalar_f0)
+        diffuse = np.asarray(self.base_color, float) / np.pi
+        if ior == 1.0:  # Cycles makes no specular lobe at all
+            return np.broadcast_to(diffuse, (*lobe.shape, 3))
+        f0 = np.clip(scalar_f0 * tint, 0.0, 1.0)
+        s = rescaled_fresnel(where.cos_d, ior)[..., None]
+        specular = lobe[..., None] * (f0 + (1.0 - f0) * s)
+        layer = rescaled_albedo(self.roughness, where.cos_o, ior)
+        brightest = f0.max() + (1.0 - f0.max()) * layer
+        return specular + np.clip(1.0 - brightest, 0.0, 1.0)[..., None] * diffuse
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """Pairs of directions, reduced to cosines of one shape: light, view and half vector against
+    the normal (i, o, h), and light against half vector (d)."""
+
+    cos_i: Array
+    cos_o: Array
+    cos_h: Array
+    cos_d: Array
+
+    @classmethod
+    def of(cls, light: Array, view: Array) -> Configuration:
+        """From unit vectors (..., 3) in a frame whose z is the normal."""
+        light, view = np.broadcast_arrays(light, view)
+        half = light + view
+        half = half / np.maximum(np.linalg.norm(half, axis=-1, keepdims=True), 1e-12)
+        cos_d = np.einsum("...i,...i->...", light, half)
+        return cls(light[..., 2], view[..., 2], half[..., 2], cos_d)
+
+    @cached_property
+    def seen(self) -> NDArray[np.bool_]:
+        """Light and view both above the horizon."""
+        return (self.cos_i > 0) & (self.cos_o > 0)
+
+    def ggx(self, roughness: float) -> Array:
+        """D·G₂/(4 cosθi cosθo) of the GGX distribution with α = roughness²."""
+        alpha2 = roughness**4
+        h2 = np.minimum(self.cos_h**2, 1.0)
+        d = alpha2 / (np.pi * (1.0 - h2 + alpha2 * h2) ** 2)
+        i, o = np.maximum(self.cos_i, 1e-6), np.maximum(self.cos_o, 1e-6)
+        smith = 1.0 + _lambda(alpha2, i) + _lambda(alpha2, o)
+        return d / (4.0 * i * o * smith)
+
+
+def _lambda(alpha2: float, cos: Array) -> Array:
+    """Smith's Λ for GGX (Heitz 2014, equation 72)."""
+    return 0.5 * (np.sqrt(1.0 + alpha2 * np.maximum(1.0 / cos**2 - 1.0, 0.0)) - 1.0)
+
+
+def _f82(cos_d: Array, f0: Array, tint: Array) -> Array:
+    """F82-tint Fresnel (..., 3) of a metal (Kutz, Hašan, Edmondson 2021)."""
+    s = np.clip(1.0 - cos_d, 0.0, 1.0)[..., None]
+    f = 6.0 / 7.0  # cos 82° is 1/7, where the tint acts fully
+    schlick82 = f0 + (1.0 - f0) * f**5
+    b = schlick82 * (7.0 / f**6) * (1.0 - tint)
+    return np.clip(f0 + (1.0 - f0) * s**5 - b * cos_d[..., None] * s**6, 0.0, 1.0)

@@ -1,0 +1,158 @@
+"""Principal components of measured reflectance, and BRDFs spanned by them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import Angles
+from ..brdf import TabulatedBRDF
+from . import mapping
+from .grid import AngleGrid
+
+CHUNK = 1 << 17
+Progress = Callable[[str, float], None]
+DEFAULT_FILE = Path(__file__).parents[2] / "assets" / "basis" / "nbrdf_basis.npz"
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Mean, reference and scaled principal components on the nodes of an AngleGrid.
+
+    mean: (n_h, n_d, n_p) float32, µ of the mapped observations.
+    log_reference: the same shape, ln(ref + ε).
+    components: (k, n_h, n_d, n_p) float32, the scaled components Q = V·Σ.
+    explained: fraction of variance of every component, also those not stored.
+    columns: number of training observations (300 for the 100 MERL materials).
+    provenance: what it was computed from, by which command, under which licence.
+    """
+
+    grid: AngleGrid
+    mean: NDArray[np.float32]
+    log_reference: NDArray[np.float32]
+    components: NDArray[np.float32]
+    explained: NDArray[np.float64]
+    columns: int
+    provenance: str
+
+    @staticmethod
+    def default() -> Basis:
+        """The embedded basis: no network, no file of the user's."""
+        return _load_default()
+
+    @staticmethod
+    def from_merl(folder: Path, progress: Progress = lambda stage, fraction: None) -> Basis:
+        """The basis of the 100 genuine MERL files in a folder, cached for the user.
+
+        Sizes and SHA-256 sums are checked. Raises InputError naming the first file that is wrong.
+        """
+        from .merl_folder import cached_basis
+
+        return cached_basis(folder, progress)
+
+    @property
+    def count(self) -> int:
+        """k, the number of stored components."""
+        return int(self.components.shape[0])
+
+    @property
+    def coefficient_variance(self) -> float:
+        """Variance of the training coefficients, 1/columns by construction."""
+        return 1.0 / self.columns
+
+    @cached_property
+    def version(self) -> str:
+        """Short hash of the numbers: two results with one version speak of the same basis."""
+        digest = hashlib.sha256()
+        for array in (self.mean, self.log_reference, self.components):
+            digest.update(np.ascontiguousarray(array).tobytes())
+        return digest.hexdigest()[:12]
+
+    @cached_property
+    def _nodes(self) -> NDArray[np.float32]:
+        """(grid.size, 1 + k): µ + ln(ref + ε), then the components; one row a node."""
+        centre = (self.mean + self.log_reference).reshape(1, -1)
+        flat = self.components.reshape(self.count, -1)
+        return np.ascontiguousarray(np.concatenate([centre, flat]).T.astype(np.float32))
+
+    def rows(
+        self, angles: Angles, count: int | None = None
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """(centre (n,), Q̂ (n, count)) at n directions: ln(ρ·cosMap + ε) = centre + Q̂ c."""
+        k = self.count if count is None else min(count, self.count)
+        values = self.grid.interpolate(self._nodes[:, : 1 + k], angles)
+        return values[:, 0], values[:, 1:]
+
+    def mapped(
+        self, rho: NDArray[np.floating], angles: Angles
+    ) -> NDArray[np.floating]:
+        """Mapped, centred observations x̂ − µ̂ (n, c) of reflectances ρ (n, c) in 1/sr."""
+        centre, _ = self.rows(angles, 0)
+        return mapping.log_weighted(rho, mapping.cos_map(angles)) - centre[:, None]
+
+    def evaluate(
+        self, coefficients: NDArray[np.floating], angles: Angles
+    ) -> NDArray[np.float32]:
+        """ρ (..., c) in 1/sr of the BRDFs with coefficients (c, k), at angles of any shape."""
+        c = np.atleast_2d(np.asarray(coefficients, np.float32))
+        shape = np.shape(angles.theta_h)
+        flat = Angles(*(np.asarray(a).ravel() for a in np.broadcast_arrays(*angles)))
+        out = np.empty((flat.theta_h.size, c.shape[0]), np.float32)
+        for start in range(0, out.shape[0], CHUNK):
+            part = Angles(*(a[start : start + CHUNK] for a in flat))
+            centre, q = self.rows(part, c.shape[1])
+            out[start : start + CHUNK] = mapping.unlog_weighted(
+                centre[:, None] + q @ c.T, mapping.cos_map(part)
+            )
+        return out.reshape(*shape, c.shape[0])
+
+    def project(
+        self,
+        rho: NDArray[np.floating],
+        angles: Angles,
+        count: int | None = None,
+        eta: float = 0.0,
+    ) -> NDArray[np.float64]:
+        """Coefficients (c, k) that fit many reflectances ρ (n, c) by least squares (ridge eta).
+
+        Normal equations are summed over chunks, so memory does not grow with n.
+        """
+        k = self.count if count is None else min(count, self.count)
+        gram, right = np.zeros((k, k)), np.zeros((k, rho.shape[1]))
+        for start in range(0, rho.shape[0], CHUNK):
+            part = Angles(*(a[start : start + CHUNK] for a in angles))
+            centre, q = self.rows(part, k)
+            target = mapping.log_weighted(rho[start : start + CHUNK], mapping.cos_map(part))
+            q64 = q.astype(np.float64)
+            gram += q64.T @ q64
+            right += q64.T @ (target - centre[:, None])
+        return np.linalg.solve(gram + eta * np.eye(k), right).T
+
+
+@dataclass(frozen=True)
+class PrincipalBRDF:
+    """An isotropic BRDF as coefficients (3, k) in a basis; unitless coefficients, ρ in 1/sr."""
+
+    basis: Basis
+    coefficients: NDArray[np.float64]
+
+    def evaluate(self, angles: Angles) -> NDArray[np.float32]:
+        """ρ (..., 3) in 1/sr at half/difference angles (radians) of any shape."""
+        return self.basis.evaluate(self.coefficients, angles)
+
+    def table(self) -> TabulatedBRDF:
+        """The BRDF at the MERL cells' centres."""
+        return TabulatedBRDF.from_function(self.evaluate)
+
+
+@lru_cache(maxsize=1)
+def _load_default() -> Basis:
+    from .storage import load  # storage needs Basis: imported late
+
+    return load(DEFAULT_FILE)

@@ -1,0 +1,76 @@
+"""Build the embedded basis: ``python run.py headless build-basis NBRDF.npz`` writes assets/basis.
+
+Input: the neural encodings of the 100 MERL materials by Sztrajman et al. 2021 (MIT licence), which
+are not part of this repository. Only the mean, the reference and the components are kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import Angles, merl_grid
+from ..brdf import nbrdf
+from .basis import Basis, Progress
+from .training import BLOCK, train
+
+PROVENANCE = (
+    "Mean, reference and principal components (Nielsen's log mapping) of the neural encodings of "
+    "the 100 MERL materials by Sztrajman, Rainer, Ritschel, Weyrich 2021 (asztr/Neural-BRDF, MIT "
+    "licence). Computed by core/basis/build_default.py. Contains no MERL data."
+)
+
+
+@dataclass(frozen=True)
+class NeuralObservations:
+    """Encodings as training columns. weights: (n, 675)."""
+
+    weights: NDArray[np.float32]
+
+    @property
+    def columns(self) -> int:
+        return 3 * len(self.weights)
+
+    def cell_blocks(self) -> Iterator[tuple[Angles, NDArray[np.float32], float]]:
+        """The MERL cells in view, at their lower edges: the encodings' own convention."""
+        seen = merl_grid.visible(merl_grid.node_angles(0.5))
+        edges = [a[seen] for a in merl_grid.node_angles(0.0)]
+        for start in range(0, edges[0].size, BLOCK):
+            part = Angles(*(a[start : start + BLOCK] for a in edges))
+            yield part, self.at(part), start / edges[0].size
+
+    def at(self, angles: Angles) -> NDArray[np.float32]:
+        out = np.empty((self.columns, angles.theta_h.size), np.float32)
+        for i, weights in enumerate(self.weights):
+            out[3 * i : 3 * i + 3] = nbrdf.evaluate(weights, angles).T
+        return out
+
+
+def build(
+    encodings: Path,
+    exclude: Sequence[str] = (),
+    progress: Progress = lambda stage, fraction: None,
+) -> Basis:
+    """Basis from an .npz of encodings, leaving out the materials named in ``exclude``."""
+    names, weights = nbrdf.load(encodings)
+    unknown = sorted(set(exclude) - set(names))
+    if unknown:
+        raise ValueError(f"no such materials: {unknown}")
+    kept = [i for i, name in enumerate(names) if name not in exclude]
+    note = f" Without {', '.join(sorted(exclude))}." if exclude else ""
+    return train(NeuralObservations(weights[kept]), PROVENANCE + note, progress=progress)
+
+
+def write_checksums(table: Path, target: Path) -> int:
+    """Names and SHA-256 sums of the genuine MERL files, from a CSV (file, size, sha256) to JSON."""
+    import csv
+    import json
+
+    with open(table, newline="", encoding="utf-8") as file:
+        sums = {row["file"]: row["sha256"] for row in csv.DictReader(file)}
+    target.write_text(json.dumps(sums, indent=0, sort_keys=True) + "\n", "utf-8")
+    return len(sums)

@@ -1,0 +1,36 @@
+"""Principal components of mapped reflectance, through the Gram matrix.
+
+With X the n_columns × n_cells matrix of mapped, centred observations, X Xᵀ = W Σ² Wᵀ is small
+(300 × 300 for MERL). The scaled components are Q = V·Σ = Xᵀ W, so they can be evaluated at ANY
+direction from the mapped observations there and W alone: no SVD of a million rows, no resampling.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def gram_matrix(blocks: Iterable[NDArray[np.float32]], columns: int) -> NDArray[np.float64]:
+    """X Xᵀ (columns, columns) from blocks (columns, cells) of mapped, centred observations."""
+    gram = np.zeros((columns, columns))
+    for block in blocks:
+        wide = block.astype(np.float64)
+        gram += wide @ wide.T
+    return gram
+
+
+def principal_directions(
+    gram: NDArray[np.float64], count: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(W (columns, count), explained variance fractions (columns,)), largest first.
+
+    Each direction's sign is fixed (its largest entry is positive): same input, same components.
+    """
+    eigenvalues, vectors = np.linalg.eigh(gram)
+    eigenvalues, vectors = eigenvalues[::-1], vectors[:, ::-1]
+    peak = np.abs(vectors).argmax(axis=0)
+    vectors = vectors * np.sign(vectors[peak, np.arange(vectors.shape[1])])
+    return vectors[:, :count].copy(), eigenvalues / eigenvalues.sum()

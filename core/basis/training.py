@@ -1,0 +1,91 @@
+"""Compute a Basis from any set of measured BRDFs that can be evaluated at given directions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import Angles
+from . import components, mapping
+from .basis import Basis, Progress
+from .grid import AngleGrid
+
+BLOCK = 1 << 16
+# Measured on the NBRDF set (run.py bench basis): finer nodes gain less than a thousandth
+DEFAULT_GRID = AngleGrid(n_h=84, n_d=46, n_p=30, knee=float(np.radians(0.7)))
+DEFAULT_COUNT = 40
+
+
+class Observations(Protocol):
+    """Training columns: one per colour channel of each material."""
+
+    @property
+    def columns(self) -> int: ...
+
+    def cell_blocks(self) -> Iterator[tuple[Angles, NDArray[np.float32], float]]:
+        """Blocks of the cells that count in the Gram matrix, each once: their angles (n,), ρ
+        (columns, n) in 1/sr, and the fraction of all cells that came before."""
+        ...
+
+    def at(self, angles: Angles) -> NDArray[np.float32]:
+        """ρ (columns, n) in 1/sr; negative where nothing was measured (then in all columns)."""
+        ...
+
+
+def train(
+    observations: Observations,
+    provenance: str,
+    count: int = DEFAULT_COUNT,
+    grid: AngleGrid = DEFAULT_GRID,
+    progress: Progress = lambda stage, fraction: None,
+) -> Basis:
+    """Basis of the first ``count`` components, stored on ``grid``; streams, so memory stays flat."""
+    def centred_blocks() -> Iterator[NDArray[np.float32]]:
+        for angles, rho, fraction in observations.cell_blocks():
+            progress("principal components", fraction)
+            logs, mean, _ = _mapped(rho, angles)
+            yield logs - mean
+
+    gram = components.gram_matrix(centred_blocks(), observations.columns)
+    directions, explained = components.principal_directions(gram, count)
+    nodes = Angles(*(a.ravel() for a in grid.nodes()))
+    mean = np.empty(grid.size, np.float32)
+    log_reference = np.empty(grid.size, np.float32)
+    scaled = np.empty((directions.shape[1], grid.size), np.float32)
+    for start in range(0, grid.size, BLOCK):
+        progress("nodes", start / grid.size)
+        block = slice(start, start + BLOCK)
+        part = Angles(*(a[block] for a in nodes))
+        rho = observations.at(part)
+        logs, mean[block], log_reference[block] = _mapped(rho, part)
+        scaled[:, block] = directions.T @ (logs - mean[block])
+        unmeasured = rho[0] < 0
+        mean[block][unmeasured] = np.nan
+    stacked = np.concatenate([mean[None], log_reference[None], scaled])
+    stacked = _fill_unmeasured(stacked.reshape(-1, *grid.shape))
+    return Basis(
+        grid, stacked[0], stacked[1], stacked[2:], explained, observations.columns, provenance
+    )
+
+
+def _mapped(
+    rho: NDArray[np.float32], angles: Angles
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """(mapped observations (columns, n), their mean (n,), ln(ref + ε) (n,))."""
+    weighted = np.maximum(rho, 0) * mapping.cos_map(angles).astype(np.float32)
+    log_reference = np.log(np.median(weighted, axis=0) + mapping.EPSILON)
+    logs = np.log(weighted + mapping.EPSILON) - log_reference
+    return logs, logs.mean(axis=0), log_reference
+
+
+def _fill_unmeasured(stacked: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Nodes without measurement (NaN mean) take the values of the next smaller θd: interpolation
+    near the horizon needs a value on its far side."""
+    missing = np.isnan(stacked[0])
+    for j in range(1, stacked.shape[2]):
+        hole = missing[:, j]
+        stacked[:, :, j][:, hole] = stacked[:, :, j - 1][:, hole]
+    return np.nan_to_num(stacked, copy=False)

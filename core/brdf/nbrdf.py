@@ -1,0 +1,44 @@
+"""Decoder of the neural BRDF encodings of Sztrajman et al. 2021, "Neural BRDF Representation and
+Importance Sampling". Used to compute the embedded basis and to check fits; no file ships with us.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import Angles
+from ..errors import InputError
+
+WEIGHTS = 675  # 6·21 + 21 + 21·21 + 21 + 21·3 + 3
+
+
+def load(path: Path) -> tuple[list[str], NDArray[np.float32]]:
+    """(names, weights (n, 675)) from an .npz of encodings."""
+    try:
+        with np.load(path) as data:
+            names, weights = [str(n) for n in data["names"]], np.asarray(data["weights"])
+    except (OSError, KeyError, ValueError) as error:
+        raise InputError(f"not a set of neural BRDF encodings ({error})", file=path) from error
+    if weights.shape != (len(names), WEIGHTS):
+        raise InputError(
+            f"weights of shape {weights.shape}, expected ({len(names)}, {WEIGHTS})", file=path
+        )
+    return names, weights.astype(np.float32)
+
+
+def evaluate(weights: NDArray[np.floating], angles: Angles) -> NDArray[np.float32]:
+    """f in 1/sr, (..., 3), at half/difference angles in radians (any shape)."""
+    w = np.asarray(weights, np.float32)
+    k1, b1 = w[:126].reshape(6, 21), w[126:147]
+    k2, b2 = w[147:588].reshape(21, 21), w[588:609]
+    k3, b3 = w[609:672].reshape(21, 3), w[672:675]
+    th, td, pd = (np.asarray(a, np.float32) for a in np.broadcast_arrays(*angles))
+    sd = np.sin(td)
+    # the y component of the half vector is 0 by convention: row 1 of k1 is never used
+    x = np.stack([np.sin(th), np.cos(th), sd * np.cos(pd), sd * np.sin(pd), np.cos(td)], axis=-1)
+    x = np.maximum(x @ k1[[0, 2, 3, 4, 5]] + b1, 0)
+    x = np.maximum(x @ k2 + b2, 0)
+    return np.maximum(np.exp(x @ k3 + b3) - 1.0, 0.0)

@@ -1,0 +1,146 @@
+"""Read a capture file (TOML). Everything that can be refused without opening images is refused."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..fit import PaperSettings
+from ..light import DistantLight
+from ..samples import Margins
+from .lines import key_lines
+from .model import SHADOW_MASK, Capture, FitOptions, MaterialEntry, PhotoEntry
+from .section import Section
+
+# Of the contract, but not read by this version: refused by name instead of as unknown
+LIGHTS_TO_COME = ("sphere", "sun", "position", "mounted", "white", "intensity")
+
+
+def read_capture(path: Path) -> Capture:
+    """The capture in a file. Raises InputError naming the key and the line."""
+    try:
+        text = path.read_text("utf-8")
+        data = tomllib.loads(text)
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", file=path) from error
+    except UnicodeDecodeError as error:
+        raise InputError("is not a text in UTF-8", file=path) from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"is not valid TOML ({error})", file=path) from error
+    lines = key_lines(text)
+    top = Section(data, path.resolve(), lines)
+
+    scan = top.table("scan")
+    cameras, mesh = scan.file_path("cameras"), scan.file_path("mesh")
+    images = scan.file_path("images", required=False)
+    scan.close()
+    lights = tuple(_light(section) for section in top.tables("light"))
+    materials = tuple(_material(section) for section in top.tables("material"))
+    photos = tuple(
+        _photo(section, {light.name for light in lights}, {m.name for m in materials})
+        for section in top.tables("photo")
+    )
+    fit = _fit(top.table("fit"))
+    top.table("diagnose").close()
+    top.close()
+    if not photos:
+        raise top.error("no [[photo]]: at least one lit photo is needed", "photo")
+    for kind, names in (("light", [x.name for x in lights]), ("material", [x.name for x in materials])):
+        for place, name in enumerate(names):
+            if name in names[:place]:
+                raise top.error(f"the name {name!r} is used twice", kind, place, "name")
+    assert cameras is not None and mesh is not None  # required above
+    return Capture(
+        file=path.resolve(),
+        cameras=cameras,
+        mesh=mesh,
+        images=images,
+        lights=lights,
+        photos=photos,
+        materials=materials or (MaterialEntry("surface"),),
+        fit=fit,
+        lines=lines,
+    )
+
+
+def _light(section: Section) -> DistantLight:
+    name = section.text("name")
+    for key in LIGHTS_TO_COME:
+        if section.get(key) is not None:
+            raise section.error(
+                f"a light by {key!r} is not read by this version; give direction and irradiance",
+                key,
+            )
+    direction = section.vector("direction")
+    if direction is None:
+        raise section.error("the key 'direction' is missing", "direction")
+    length = float(np.linalg.norm(direction))
+    if length < 1e-9:
+        raise section.error("the direction has no length", "direction")
+    irradiance = section.vector("irradiance")
+    if irradiance is not None and not (irradiance > 0).all():
+        raise section.error(f"found {irradiance.tolist()}, expected positive numbers", "irradiance")
+    section.close()
+    assert name is not None
+    return DistantLight(name, direction / length, irradiance)
+
+
+def _material(section: Section) -> MaterialEntry:
+    name = section.text("name")
+    faces = section.text("faces", required=False)
+    section.close()
+    assert name is not None
+    if name == SHADOW_MASK:
+        raise section.error(f"{SHADOW_MASK!r} is the name of the shadow masks", "name")
+    if any(c in name for c in '/\\:*?"<>|') or name.strip(". ") != name:
+        raise section.error(f"{name!r} cannot be part of a file name", "name")
+    return MaterialEntry(name, faces)
+
+
+def _photo(section: Section, lights: set[str], materials: set[str]) -> PhotoEntry:
+    file, camera, light = (
+        section.file_path("file"), section.text("camera"), section.text("light"),
+    )  # fmt: skip
+    exposure = section.number("exposure", 1.0, low=1e-12, high=1e12)
+    entries = section.table("masks")
+    masks = {}
+    for name in entries.data:
+        if name != SHADOW_MASK and name not in materials:
+            raise entries.error(f"no [[material]] is named {name!r}", name)
+        path = entries.file_path(name)
+        assert path is not None
+        masks[name] = path
+    section.close()
+    assert file is not None and camera is not None and light is not None
+    if light not in lights:
+        known = ", ".join(sorted(lights)) or "none"
+        raise section.error(f"no [[light]] is named {light!r}; there are: {known}", "light")
+    return PhotoEntry(file, camera, light, exposure, masks)
+
+
+def _fit(section: Section) -> FitOptions:
+    margins, paper = Margins(), PaperSettings()
+    curvature = section.number("curvature", paper.curvature or 0.0, low=0.0)
+    options = FitOptions(
+        margins=Margins(
+            silhouette=section.integer("silhouette_margin", margins.silhouette, 0, 1000),
+            shadow=section.integer("shadow_margin", margins.shadow, 0, 1000),
+            cosine=section.number("smallest_cosine", margins.cosine, 0.001, 0.99),
+        ),
+        paper=PaperSettings(
+            samples=section.integer("samples", paper.samples, 1, 40),
+            trials=section.integer("trials", paper.trials, 1, 10_000),
+            subset=section.integer("subset", paper.subset, 10, 1_000_000),
+            curvature=curvature if curvature > 0 else None,  # 0 switches the test off
+            monotonicity=section.flag("monotonicity", paper.monotonicity),
+            highest_intensity=section.flag("highest_intensity", paper.highest_intensity),
+            eta=section.number("eta", paper.eta, 0.0),
+            seed=section.integer("seed", paper.seed, 0),
+        ),
+        held_out=section.flag("held_out", True),
+    )
+    section.close()
+    return options

@@ -1,0 +1,122 @@
+"""One table of a capture file, read key by key; what is not read is unknown, and said so."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .model import key_error
+
+
+class Section:
+    """A table and where it stands. Reading a key marks it as known; close() refuses the rest."""
+
+    def __init__(
+        self,
+        data: dict[str, Any],
+        file: Path,
+        lines: dict[tuple[str | int, ...], int],
+        path: tuple[str | int, ...] = (),
+    ) -> None:
+        self.data, self.file, self.lines, self.path = data, file, lines, path
+        self.known: set[str] = set()
+
+    def error(self, message: str, *key: str | int) -> InputError:
+        return key_error(self.file, self.lines, message, *self.path, *key)
+
+    def get(self, name: str, required: bool = False) -> Any:
+        self.known.add(name)
+        if required and name not in self.data:
+            raise self.error(f"the key {name!r} is missing", name)
+        return self.data.get(name)
+
+    def text(self, name: str, required: bool = True) -> str | None:
+        value = self.get(name, required)
+        if value is not None and (not isinstance(value, str) or not value):
+            raise self.error(f"found {value!r}, expected a text", name)
+        return value
+
+    def file_path(self, name: str, required: bool = True) -> Path | None:
+        """A file or folder that must exist, relative to the capture file."""
+        value = self.text(name, required)
+        return None if value is None else self.existing(value, name)
+
+    def existing(self, value: str, *key: str | int) -> Path:
+        path = Path(value)
+        path = path if path.is_absolute() else self.file.parent / path
+        if not path.exists():
+            raise self.error(f"no such file: {path}", *key)
+        return path
+
+    def number(
+        self, name: str, default: float, low: float = -math.inf, high: float = math.inf
+    ) -> float:
+        value = self.get(name)
+        if value is None:
+            return default
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.error(f"found {value!r}, expected a number", name)
+        if not (math.isfinite(value) and low <= value <= high):
+            raise self.error(f"found {value}, expected a number from {low:g} to {high:g}", name)
+        return float(value)
+
+    def integer(self, name: str, default: int, low: int, high: int = 2**31) -> int:
+        value = self.get(name)
+        if value is None:
+            return default
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            raise self.error(f"found {value!r}, expected a whole number from {low} up", name)
+        return value
+
+    def flag(self, name: str, default: bool) -> bool:
+        value = self.get(name)
+        if value is None:
+            return default
+        if not isinstance(value, bool):
+            raise self.error(f"found {value!r}, expected true or false", name)
+        return value
+
+    def vector(self, name: str) -> NDArray[np.float64] | None:
+        """Three finite numbers, or None where the key is absent."""
+        value = self.get(name)
+        if value is None:
+            return None
+        good = (
+            isinstance(value, list)
+            and len(value) == 3
+            and all(isinstance(x, int | float) and not isinstance(x, bool) for x in value)
+            and all(math.isfinite(x) for x in value)
+        )
+        if not good:
+            raise self.error(f"found {value!r}, expected three numbers [x, y, z]", name)
+        return np.array(value, np.float64)
+
+    def table(self, name: str) -> Section:
+        value = self.get(name)
+        if value is None:
+            value = {}
+        if not isinstance(value, dict):
+            raise self.error(f"found {value!r}, expected a table", name)
+        return Section(value, self.file, self.lines, (*self.path, name))
+
+    def tables(self, name: str) -> Iterator[Section]:
+        value = self.get(name)
+        if value is None:
+            value = []
+        if not isinstance(value, list) or not all(isinstance(v, dict) for v in value):
+            raise self.error(f"expected [[{name}]] tables", name)
+        for place, entry in enumerate(value):
+            yield Section(entry, self.file, self.lines, (*self.path, name, place))
+
+    def close(self) -> None:
+        """Refuse keys that nothing has asked for."""
+        for name in self.data:
+            if name not in self.known:
+                known = ", ".join(sorted(self.known))
+                raise self.error(f"unknown key {name!r}; known here: {known}", name)

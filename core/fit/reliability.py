@@ -1,0 +1,49 @@
+"""The paper's three tests of which samples to believe (section 3.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import half_difference
+from ..samples import SampleTable
+
+
+def calm(table: SampleTable, threshold: float) -> NDArray[np.bool_]:
+    """(n,) samples where the screen-space mean curvature is known and at most the threshold."""
+    with np.errstate(invalid="ignore"):
+        return np.abs(table.curvature) <= threshold
+
+
+def monotone_with(
+    cos_h: NDArray[np.floating], rho: NDArray[np.floating], chosen: NDArray[np.intp]
+) -> NDArray[np.bool_]:
+    """(n,) samples that stand to every chosen one as n·h does: larger n·h ⇔ larger ρ.
+
+    cos_h, rho: (n,), rho the mean over the channels (Higo et al. 2010's monotonicity).
+    """
+    agree = np.ones(len(cos_h), bool)
+    for i in chosen:
+        agree &= (cos_h - cos_h[i]) * (rho - rho[i]) > 0
+    return agree
+
+
+def highest_intensity(table: SampleTable) -> tuple[int, SampleTable]:
+    """(row, table of that one sample) of the brightest pixel, its normal replaced by the half
+    vector: the paper takes it for the specular peak, so θh = 0 there."""
+    row = int(table.radiance.mean(axis=1).argmax())
+    one = table.select(np.array([row]))
+    light = one.light[one.photo]
+    half = light + one.view
+    half = half / np.linalg.norm(half, axis=1, keepdims=True)
+    angles = half_difference(half, light, one.view.astype(np.float64))
+    cos_i = np.einsum("ij,ij->i", half, light)
+    rho = one.radiance / (one.irradiance[one.photo] * cos_i[:, None])
+    return row, SampleTable(
+        photo=one.photo, pixel=one.pixel,
+        theta_h=np.zeros(1, np.float32), theta_d=angles.theta_d.astype(np.float32),
+        phi_d=angles.phi_d.astype(np.float32),
+        cos_i=cos_i.astype(np.float32), cos_o=cos_i.astype(np.float32),
+        rho=rho.astype(np.float32), radiance=one.radiance, normal=half.astype(np.float32),
+        view=one.view, curvature=one.curvature, light=one.light, irradiance=one.irradiance,
+    )  # fmt: skip

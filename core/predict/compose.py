@@ -1,0 +1,47 @@
+"""A whole photo as the model sees it: every material in its place, direct light, shadows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import half_difference
+from ..basis import PrincipalBRDF
+from ..geometry import RayScene, SurfaceView
+from ..light import DistantLight
+from ..samples.take import light_surface
+
+
+@dataclass(frozen=True)
+class PredictedPhoto:
+    """radiance: (h, w, 3), 0 in shadow, NaN where no material was fitted or no surface is seen."""
+
+    radiance: NDArray[np.float32]
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """(h, w) where there is a prediction."""
+        return np.isfinite(self.radiance[..., 0])
+
+
+def predict_photo(
+    rays: RayScene,
+    view: SurfaceView,
+    light: DistantLight,
+    parts: list[tuple[NDArray[np.bool_], PrincipalBRDF]],
+) -> PredictedPhoto:
+    """parts: ((n,) pixels of the view, BRDF) of every material."""
+    lighting = light_surface(rays, view, light)
+    values = np.full((len(view.pixel), 3), np.nan, np.float32)
+    for pixels, brdf in parts:
+        values[pixels] = 0.0
+        lit = pixels & ~lighting.shadowed
+        angles = half_difference(view.normal[lit], light.direction[None, :], view.view[lit])
+        values[lit] = (
+            brdf.evaluate(angles)
+            * light.effective_irradiance.astype(np.float32)
+            * lighting.cos_i[lit, None]
+        )
+    return PredictedPhoto(view.image(values))

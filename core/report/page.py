@@ -1,0 +1,142 @@
+"""The report of a fit: one HTML page and its pictures, in one folder, no network needed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+from pathlib import Path
+
+import numpy as np
+
+from ..geometry import view_surface
+from ..job import CaptureResult, MaterialResult, inputs
+from ..photo import write_png
+from ..predict.compose import predict_photo
+from . import display
+from .polar import Curve, polar_chart
+from .sphere import lit_sphere
+
+STYLE = """
+:root{color-scheme:light}body{font:15px/1.5 system-ui,sans-serif;margin:2.5rem auto;max-width:1180px;
+padding:0 1.2rem;color:#223;background:#f6f6f4}h1{font-weight:600;margin-bottom:.2rem}
+h2{font-weight:600;margin:2.2rem 0 .6rem}p.sub{color:#667;margin-top:0}figure{margin:0}
+figcaption{color:#556;font-size:13px;padding:.25rem 0}img{display:block;width:100%;border-radius:6px}
+.material{display:grid;grid-template-columns:260px 1fr;gap:1.4rem;align-items:start}
+.charts{display:grid;grid-template-columns:repeat(3,1fr);gap:.8rem}.charts svg{background:#fff;
+border-radius:6px;width:100%}.triple{display:grid;grid-template-columns:repeat(3,1fr);gap:.5rem;
+margin-bottom:1rem}table{border-collapse:collapse;margin:.6rem 0}td,th{padding:.2rem .9rem .2rem 0;
+text-align:left;font-weight:400;vertical-align:top}th{color:#667}.warn{background:#fff3d6;padding:.5rem .8rem;
+border-radius:6px;margin:.4rem 0}.key{display:inline-block;width:9em;height:.7em;border-radius:3px;
+background:linear-gradient(90deg,#3b4cc0,#ececec,#b40426)}
+"""
+LONGEST = 640
+
+
+def write_report(folder: Path, result: CaptureResult) -> Iterator[float]:
+    """Write index.html and pictures into ``folder``; yields the fraction done before each piece."""
+    folder.mkdir(parents=True, exist_ok=True)
+    body: list[str] = []
+    count = len(result.materials) + len(result.capture.photos)
+    for done, material in enumerate(result.materials):
+        yield done / count
+        body.append(_material_section(folder, material))
+    body.append(
+        "<h2>Photo, prediction, difference</h2><p class='sub'>Each prediction is made from the "
+        "scanned mesh, the light and the fitted materials: direct light and cast shadows. "
+        "Difference: <span class='key'></span> prediction too dark … too bright, full colour at "
+        "± 30 % of the photo's white. Dark grey: no surface or no material.</p>"
+    )
+    for place in range(len(result.capture.photos)):
+        yield (len(result.materials) + place) / count
+        body.append(_photo_row(folder, result, place))
+    title = escape(result.capture.file.name)
+    (folder / "index.html").write_text(
+        f"<!doctype html><html lang='en'><meta charset='utf-8'><title>Patina: {title}</title>"
+        f"<style>{STYLE}</style><h1>Patina report</h1><p class='sub'>{title} · "
+        f"{len(result.capture.photos)} lit photos · {len(result.scan.mesh.faces):,} faces · basis "
+        f"{result.basis.version}</p>{''.join(body)}</html>",
+        "utf-8",
+    )
+
+
+def _material_section(folder: Path, material: MaterialResult) -> str:
+    brdf = material.fit.brdf
+    sphere, coverage = lit_sphere(brdf.evaluate)
+    picture = display.srgb(sphere)
+    alpha = (coverage * 255 + 0.5).astype(np.uint8)
+    name = f"sphere_{material.name}.png"
+    write_png(folder / name, np.dstack([picture, alpha]))
+    charts = "".join(
+        f"<figure>{polar_chart([Curve('fit', brdf.evaluate)], incidence)}</figure>"
+        for incidence in (15, 45, 70)
+    )
+    warnings = "".join(f"<p class='warn'>{escape(w)}</p>" for w in material.warnings)
+    rows = "".join(
+        f"<tr><th>{key}</th><td>{value}</td></tr>" for key, value in _figures(material)
+    )
+    return (
+        f"<h2>{escape(material.name)}</h2><div class='material'><figure><img src='{escape(name)}' "
+        f"alt='lit sphere'><figcaption>Lit sphere, key light π at the upper left</figcaption>"
+        f"</figure><div>{warnings}<table>{rows}</table></div></div><div class='charts'>{charts}</div>"
+    )
+
+
+def _figures(material: MaterialResult) -> list[tuple[str, str]]:
+    fit, p = material.fit, material.principled.principled
+    held = material.held_out
+    unseen = (
+        "only one photo: nothing to hold out"
+        if held is None
+        else f"predicts a photo it has not seen to {100 * held.error:.1f} % (relative RMS)"
+    )
+    colour = ", ".join(f"{c:.3f}" for c in p.base_color)
+    return [
+        ("held-out photos", unseen),
+        ("samples", f"{material.samples:,} lit pixels, {fit.reliable:,} on calm surface, "
+                    f"{len(fit.chosen)} chosen (condition number {fit.condition:.1f})"),
+        ("cosine similarity", f"{fit.similarity.max():.4f}, the best of {len(fit.similarity)} trials "
+                              f"(worst {fit.similarity.min():.4f})"),
+        ("spread of trials", f"± {100 * material.spread.median:.0f} % median, "
+                             f"± {100 * material.spread.at_highlight:.0f} % at the highlight"),
+        ("Principled", f"base colour {colour} · metallic {p.metallic:.2f} · roughness "
+                       f"{p.roughness:.2f} · specular {p.specular_ior_level:.2f} · coat "
+                       f"{p.coat_weight:.2f} (cube-root error {100 * material.principled.error:.1f} %)"),
+    ]  # fmt: skip
+
+
+def _photo_row(folder: Path, result: CaptureResult, place: int) -> str:
+    capture = result.capture
+    photo = capture.photos[place]
+    view = view_surface(result.rays, inputs.camera_of(capture, result.scan, place))
+    where, _ = inputs.material_pixels(capture, result.scan, view, place)
+    parts = [(where[m.name], m.fit.brdf) for m in result.materials]
+    predicted = predict_photo(result.rays, view, capture.light(photo.light), parts)
+    measured = inputs.radiance_of(capture, place)
+    box = display.crop_box(view.seen, margin=12)
+    a = display.shrink(measured[box], LONGEST)
+    b = display.shrink(predicted.radiance[box], LONGEST)
+    white = display.white_level(measured[box][view.seen[box]])
+    names = [f"photo_{place:02d}_{kind}.png" for kind in ("measured", "predicted", "difference")]
+    write_png(folder / names[0], display.photo_picture(a, white))
+    write_png(folder / names[1], display.photo_picture(b, white))
+    write_png(folder / names[2], display.difference_picture(b, a, 0.3 * white))
+    error = _relative_error(predicted.radiance, measured)
+    labels = (
+        f"{escape(photo.file.name)}: photo",
+        "prediction",
+        f"difference, relative RMS {100 * error:.1f} %",
+    )
+    cells = "".join(
+        f"<figure><img src='{name}' alt='{label}' loading='lazy'><figcaption>{label}</figcaption>"
+        "</figure>"
+        for name, label in zip(names, labels, strict=True)
+    )
+    return f"<div class='triple'>{cells}</div>"
+
+
+def _relative_error(predicted: np.ndarray, measured: np.ndarray) -> float:
+    """‖L̂ − L‖ / ‖L‖ over all pixels with a prediction, edges and shadows included."""
+    known = np.isfinite(predicted[..., 0])
+    difference = (predicted - measured)[known].astype(np.float64)
+    size = measured[known].astype(np.float64)
+    return float(np.linalg.norm(difference) / max(np.linalg.norm(size), 1e-300))

@@ -1,0 +1,123 @@
+"""result.json: what a fit found, for programs and researchers."""
+
+from __future__ import annotations
+
+import json
+import os
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..job import CaptureResult, MaterialResult, Stage
+
+MANIFEST = Path(__file__).parents[2] / "blender_manifest.toml"
+FORMAT = 1
+
+
+def program_version() -> str:
+    """The extension's version, as its manifest says."""
+    return str(tomllib.loads(MANIFEST.read_text("utf-8"))["version"])
+
+
+def write(path: Path, result: CaptureResult, stages: Sequence[Stage], notes: Sequence[str]) -> None:
+    """Write the file; it appears whole or not at all."""
+    partial = path.with_name(path.name + ".part")
+    partial.write_text(json.dumps(describe(result, stages, notes), indent=1) + "\n", "utf-8")
+    os.replace(partial, path)
+
+
+def describe(
+    result: CaptureResult, stages: Sequence[Stage], notes: Sequence[str] = ()
+) -> dict[str, Any]:
+    """The content of result.json. Angles in degrees, ρ in 1/sr."""
+    basis = result.basis
+    return {
+        "format": FORMAT,
+        "program": {"name": "patina", "version": program_version()},
+        "basis": {
+            "version": basis.version,
+            "components": basis.count,
+            "columns": basis.columns,
+            "provenance": basis.provenance,
+        },
+        "capture": str(result.capture.file),
+        "materials": [_material(result, m) for m in result.materials],
+        "warnings": [*result.warnings, *notes],
+        "stages": [
+            {"name": s.name, "seconds": round(s.seconds, 3), "peak_mb": _rounded(s.peak_mb, 1)}
+            for s in stages
+        ],
+    }
+
+
+def _material(result: CaptureResult, material: MaterialResult) -> dict[str, Any]:
+    fit, held, photos = material.fit, material.held_out, result.capture.photos
+    width = {
+        i: (result.scan.camera(photo.camera) or result.scan.cameras[0]).width
+        for i, photo in enumerate(photos)
+    }
+    chosen = fit.chosen
+    principled = material.principled
+    return {
+        "name": material.name,
+        "estimator": "paper",
+        "coefficients": fit.brdf.coefficients.tolist(),
+        "scale_known": material.irradiance_known,
+        "samples": {
+            "used": material.samples,
+            "on_calm_surface": fit.reliable,
+            "per_photo": dict(
+                zip((p.file.name for p in photos), material.per_photo, strict=True)
+            ),
+        },
+        "chosen": [
+            {
+                "photo": photos[int(chosen.photo[i])].file.name,
+                "pixel": [
+                    int(chosen.pixel[i] % width[int(chosen.photo[i])]),
+                    int(chosen.pixel[i] // width[int(chosen.photo[i])]),
+                ],
+                "theta_h": _degrees(chosen.theta_h[i]),
+                "theta_d": _degrees(chosen.theta_d[i]),
+                "phi_d": _degrees(chosen.phi_d[i]),
+                "rho": [float(x) for x in chosen.rho[i]],
+            }
+            for i in range(len(chosen))
+        ],
+        "condition_number": fit.condition,
+        "cosine_similarity": fit.similarity.tolist(),
+        "held_out": None
+        if held is None
+        else {
+            "measure": "relative RMS error of lit pixels, each photo predicted from the others",
+            "error": held.error,
+            "per_photo": {photos[i].file.name: e for i, e in held.per_photo.items()},
+        },
+        "uncertainty": {
+            "measure": "standard deviation of ln(reflectance) between trials; not calibrated",
+            "median": material.spread.median,
+            "percentile_90": material.spread.percentile_90,
+            "at_highlight": material.spread.at_highlight,
+        },
+        "principled": {
+            **{k: _plain(v) for k, v in vars(principled.principled).items()},
+            "cube_root_error": principled.error,
+            "lambertian_cube_root_error": principled.diffuse_error,
+        },
+        "warnings": list(material.warnings),
+    }
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _degrees(angle: float) -> float:
+    return round(float(np.degrees(angle)), 4)
+
+
+def _rounded(value: float | None, digits: int) -> float | None:
+    return None if value is None else round(value, digits)

@@ -1,0 +1,42 @@
+"""A lit sphere: the picture by which a material is recognised."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import Angles, half_difference
+
+KEY = np.array([-0.5, 0.6, 0.62])  # left, above, in front
+RIM = np.array([0.85, 0.25, -0.30])
+RIM_STRENGTH = 0.7
+
+
+def lit_sphere(
+    evaluate: Callable[[Angles], NDArray[np.floating]], size: int = 320, oversample: int = 2
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """(radiance (size, size, 3), coverage (size, size)) of a sphere under two distant lights.
+
+    evaluate(angles) -> ρ (n, 3). Orthographic view along −z; key light of irradiance π, so that a
+    white matte sphere reaches 1.
+    """
+    n = size * oversample
+    axis = (np.arange(n) + 0.5) / n * 2.1 - 1.05
+    x, y = np.meshgrid(axis, -axis)
+    inside = x**2 + y**2 < 1.0
+    normal = np.stack([x, y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], axis=-1)[inside]
+    view = np.broadcast_to(np.array([0.0, 0.0, 1.0]), normal.shape)
+    radiance = np.zeros((len(normal), 3), np.float32)
+    for direction, strength in ((KEY, 1.0), (RIM, RIM_STRENGTH)):
+        light = direction / np.linalg.norm(direction)
+        cos_i = normal @ light
+        lit = cos_i > 0
+        angles = half_difference(normal[lit], light[None, :], view[lit])
+        radiance[lit] += (strength * np.pi * cos_i[lit, None] * evaluate(angles)).astype(np.float32)
+    image = np.zeros((n, n, 3), np.float32)
+    image[inside] = radiance
+    blocks = image.reshape(size, oversample, size, oversample, 3).mean(axis=(1, 3))
+    coverage = inside.reshape(size, oversample, size, oversample).mean(axis=(1, 3))
+    return blocks, coverage.astype(np.float32)

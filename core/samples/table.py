@@ -1,0 +1,66 @@
+"""The table every estimator reads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import Angles
+
+
+@dataclass(frozen=True)
+class SampleTable:
+    """n reflectance samples; row i is one pixel of one photo.
+
+    photo: (n,) int16 index of the photo; pixel: (n,) int32 flat index in it.
+    theta_h, theta_d, phi_d: (n,) float32, radians, of the scanned normal.
+    cos_i, cos_o: (n,) float32. rho: (n, 3) float32, L / (E · cos θi), 1/sr.
+    radiance: (n, 3) float32, the photo's units. irradiance: (photos, 3) of each photo's light.
+    light: (photos, 3) unit direction surface → light, scan frame.
+    normal, view: (n, 3) float32 unit, scan frame. curvature: (n,) float32, 1/pixel, NaN unknown.
+    """
+
+    photo: NDArray[np.int16]
+    pixel: NDArray[np.int32]
+    theta_h: NDArray[np.float32]
+    theta_d: NDArray[np.float32]
+    phi_d: NDArray[np.float32]
+    cos_i: NDArray[np.float32]
+    cos_o: NDArray[np.float32]
+    rho: NDArray[np.float32]
+    radiance: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    view: NDArray[np.float32]
+    curvature: NDArray[np.float32]
+    light: NDArray[np.float64]
+    irradiance: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.photo)
+
+    @property
+    def angles(self) -> Angles:
+        return Angles(self.theta_h, self.theta_d, self.phi_d)
+
+    def select(self, which: NDArray) -> SampleTable:
+        """The rows of a boolean mask or an index array."""
+        rows = {
+            f.name: getattr(self, f.name)[which]
+            for f in fields(self)
+            if f.name not in ("light", "irradiance")
+        }
+        return SampleTable(**rows, light=self.light, irradiance=self.irradiance)
+
+    @staticmethod
+    def join(tables: Sequence[SampleTable]) -> SampleTable:
+        """Tables of several photos, one after the other. Photo i of the result is table i."""
+        rows = {
+            f.name: np.concatenate([getattr(t, f.name) for t in tables])
+            for f in fields(SampleTable)
+            if f.name != "photo"
+        }
+        photo = np.concatenate([np.full(len(t), i, np.int16) for i, t in enumerate(tables)])
+        return SampleTable(photo=photo, **rows)

@@ -1,0 +1,96 @@
+"""A triangle mesh from OBJ or PLY (trimesh reads), with smooth vertex normals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+FORMATS = {".ply": "ply", ".obj": "obj"}
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """vertices: (v, 3) float64, scan units; faces: (f, 3) int32, counter-clockwise from outside;
+    face_attributes: name → (f,) int32, the integer face properties of the file."""
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    face_attributes: dict[str, NDArray[np.int32]] = field(default_factory=dict)
+
+    @cached_property
+    def vertex_normals(self) -> NDArray[np.float64]:
+        """(v, 3) unit normals, the mean of the adjoining faces weighted by their angles
+        (Thürmer & Wüthrich 1998: independent of how a surface is cut into triangles)."""
+        corners = self.vertices[self.faces]
+        face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        face_normals /= np.maximum(np.linalg.norm(face_normals, axis=1, keepdims=True), 1e-300)
+        normals = np.zeros_like(self.vertices)
+        for k in range(3):
+            a = corners[:, (k + 1) % 3] - corners[:, k]
+            b = corners[:, (k + 2) % 3] - corners[:, k]
+            angle = np.arctan2(
+                np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b)
+            )
+            for axis in range(3):
+                normals[:, axis] += np.bincount(
+                    self.faces[:, k], angle * face_normals[:, axis], len(self.vertices)
+                )
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        return np.where(length > 1e-12, normals / np.maximum(length, 1e-12), [0.0, 0.0, 1.0])
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal of the bounding box of what the faces use, scan units."""
+        used = self.vertices[np.unique(self.faces)]
+        return float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))
+
+
+def read_mesh(path: Path) -> Mesh:
+    """The triangles of an OBJ or PLY file (larger polygons are cut). Raises InputError."""
+    kind = FORMATS.get(path.suffix.lower())
+    if kind is None:
+        expected = " or ".join(sorted(FORMATS))
+        raise InputError(f"mesh format {path.suffix!r} is not read, expected {expected}", file=path)
+    try:
+        with open(path, "rb") as file:
+            loaded = trimesh.load(
+                file, file_type=kind, process=False, maintain_order=True, skip_materials=True
+            )
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", file=path) from error
+    except Exception as error:  # trimesh raises whatever the parser met
+        raise InputError(f"not a readable {kind.upper()} mesh ({error})", file=path) from error
+    if isinstance(loaded, trimesh.Scene):
+        parts = [g for g in loaded.geometry.values() if isinstance(g, trimesh.Trimesh)]
+        loaded = trimesh.util.concatenate(parts) if parts else None
+    faces = getattr(loaded, "faces", None)
+    if faces is None or len(faces) == 0:
+        raise InputError("the mesh has no faces (a point cloud?): export the surface", file=path)
+    vertices = np.asarray(loaded.vertices, np.float64)
+    faces = np.asarray(faces, np.int32)
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise InputError("faces refer to vertices that are not there", file=path)
+    if not np.isfinite(vertices).all():
+        raise InputError("vertices are not finite numbers (NaN)", file=path)
+    return Mesh(vertices, faces, _integer_properties(loaded, len(faces)))
+
+
+def _integer_properties(loaded: trimesh.Trimesh, count: int) -> dict[str, NDArray[np.int32]]:
+    """Integer properties of a PLY's faces (only where its polygons were triangles already)."""
+    raw = loaded.metadata.get("_ply_raw", {}).get("face", {}).get("data")
+    if raw is None:
+        return {}
+    names = raw.dtype.names if isinstance(raw, np.ndarray) and raw.dtype.names else tuple(raw)
+    found = {}
+    for name in names:
+        values = np.asarray(raw[name]).squeeze()
+        if values.shape == (count,) and np.issubdtype(values.dtype, np.integer):
+            found[str(name)] = values.astype(np.int32)
+    return found

@@ -1,0 +1,65 @@
+"""Mesh and cameras together, in the frame the reconstruction tool gave them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from .camera import Camera
+from .colmap import is_colmap, read_colmap
+from .mesh import Mesh, read_mesh
+
+
+@dataclass(frozen=True)
+class Scan:
+    """A scanned object: its mesh, the cameras that saw it and where its own photos lie, if known."""
+
+    mesh: Mesh
+    cameras: tuple[Camera, ...]
+    images: Path | None = None
+
+    def camera(self, label: str) -> Camera | None:
+        """The camera of that label; a label is also found without its folder and extension
+        (COLMAP says "IMG_0041.jpg", Metashape "IMG_0041") where that is unambiguous."""
+        for camera in self.cameras:
+            if camera.label == label:
+                return camera
+        same = [c for c in self.cameras if Path(c.label).stem == Path(label).stem]
+        return same[0] if len(same) == 1 else None
+
+
+def read_cameras(path: Path) -> tuple[Camera, ...]:
+    """The cameras of any model Patina reads. Raises InputError."""
+    if path.is_dir():
+        if is_colmap(path):
+            return read_colmap(path)
+        raise InputError("the folder holds no COLMAP model (cameras and images)", file=path)
+    raise InputError("cameras of this kind are not read; expected a COLMAP folder", file=path)
+
+
+def read_scan(cameras: Path, mesh: Path, images: Path | None = None) -> Scan:
+    """Mesh and cameras from files, checked to be in one frame. Raises InputError."""
+    scan = Scan(read_mesh(mesh), read_cameras(cameras), images)
+    check_common_frame(scan, mesh)
+    return scan
+
+
+def check_common_frame(scan: Scan, mesh_file: Path) -> None:
+    """Refuse a mesh that no camera sees: it was exported in another frame than the cameras."""
+    vertices = scan.mesh.vertices
+    some = vertices[:: max(1, len(vertices) // 2000)]
+    for camera in scan.cameras:
+        pixels = camera.project(some)
+        with np.errstate(invalid="ignore"):
+            inside = (pixels >= 0) & (pixels < (camera.width, camera.height))
+        if inside.all(axis=1).any():
+            return
+    raise InputError(
+        "the mesh lies in another frame than the cameras: no vertex projects into any photo; "
+        "export mesh and cameras from the same project, without a transform of its own",
+        file=mesh_file,
+        key="scan.mesh",
+    )

@@ -1,0 +1,109 @@
+"""Fit stage: a stepped job. Scripts drain it, the window steps it on a timer; ESC cancels."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from ..core.capture import read_capture
+from ..core.errors import PatinaError
+from ..core.job import FitJob
+from ..scene.apply import apply_result
+from .report_errors import refuse
+
+TICK = 0.01
+
+
+class PATINA_OT_fit(bpy.types.Operator):
+    """Measure the materials: sample every lit photo and fit a BRDF to each material"""
+
+    bl_idname = "patina.fit"
+    bl_label = "Fit Materials"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.scene.patina.capture:
+            return True
+        cls.poll_message_set("Import a capture first: it says which photos to measure")
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            self._start(context)
+            self._job.drain()
+            self._finish(context)
+        except PatinaError as error:
+            return refuse(self, error)
+        return {"FINISHED"}
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        try:
+            self._start(context)
+        except PatinaError as error:
+            return refuse(self, error)
+        self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type == "ESC":
+            self._stop(context)
+            self.report({"WARNING"}, "Fit cancelled; nothing was changed")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        try:
+            if self._job.step():
+                self._show(context)
+                return {"RUNNING_MODAL"}
+            self._stop(context)
+            self._finish(context)
+        except PatinaError as error:
+            self._stop(context)
+            return refuse(self, error)
+        except BaseException:
+            self._stop(context)
+            raise
+        return {"FINISHED"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        self._stop(context)
+
+    def _start(self, context: bpy.types.Context) -> None:
+        path = Path(bpy.path.abspath(context.scene.patina.capture))
+        self._job, self._timer = FitJob(read_capture(path)), None
+
+    def _show(self, context: bpy.types.Context) -> None:
+        state = context.scene.patina
+        state.stage, state.progress = self._job.now.stage, self._job.now.fraction
+        for area in context.screen.areas if context.screen else ():
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+
+    def _stop(self, context: bpy.types.Context) -> None:
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+        context.scene.patina.stage = ""
+
+    def _finish(self, context: bpy.types.Context) -> None:
+        result = self._job.result
+        if result is None:
+            return
+        notes = apply_result(context.scene, result, self._job.stages)
+        for material in result.materials:
+            for warning in material.warnings:
+                self.report({"WARNING"}, f"{material.name}: {warning}")
+        for note in notes:
+            self.report({"WARNING"}, note)
+        self.report({"INFO"}, f"{len(result.materials)} materials measured")
+
+
+def register() -> None:
+    bpy.utils.register_class(PATINA_OT_fit)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(PATINA_OT_fit)

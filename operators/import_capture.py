@@ -1,0 +1,75 @@
+"""Scan stage: a capture into the scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from ..core.capture import read_capture
+from ..core.errors import PatinaError
+from ..core.job import inputs
+from ..scene.scan_collection import create_scan_collection
+from ..scene.working_folder import working_folder
+from .report_errors import refuse
+
+DEMO = Path(__file__).parents[1] / "assets" / "demo" / "demo.capture.toml"
+
+
+class PATINA_OT_import_capture(bpy.types.Operator):
+    """Bring in a capture: the scanned mesh, its cameras with the photos behind them, the lights"""
+
+    bl_idname = "patina.import_capture"
+    bl_label = "Import Capture"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})  # type: ignore[valid-type]
+    filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})  # type: ignore[valid-type]
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        path = Path(bpy.path.abspath(self.filepath))
+        try:
+            capture = read_capture(path)
+            scan = inputs.open_scan(capture)
+            inputs.check_photos(capture, scan)
+            made = create_scan_collection(context.scene, capture, scan, working_folder())
+        except PatinaError as error:
+            return refuse(self, error)
+        context.scene.patina.capture = str(path)
+        context.scene.patina.mesh = made.mesh
+        self.report(
+            {"INFO"},
+            f"{len(made.cameras)} cameras, {len(capture.photos)} lit photos, "
+            f"{len(scan.mesh.faces):,} faces",
+        )
+        return {"FINISHED"}
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if self.filepath:
+            return self.execute(context)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+
+class PATINA_OT_import_demo(bpy.types.Operator):
+    """Bring in the capture that comes with Patina, to try everything without photos of your own"""
+
+    bl_idname = "patina.import_demo"
+    bl_label = "Import Demo Capture"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return bpy.ops.patina.import_capture("EXEC_DEFAULT", filepath=str(DEMO))
+
+
+CLASSES = (PATINA_OT_import_capture, PATINA_OT_import_demo)
+
+
+def register() -> None:
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,1 @@
+"""The stages of the workflow, as the artist sees them."""

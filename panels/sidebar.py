@@ -1,0 +1,106 @@
+"""The sidebar tab: Scan, Photos, Fit, Material, in the order of the work."""
+
+from __future__ import annotations
+
+import textwrap
+
+import bpy
+
+from ..operators.look_through import lit_cameras
+from ..scene.apply import measured_materials
+from ..scene.materials import REASON_PROPERTY
+from ..scene.properties import stored_result
+
+
+class _Stage:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Patina"
+
+
+class PATINA_PT_scan(_Stage, bpy.types.Panel):
+    bl_idname = "PATINA_PT_scan"
+    bl_label = "Scan"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, state = self.layout, context.scene.patina
+        if state.mesh is not None:
+            layout.label(text=state.mesh.name, icon="MESH_DATA")
+        layout.operator("patina.import_capture", icon="IMPORT")
+        if state.mesh is None:
+            layout.operator("patina.import_demo", icon="MONKEY")
+
+
+class PATINA_PT_photos(_Stage, bpy.types.Panel):
+    bl_idname = "PATINA_PT_photos"
+    bl_label = "Photos & Light"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        found = lit_cameras(context.scene)
+        if not found:
+            layout.label(text="No lit photos yet", icon="INFO")
+            return
+        camera = context.scene.camera
+        if camera in found:
+            place = f"{found.index(camera) + 1} of {len(found)}: {camera['patina_lit']}"
+        else:
+            place = f"{len(found)} lit photos"
+        layout.label(text=place, icon="CAMERA_DATA")
+        row = layout.row(align=True)
+        row.operator("patina.next_photo", text="Previous", icon="TRIA_LEFT").step = -1
+        row.operator("patina.next_photo", text="Next", icon="TRIA_RIGHT").step = 1
+
+
+class PATINA_PT_fit(_Stage, bpy.types.Panel):
+    bl_idname = "PATINA_PT_fit"
+    bl_label = "Fit"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, state = self.layout, context.scene.patina
+        if state.stage:
+            layout.progress(text=state.stage, factor=state.progress, type="BAR")
+            layout.label(text="ESC cancels", icon="CANCEL")
+            return
+        layout.operator("patina.fit", icon="SHADERFX")
+        result = stored_result()
+        for material in (result or {}).get("materials", []):
+            box = layout.box()
+            box.label(text=material["name"], icon="MATERIAL")
+            held = material.get("held_out")
+            if held:
+                box.label(text=f"Predicts an unseen photo to {100 * held['error']:.1f} %")
+            box.label(text=f"{material['samples']['used']:,} samples")
+            for warning in material["warnings"]:
+                column = box.column(align=True)
+                column.scale_y = 0.8
+                for i, line in enumerate(textwrap.wrap(warning, 38)):
+                    column.label(text=line, icon="ERROR" if i == 0 else "BLANK1")
+
+
+class PATINA_PT_material(_Stage, bpy.types.Panel):
+    bl_idname = "PATINA_PT_material"
+    bl_label = "Material"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        found = measured_materials()
+        if not found:
+            layout.label(text="Nothing measured yet", icon="INFO")
+        for material in found:
+            row = layout.row()
+            row.label(text=material.name, icon="MATERIAL")
+            row.label(text="Principled only" if REASON_PROPERTY in material else "OSL + Principled")
+
+
+CLASSES = (PATINA_PT_scan, PATINA_PT_photos, PATINA_PT_fit, PATINA_PT_material)
+
+
+def register() -> None:
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

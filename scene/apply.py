@@ -1,0 +1,48 @@
+"""A fit's result into the open .blend: materials on the mesh, the description kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+
+from ..core.job import CaptureResult, Stage
+from ..core.report.result_json import describe
+from . import materials, meshes, osl_files
+from .properties import store_result
+
+MEASURED = "patina_measured"  # on the material: the name it has in the capture
+
+
+def measured_materials() -> list[bpy.types.Material]:
+    """The materials that a fit made, by name."""
+    return sorted((m for m in bpy.data.materials if MEASURED in m), key=lambda m: m.name)
+
+
+def apply_result(
+    scene: bpy.types.Scene, result: CaptureResult, stages: Sequence[Stage]
+) -> list[str]:
+    """Make the materials, put them on the scanned mesh where it is in the scene, and keep the
+    description. Returns notes for the user. A material of an earlier fit is replaced."""
+    atlas = osl_files.ensure_components(result.basis)
+    notes: list[str] = []
+    made = []
+    for fitted in result.materials:
+        old = next((m for m in measured_materials() if m[MEASURED] == fitted.name), None)
+        new = materials.create_material(fitted.name, fitted.fit.brdf, fitted.principled, atlas)
+        new[MEASURED] = fitted.name
+        if old is not None:
+            old.user_remap(new)
+            bpy.data.materials.remove(old)
+            new.name = fitted.name
+        if materials.REASON_PROPERTY in new:
+            notes.append(
+                f"{fitted.name}: only the Principled fit is wired, "
+                f"because {new[materials.REASON_PROPERTY]}"
+            )
+        made.append(new)
+    mesh = scene.patina.mesh
+    if mesh is not None and mesh.type == "MESH":
+        meshes.assign_materials(mesh, made, result.face_material)
+    store_result(describe(result, stages, notes))
+    return notes

@@ -1,0 +1,43 @@
+"""The scanned mesh as a Blender object."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.scan import Mesh
+
+
+def create_mesh_object(
+    name: str, mesh: Mesh, origin: NDArray[np.float64], collection: bpy.types.Collection
+) -> bpy.types.Object:
+    """A smooth-shaded object with the scan's triangles, shifted by −origin."""
+    data = bpy.data.meshes.new(name)
+    count = len(mesh.faces)
+    data.vertices.add(len(mesh.vertices))
+    data.vertices.foreach_set("co", (mesh.vertices - origin).astype(np.float32).ravel())
+    data.loops.add(3 * count)
+    data.loops.foreach_set("vertex_index", mesh.faces.astype(np.int32).ravel())
+    data.polygons.add(count)
+    data.polygons.foreach_set("loop_start", np.arange(0, 3 * count, 3, dtype=np.int32))
+    data.polygons.foreach_set("use_smooth", np.ones(count, bool))
+    data.update(calc_edges=True)
+    data.validate()
+    result = bpy.data.objects.new(name, data)
+    collection.objects.link(result)
+    return result
+
+
+def assign_materials(
+    target: bpy.types.Object,
+    materials: list[bpy.types.Material],
+    face_material: NDArray[np.int32],
+) -> None:
+    """Give every face the material of its number; the object's own materials are replaced."""
+    target.data.materials.clear()
+    for material in materials:
+        target.data.materials.append(material)
+    if len(target.data.polygons) == len(face_material):
+        target.data.polygons.foreach_set("material_index", face_material.astype(np.int32))
+        target.data.update()

@@ -1,0 +1,72 @@
+"""Run every test_* function of the test_*.py files beside this one, inside Blender.
+
+    blender -b --factory-startup --addons bl_ext.user_default.patina \
+        --python-exit-code 1 -P tests/blender/run_all.py [-- WORD ...]
+
+Each test starts from Blender's factory scene. With WORDs only tests whose `file::function` holds
+one of them are run. A test fails by raising, and is skipped by raising `support.Skip`. The last
+line is the count; the exit code is 1 if anything failed. With the bpy wheel the same file runs as
+`python tests/blender/run_all.py WORD ...`, on the checkout instead of the installed zip.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import bpy
+
+FOLDER = Path(__file__).resolve().parent
+sys.path.insert(0, str(FOLDER))
+
+import support  # noqa: E402
+
+
+def collect(words: list[str]) -> Iterator[tuple[str, Callable[[], None]]]:
+    """Yield (name, function) of the tests asked for, in the order they are written in."""
+    for path in sorted(FOLDER.glob("test_*.py")):
+        module = importlib.import_module(path.stem)
+        for name, function in list(vars(module).items()):
+            label = f"{path.stem}::{name}"
+            ours = callable(function) and getattr(function, "__module__", "") == path.stem
+            if name.startswith("test_") and ours and (not words or any(w in label for w in words)):
+                yield label, function
+
+
+def run_one(label: str, function: Callable[[], None]) -> str:
+    """Run one test from a fresh scene; return "passed", "failed" or "skipped"."""
+    start = time.monotonic()
+    try:
+        bpy.ops.wm.read_homefile(use_factory_startup=True)
+        function()
+    except support.Skip as reason:
+        print(f"SKIP {label}: {reason}", flush=True)
+        return "skipped"
+    except Exception:
+        traceback.print_exc()
+        print(f"FAIL {label} ({time.monotonic() - start:.2f} s)", flush=True)
+        return "failed"
+    print(f"PASS {label} ({time.monotonic() - start:.2f} s)", flush=True)
+    return "passed"
+
+
+def main() -> int:
+    """Run them all; return the exit code."""
+    words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    if Path(sys.argv[0]).name == Path(__file__).name:  # python, not Blender
+        words = sys.argv[1:]
+    print(f"Blender {bpy.app.version_string}, extension {support.extension().__name__}")
+    results = [run_one(label, function) for label, function in collect(words)]
+    skipped = results.count("skipped")
+    failed = results.count("failed")
+    more = f", {skipped} skipped" if skipped else ""
+    print(f"{results.count('passed')} passed, {failed} failed{more}", flush=True)
+    return 1 if failed or not results else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,41 @@
+"""What the tests in Blender share: the extension as it is installed, and how to skip."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+INSTALLED = "bl_ext.user_default.patina"
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class Skip(Exception):
+    """Raised by a test that cannot say anything on this Blender; the message says why."""
+
+
+def installed() -> bool:
+    """Say whether the extension was installed from a zip and enabled."""
+    return INSTALLED in sys.modules
+
+
+def extension(inside: str = "") -> ModuleType:
+    """Return the extension, or a module of it: `extension("core.fit")`.
+
+    Where no zip is installed (the bpy wheel) it is the checkout, as package `patina`, registered.
+    """
+    if installed():
+        package = INSTALLED
+    else:
+        package = "patina"
+        if package not in sys.modules:
+            spec = importlib.util.spec_from_file_location(
+                package, ROOT / "__init__.py", submodule_search_locations=[str(ROOT)]
+            )
+            module = importlib.util.module_from_spec(spec)
+            sys.modules[package] = module
+            spec.loader.exec_module(module)
+            module.register()
+    return importlib.import_module(f"{package}.{inside}" if inside else package)

@@ -1,0 +1,168 @@
+"""What is shipped: the manifest, the wheels, and what the code may import."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tools import staging, wheels
+
+ROOT = Path(__file__).resolve().parents[2]
+SETUP = (
+    "__init__", "blender", "build", "checks", "common", "environment", "extension", "headless",
+    "inside", "package", "staging", "wheels",
+)  # fmt: skip
+ROOMS = ("core", "scene", "operators", "panels", "commands")
+LIBRARIES = {"numpy", "scipy", "pycolmap", "OpenImageIO", "embreex", "trimesh"}
+BLENDER = {"bpy", "bpy_extras", "mathutils", "bmesh", "gpu", "gpu_extras", "blf", "addon_utils"}
+# The list of the Blender extensions platform.
+TAGS = {
+    "3D View", "Add Curve", "Add Mesh", "Animation", "Bake", "Camera", "Compositing",
+    "Development", "Game Engine", "Geometry Nodes", "Grease Pencil", "Import-Export", "Lighting",
+    "Material", "Mesh", "Modeling", "Node", "Object", "Paint", "Physics", "Pipeline", "Render",
+    "Rigging", "Scene", "Sculpt", "Sequencer", "System", "Text Editor", "Tracking",
+    "User Interface", "UV",
+}  # fmt: skip
+
+
+def sources(*rooms: str) -> list[Path]:
+    """The Python files of some rooms, and the root package's own where asked for as "."."""
+    found = [ROOT / "__init__.py"] if "." in rooms else []
+    for room in rooms:
+        if room != ".":
+            found += sorted((ROOT / room).rglob("*.py"))
+    return found
+
+
+def imports(path: Path) -> Iterator[tuple[int, str]]:
+    """Yield (line, top-level name) of every absolute import in a file."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name.partition(".")[0]) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            yield node.lineno, node.module.partition(".")[0]
+
+
+def foreign(paths: list[Path], allowed: set[str]) -> list[str]:
+    """Every import of those files that is neither relative nor allowed, as "file:line name"."""
+    known = allowed | set(sys.stdlib_module_names)
+    return [
+        f"{path.relative_to(ROOT)}:{line} {name}"
+        for path in paths
+        for line, name in imports(path)
+        if name not in known
+    ]
+
+
+@pytest.fixture(scope="module")
+def manifest() -> dict:
+    return tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+
+
+def test_manifest_says_what_blender_asks_for(manifest: dict) -> None:
+    assert manifest["schema_version"] == "1.0.0"
+    assert manifest["id"] == "patina"
+    assert manifest["blender_version_min"] == "4.2.0"
+    assert manifest["license"] == ["SPDX:GPL-3.0-or-later"]
+    assert set(manifest["tags"]) <= TAGS
+    assert re.fullmatch(r"\d+\.\d+\.\d+", manifest["version"])
+    for sentence in (manifest["tagline"], *manifest["permissions"].values()):
+        assert len(sentence) <= 64
+        assert not sentence.endswith(".")
+
+
+def test_manifest_lists_exactly_the_pinned_wheels(manifest: dict) -> None:
+    assert manifest["wheels"] == [f"./wheels/{name}" for name in wheels.wheel_names()]
+    assert tuple(manifest["platforms"]) == wheels.PLATFORMS
+
+
+def test_every_library_comes_for_every_platform_and_python() -> None:
+    pure = sum(tags is None for tags in wheels.TAGS.values())  # one wheel serves them all
+    expected = (len(wheels.PINS) - pure) * len(wheels.PLATFORMS) * len(wheels.PYTHONS) + pure
+    assert len(set(wheels.wheel_names())) == expected
+    assert set(wheels.checksums()) == set(wheels.wheel_names())
+
+
+def test_numpy_is_not_shipped(manifest: dict) -> None:
+    assert not [name for name in manifest["wheels"] if "numpy" in name.lower()]
+
+
+def test_filtered_manifest_changes_nothing_else(manifest: dict) -> None:
+    text = staging.filtered_manifest(["macos-arm64"], ["cp313"])
+    filtered = tomllib.loads(text)
+    assert filtered["platforms"] == ["macos-arm64"]
+    names = wheels.wheel_names(["macos-arm64"], ["cp313"])
+    assert filtered["wheels"] == [f"./wheels/{name}" for name in names]
+    same = ("platforms", "wheels")
+    assert {k: v for k, v in filtered.items() if k not in same} == {
+        k: v for k, v in manifest.items() if k not in same
+    }
+
+
+def test_only_the_extension_is_shipped() -> None:
+    allowed = {
+        *ROOMS, "assets", "__init__.py", "headless.py", "blender_manifest.toml",
+        "LICENSE", "README.md", "CHANGELOG.md",
+    }  # fmt: skip
+    assert {path.name for path in staging.shipped()} <= allowed
+
+
+def test_imports_are_relative_or_of_allowed_libraries() -> None:
+    assert not foreign(sources(".", *ROOMS[1:]), LIBRARIES | BLENDER)
+    headless = [path for path in [ROOT / "headless.py"] if path.exists()]
+    assert not foreign(headless, LIBRARIES | BLENDER)
+
+
+def test_core_knows_no_blender() -> None:
+    # OpenEXR's own wheel is not allowed either: it exports the C functions of the OpenEXR library,
+    # and on Linux those of Blender's copy are called in their place. Writing then fails and
+    # corrupts memory. OpenImageIO keeps its copy to itself and writes the same files.
+    assert not foreign(sources("core"), LIBRARIES)
+
+
+def test_core_loads_without_blender() -> None:
+    import subprocess
+
+    code = (
+        "import sys; sys.modules['bpy'] = None; from tools.package import load_patina; "
+        "load_patina(); import patina.core, pkgutil, importlib; "
+        "[importlib.import_module(m.name) for m in "
+        "pkgutil.walk_packages(patina.core.__path__, 'patina.core.')]"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_tools_need_only_the_standard_library() -> None:
+    """run.py runs on a bare Python: so must every module it reaches without an environment."""
+    own = [ROOT / "tools" / f"{name}.py" for name in SETUP]
+    assert not foreign([*own, ROOT / "run.py"], {"tools"})
+
+
+def test_no_file_is_longer_than_500_lines() -> None:
+    paths = [ROOT / "run.py", *sources(".", *ROOMS, "tools", "tests")]
+    long = {
+        str(path.relative_to(ROOT)): lines
+        for path in paths
+        if (lines := len(path.read_text(encoding="utf-8").splitlines())) > 500
+    }
+    assert not long
+
+
+def test_nothing_shipped_changes_the_search_path_or_runs_strings() -> None:
+    pattern = re.compile(
+        r"sys\.path\s*(\.|\+=|=|\[)|(?<![.\w])(eval|exec)\(|\bpickle\b|\bpip install"
+    )
+    found = [
+        f"{path.relative_to(ROOT)}:{number} {line.strip()}"
+        for path in sources(".", *ROOMS)
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if pattern.search(line)
+    ]
+    assert not found

@@ -1,0 +1,93 @@
+"""A unit sphere in Cycles, seen by an orthographic camera from +z, every pixel's normal known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+HALF_WIDTH = 1.05  # of the picture, in radii
+
+
+def new_scene(size: int = 64, samples: int = 1, osl: bool = False) -> bpy.types.Object:
+    """Empty the .blend and put the sphere in it; returns the sphere."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    cycles = scene.cycles
+    cycles.device, cycles.samples, cycles.use_denoising = "CPU", samples, False
+    cycles.use_adaptive_sampling, cycles.light_sampling_threshold = False, 0.0
+    # a filter without width: with one sample, the ray goes through the pixel's centre
+    cycles.pixel_filter_type, cycles.filter_width = "BOX", 0.01
+    cycles.shading_system = osl
+    scene.render.resolution_x = scene.render.resolution_y = size
+    scene.render.resolution_percentage = 100
+    scene.render.use_persistent_data = False
+    scene.world = bpy.data.worlds.new("black")
+    sky(0.0)
+    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 2 * HALF_WIDTH
+    camera.location = (0, 0, 5)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=512, ring_count=256, radius=1.0)
+    sphere = bpy.context.object
+    sphere.data.shade_smooth()
+    return sphere
+
+
+def sky(strength: float) -> None:
+    """Uniform radiance from everywhere."""
+    world = bpy.context.scene.world
+    world.use_nodes = True
+    nodes = world.node_tree.nodes
+    background = next((n for n in nodes if n.type == "BACKGROUND"), None)
+    if background is None:
+        background = nodes.new("ShaderNodeBackground")
+        output = nodes.new("ShaderNodeOutputWorld")
+        world.node_tree.links.new(background.outputs[0], output.inputs[0])
+    background.inputs["Color"].default_value = (1, 1, 1, 1)
+    background.inputs["Strength"].default_value = strength
+
+
+def sun(direction: np.ndarray, irradiance: float = 1.0) -> bpy.types.Object:
+    """A sun without width; direction: surface → light."""
+    from mathutils import Vector
+
+    lamp = bpy.data.lights.new("sun", "SUN")
+    lamp.energy, lamp.angle = irradiance, 0.0
+    lamp_object = bpy.data.objects.new("sun", lamp)
+    lamp_object.rotation_mode = "QUATERNION"
+    lamp_object.rotation_quaternion = Vector(direction).to_track_quat("Z", "Y")
+    bpy.context.scene.collection.objects.link(lamp_object)
+    return lamp_object
+
+
+def normals() -> tuple[np.ndarray, np.ndarray]:
+    """(normal (h, w, 3), inside (h, w)) of every pixel's centre, row 0 on top."""
+    size = bpy.context.scene.render.resolution_x
+    u = ((np.arange(size) + 0.5) / size * 2 - 1) * HALF_WIDTH
+    x, y = np.meshgrid(u, -u)
+    r2 = x * x + y * y
+    z = np.sqrt(np.maximum(1 - r2, 0))
+    return np.stack([x, y, z], axis=-1), r2 < 0.995
+
+
+def render(folder: Path) -> np.ndarray:
+    """(h, w, 3) linear radiance, row 0 on top."""
+    import OpenEXR
+
+    scene = bpy.context.scene
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "IMAGE"
+    settings.file_format, settings.color_depth = "OPEN_EXR", "32"
+    settings.color_mode = "RGB"
+    scene.render.filepath = str(folder / "render.exr")
+    bpy.ops.render.render(write_still=True)
+    with OpenEXR.File(scene.render.filepath) as file:
+        channels = file.channels()
+        if "RGB" in channels:
+            return np.array(channels["RGB"].pixels)
+        return np.stack([channels[c].pixels for c in "RGB"], axis=-1)

@@ -1,0 +1,116 @@
+"""Where things lie, how progress is told, and how a step that fails says so."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+"""The checkout, which is also the extension."""
+
+
+class Failure(Exception):
+    """Something the user should read in one line; `code` is the exit code."""
+
+    def __init__(self, message: str, code: int = 2) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+def say(message: str) -> None:
+    """Tell one line of progress, on stderr: stdout belongs to the command that is run."""
+    print(f"patina: {message}", file=sys.stderr, flush=True)
+
+
+def cache_dir() -> Path:
+    """Return the folder for everything we download or set up; it may be deleted at any time."""
+    if own := os.environ.get("PATINA_CACHE"):
+        folder = Path(own).expanduser().resolve()
+    elif sys.platform == "win32":
+        folder = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData/Local")) / "patina"
+    elif sys.platform == "darwin":
+        folder = Path.home() / "Library/Caches/patina"
+    else:
+        folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "patina"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def this_platform() -> str:
+    """Return this machine's platform in Blender's words; a Failure where we have no wheels."""
+    machine = platform.machine().lower()
+    system = {"linux": "linux", "win32": "windows", "darwin": "macos"}.get(
+        sys.platform, sys.platform
+    )
+    name = f"{system}-{'x64' if machine in ('x86_64', 'amd64') else machine}"
+    if name not in ("linux-x64", "windows-x64", "macos-arm64"):
+        raise Failure(
+            f"no libraries for {name}: Patina runs on linux-x64, windows-x64 and macos-arm64"
+        )
+    return name
+
+
+def call(command: Sequence[str | Path], *, env: Mapping[str, str] | None = None) -> int:
+    """Run a command on the user's terminal and return its exit code.
+
+    Ctrl-C reaches the command too: it is given a moment to tidy up, then ended.
+    """
+    process = subprocess.Popen([str(word) for word in command], env=env and dict(env))
+    try:
+        code = process.wait()
+    except KeyboardInterrupt:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=5)
+        raise
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
+    return code if code >= 0 else 128 - code  # ended by a signal, as a shell says it
+
+
+def quietly(
+    command: Sequence[str | Path], what: str, *, env: Mapping[str, str] | None = None
+) -> str:
+    """Run a command out of sight and return its stdout; if it fails, show its end and say what."""
+    done = subprocess.run(
+        [str(word) for word in command], env=env and dict(env), capture_output=True, text=True
+    )
+    if done.returncode:
+        lines = (done.stdout + done.stderr).strip().splitlines()
+        told = [line for line in lines if not line.startswith("WARNING: Location ")]
+        print("\n".join(told[-15:]), file=sys.stderr)
+        raise Failure(f"{what} failed (exit code {done.returncode}, see above)", 1)
+    return done.stdout
+
+
+def megabytes(paths: Sequence[Path]) -> str:
+    """Return the size of some files as people say it."""
+    return f"{sum(path.stat().st_size for path in paths) / 1e6:.0f} MB"
+
+
+@contextlib.contextmanager
+def one_at_a_time(name: str) -> Iterator[None]:
+    """Hold a lock in the cache, so that two runs do not set up the same folder together.
+
+    The operating system drops it when the process ends, however it ends.
+    """
+    with (cache_dir() / f"{name}.lock").open("a+b") as handle:
+        if sys.platform == "win32":
+            import msvcrt
+
+            handle.seek(0)
+            while True:
+                with contextlib.suppress(OSError):  # LK_LOCK gives up after ten seconds
+                    msvcrt.locking(handle.fileno(), msvcrt.LK_LOCK, 1)
+                    break
+        else:
+            import fcntl
+
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield

@@ -1,0 +1,219 @@
+"""The demo capture's renders: Cycles under one distant lamp, direct light and cast shadows only."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+import OpenEXR
+from mathutils import Matrix, Vector
+from mathutils.bvhtree import BVHTree
+from numpy.typing import NDArray
+
+from .demo_shape import Array, Surface, vertex_normals
+
+GLAZE = {
+    "Base Color": (0.007, 0.140, 0.165),
+    "Roughness": 0.25,
+    "IOR": 1.5,
+    "Diffuse Roughness": 0.0,
+    "Specular IOR Level": 0.5,
+}
+CLAY = {
+    "Base Color": (0.46, 0.205, 0.098),
+    "Roughness": 0.80,
+    "IOR": 1.5,
+    "Diffuse Roughness": 0.6,
+    "Specular IOR Level": 0.25,
+}
+"""The two materials, as inputs of Blender's Principled BSDF (GGX); the rest are its defaults."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole in COLMAP's terms: x right, y down, z forward, pixel centres at +0.5.
+
+    `rotation` (3, 3) and `translation` (3,) take the scan's frame to the camera's; `focal` and
+    `centre` (2,) are in pixels, `size` is (width, height).
+    """
+
+    rotation: Array
+    translation: Array
+    focal: float
+    centre: tuple[float, float]
+    size: tuple[int, int]
+
+    @property
+    def position(self) -> Array:
+        """The centre of projection in the scan's frame."""
+        return -self.rotation.T @ self.translation
+
+    def project(self, points: Array) -> Array:
+        """Return pixel coordinates (n, 2) of points (n, 3)."""
+        seen = points @ self.rotation.T + self.translation
+        return self.focal * seen[:, :2] / seen[:, 2:] + np.array(self.centre)
+
+
+def decimated(surface: Surface, faces: int) -> Surface:
+    """Return a mesh with about that many triangles, small where it bends (Blender's collapse)."""
+    mesh = bpy.data.meshes.new("decimated")
+    mesh.from_pydata(surface.points.tolist(), [], surface.triangles.tolist())
+    thing = bpy.data.objects.new("decimated", mesh)
+    bpy.context.scene.collection.objects.link(thing)
+    modifier = thing.modifiers.new("collapse", "DECIMATE")
+    modifier.ratio = faces / len(surface.triangles)
+    result = thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    points = np.empty((len(result.vertices), 3), np.float32)
+    triangles = np.empty((len(result.polygons), 3), np.int32)
+    result.vertices.foreach_get("co", points.ravel())
+    result.polygons.foreach_get("vertices", triangles.ravel())
+    bpy.data.objects.remove(thing)
+    exact, whole = points.astype(np.float64), triangles.astype(np.int64)
+    return Surface(exact, whole, vertex_normals(exact, whole))
+
+
+class Occluder:
+    """A mesh that rays may hit."""
+
+    def __init__(self, surface: Surface) -> None:
+        self.tree = BVHTree.FromPolygons(surface.points.tolist(), surface.triangles.tolist())
+
+    def free(self, start: Array, direction: Array) -> bool:
+        """Return whether a ray meets nothing."""
+        return self.tree.ray_cast(Vector(start), Vector(direction))[0] is None
+
+
+class Studio:
+    """A Cycles scene with one object in it; it photographs."""
+
+    def __init__(self, samples: int = 128) -> None:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        self.scene = scene = bpy.context.scene
+        scene.render.engine = "CYCLES"
+        scene.world = bpy.data.worlds.new("black")
+        scene.world.use_nodes = True
+        scene.world.node_tree.nodes.clear()
+        cycles = scene.cycles
+        cycles.device, cycles.seed, cycles.samples = "CPU", 0, samples
+        cycles.use_adaptive_sampling = cycles.use_denoising = False
+        cycles.pixel_filter_type = "BOX"
+        cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = 0
+        cycles.sample_clamp_direct = cycles.blur_glossy = cycles.light_sampling_threshold = 0.0
+        scene.render.film_transparent = True
+        image = scene.render.image_settings
+        image.file_format, image.color_mode, image.color_depth = "OPEN_EXR", "RGBA", "32"
+        lamp = bpy.data.lights.new("lamp", "SUN")
+        lamp.angle = 0.0
+        lens = bpy.data.cameras.new("lens")
+        lens.clip_start = 0.01
+        self.lamp = bpy.data.objects.new("lamp", lamp)
+        self.lens = bpy.data.objects.new("lens", lens)
+        for thing in (self.lamp, self.lens):
+            scene.collection.objects.link(thing)
+        scene.camera = self.lens
+        self.body: bpy.types.Object | None = None
+
+    def show(self, surface: Surface, glazed: Array) -> None:
+        """Put a mesh before the camera, instead of what was there; `glazed` is per point."""
+        if self.body is not None:
+            bpy.data.objects.remove(self.body)
+        mesh = bpy.data.meshes.new("body")
+        mesh.from_pydata(surface.points.tolist(), [], surface.triangles.tolist())
+        mesh.shade_smooth()
+        mesh.normals_split_custom_set_from_vertices(surface.normals.tolist())
+        layer = mesh.attributes.new("glazed", "FLOAT", "POINT")
+        layer.data.foreach_set("value", glazed.astype(np.float32))
+        self.body = bpy.data.objects.new("body", mesh)
+        self.scene.collection.objects.link(self.body)
+
+    def dress(self, material: bpy.types.Material) -> None:
+        """Give the object a material."""
+        self.body.data.materials.clear()
+        self.body.data.materials.append(material)
+
+    def light(self, direction: Array, irradiance: float) -> None:
+        """Let the sun shine from `direction` (surface → light)."""
+        self.lamp.data.energy = irradiance
+        self.lamp.rotation_mode = "QUATERNION"
+        self.lamp.rotation_quaternion = Vector(direction).to_track_quat("Z", "Y")
+
+    def photograph(self, camera: Camera) -> Array:
+        """Return linear RGBA (height, width, 4), row 0 on top, alpha the object's coverage."""
+        width, height = camera.size
+        lens, render = self.lens.data, self.scene.render
+        lens.sensor_fit, lens.sensor_width = "HORIZONTAL", 36.0
+        lens.lens = camera.focal * lens.sensor_width / width
+        lens.shift_x = (width / 2 - camera.centre[0]) / width
+        lens.shift_y = (camera.centre[1] - height / 2) / width
+        pose = np.eye(4)
+        pose[:3, :3] = camera.rotation.T @ np.diag([1.0, -1.0, -1.0])
+        pose[:3, 3] = camera.position
+        self.lens.matrix_world = Matrix(pose.tolist())
+        render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
+        with tempfile.TemporaryDirectory() as folder:
+            render.filepath = str(Path(folder) / "photo.exr")
+            bpy.ops.render.render(write_still=True)
+            with OpenEXR.File(render.filepath) as file:
+                return np.array(file.channels()["RGBA"].pixels, dtype=np.float64)
+
+
+def _threshold(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:
+    """Return a socket that is 1 on the glaze and 0 on the clay."""
+    attribute = tree.nodes.new("ShaderNodeAttribute")
+    attribute.attribute_name = "glazed"
+    step = tree.nodes.new("ShaderNodeMath")
+    step.operation = "GREATER_THAN"
+    step.inputs[1].default_value = 0.0
+    tree.links.new(attribute.outputs["Fac"], step.inputs[0])
+    return step.outputs[0]
+
+
+def _split(name: str, shaders: Sequence[tuple[str, dict]]) -> bpy.types.Material:
+    """Return a material with the first shader on the clay and the second on the glaze."""
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    mix = tree.nodes.new("ShaderNodeMixShader")
+    tree.links.new(_threshold(tree), mix.inputs[0])
+    for slot, (kind, values) in enumerate(shaders, start=1):
+        node = tree.nodes.new(kind)
+        for key, value in values.items():
+            node.inputs[key].default_value = (*value, 1.0) if isinstance(value, tuple) else value
+        if kind == "ShaderNodeBsdfPrincipled":
+            node.distribution = "GGX"
+        tree.links.new(node.outputs[0], mix.inputs[slot])
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    return material
+
+
+def pottery() -> bpy.types.Material:
+    """Return the material of the lit photos."""
+    kind = "ShaderNodeBsdfPrincipled"
+    return _split("pottery", ((kind, CLAY), (kind, GLAZE)))
+
+
+def identity() -> bpy.types.Material:
+    """Return a material whose red is the glaze's coverage of a pixel and green the clay's."""
+    kind = "ShaderNodeEmission"
+    return _split("identity", ((kind, {"Color": (0.0, 1.0, 0.0)}), (kind, {"Color": (1.0, 0, 0)})))
+
+
+def lambertian() -> bpy.types.Material:
+    """Return a white Lambertian surface, for the check of the irradiance's convention."""
+    white = ("ShaderNodeBsdfDiffuse", {"Color": (1.0, 1.0, 1.0), "Roughness": 0.0})
+    return _split("white", (white, white))
+
+
+def plane(normal: Array, size: float = 4.0) -> Surface:
+    """Return a square around the origin that faces `normal`."""
+    across = np.linalg.svd(normal[None])[2][1:]
+    across[1] *= np.sign(np.linalg.det(np.stack([*across, normal])))
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) @ across * size / 2
+    triangles: NDArray[np.int64] = np.array([[0, 1, 2], [0, 2, 3]])
+    return Surface(corners, triangles, np.tile(normal, (4, 1)))

@@ -1,0 +1,59 @@
+"""Blender's own `extension` command, and the zips it makes: one per platform, validated."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from .common import Failure, quietly
+from .staging import manifest, staged
+from .wheels import download, wheel_names
+
+
+@dataclass(frozen=True)
+class ExtensionTool:
+    """How `extension build` and `extension validate` are called here.
+
+    `command` is the program and its first words; `tags` the list of allowed tags, which the
+    script inside the bpy wheel must be told and Blender knows.
+    """
+
+    command: tuple[str, ...]
+    tags: Path | None = None
+
+    def run(self, what: str, *arguments: str | Path) -> str:
+        """Run one command and return what it printed."""
+        tags = ["--valid-tags", str(self.tags)] if self.tags else []
+        return quietly([*self.command, what, *arguments, *tags], f"extension {what}")
+
+
+def pack(
+    tool: ExtensionTool, platforms: Sequence[str], pythons: Sequence[str], out: Path
+) -> list[Path]:
+    """Build and validate the zips for these platforms; return them in the same order."""
+    download(wheel_names(platforms, pythons))
+    out.mkdir(parents=True, exist_ok=True)
+    with staged(platforms, pythons) as source:
+        tool.run("build", "--split-platforms", "--source-dir", source, "--output-dir", out)
+    about = manifest()
+    archives = []
+    for platform in platforms:
+        name = f"{about['id']}-{about['version']}-{platform.replace('-', '_')}.zip"
+        archive = out / name
+        if not archive.exists():
+            raise Failure(f"Blender made no {name}", 1)
+        tool.run("validate", archive)
+        check_wheels(archive, wheel_names([platform], pythons))
+        archives.append(archive)
+    return archives
+
+
+def check_wheels(archive: Path, expected: Sequence[str]) -> None:
+    """Make sure that a zip holds the wheels of its own platform and no others."""
+    with zipfile.ZipFile(archive) as opened:
+        inside = {Path(name).name for name in opened.namelist() if name.endswith(".whl")}
+    if inside != set(expected):
+        wrong = ", ".join(sorted(inside ^ set(expected)))
+        raise Failure(f"{archive.name}: missing or foreign wheels: {wrong}", 1)

@@ -1,0 +1,32 @@
+"""The checkout as the package `patina`, whatever its folder is called."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from types import ModuleType
+
+from .common import ROOT
+
+
+def load_patina() -> ModuleType:
+    """Import the repository root as `patina`; `import patina.core...` works from then on.
+
+    Inside Blender the same files are `bl_ext.user_default.patina`, which is why every import in
+    them is relative. Nothing of bpy is touched until `patina.register()` is called.
+    """
+    if "patina" in sys.modules:
+        return sys.modules["patina"]
+    spec = importlib.util.spec_from_file_location(
+        "patina", ROOT / "__init__.py", submodule_search_locations=[str(ROOT)]
+    )
+    if spec is None or spec.loader is None:
+        raise ImportError(f"no package in {ROOT}")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["patina"] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules["patina"]
+        raise
+    return module

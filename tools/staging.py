@@ -1,0 +1,83 @@
+"""The folder that Blender packs: the extension's own files, and only the wheels asked for."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import re
+import shutil
+import tomllib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from .common import ROOT, cache_dir
+from .wheels import FOLDER, manifest_list, wheel_names
+
+MANIFEST = "blender_manifest.toml"
+CRUMBS = shutil.ignore_patterns("__pycache__", "*.py[co]", ".*", "*~", "*.blend1")
+
+
+def manifest() -> dict:
+    """Return blender_manifest.toml as it stands."""
+    return tomllib.loads((ROOT / MANIFEST).read_text(encoding="utf-8"))
+
+
+def shipped() -> list[Path]:
+    """Return the top-level files and folders that the manifest does not exclude."""
+    anchored = {
+        pattern.strip("/")
+        for pattern in manifest()["build"]["paths_exclude_pattern"]
+        if pattern.startswith("/")
+    }
+    left_out = anchored | CRUMBS(str(ROOT), os.listdir(ROOT))
+    return sorted(
+        path for path in ROOT.iterdir() if path.name not in left_out and path.suffix != ".zip"
+    )
+
+
+def source_hash(*extra: str) -> str:
+    """Return a hash over everything that would be shipped, and over what else decides."""
+    digest = hashlib.sha256("\n".join(extra).encode())
+    for top in shipped():
+        files = sorted(path for path in top.rglob("*") if path.is_file()) if top.is_dir() else [top]
+        for path in files:
+            inside = path.relative_to(ROOT)
+            if CRUMBS(str(path.parent), list(inside.parts)):
+                continue
+            digest.update(f"\n{inside.as_posix()}\n".encode())
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def filtered_manifest(platforms: Sequence[str], pythons: Sequence[str]) -> str:
+    """Return the manifest's text with only these platforms, and their wheels for these Pythons."""
+    text = (ROOT / MANIFEST).read_text(encoding="utf-8")
+    wheels = manifest_list(wheel_names(platforms, pythons))
+    words = ", ".join(f'"{platform}"' for platform in platforms)
+    text = re.sub(r"^wheels = \[.*?^\]", lambda _: wheels, text, flags=re.M | re.S)
+    return re.sub(r"^platforms = \[.*?\]", lambda _: f"platforms = [{words}]", text, flags=re.M)
+
+
+@contextlib.contextmanager
+def staged(platforms: Sequence[str], pythons: Sequence[str]) -> Iterator[Path]:
+    """Lay out a folder for `extension build`; the wheels must have been downloaded."""
+    folder = cache_dir() / f"staging-{os.getpid()}"
+    shutil.rmtree(folder, ignore_errors=True)
+    try:
+        (folder / "wheels").mkdir(parents=True)
+        for path in shipped():
+            if path.is_dir():
+                shutil.copytree(path, folder / path.name, ignore=CRUMBS)
+            else:
+                shutil.copy2(path, folder)
+        for name in wheel_names(platforms, pythons):
+            try:
+                os.link(FOLDER / name, folder / "wheels" / name)
+            except OSError:  # another disk, or a file system without links
+                shutil.copy2(FOLDER / name, folder / "wheels")
+        text = filtered_manifest(platforms, pythons)
+        (folder / MANIFEST).write_text(text, encoding="utf-8")
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
