@@ -28,7 +28,9 @@ COMMANDS = {
 
 def package() -> str:
     """The name the extension is importable by; loads and registers it where needed."""
-    installed = next((n for n in sys.modules if n.startswith("bl_ext.") and n.endswith(".patina")), None)
+    installed = next(
+        (n for n in sys.modules if n.startswith("bl_ext.") and n.endswith(".patina")), None
+    )
     if installed:
         return installed
     root = Path(__file__).resolve().parent
@@ -48,7 +50,9 @@ def main(arguments: list[str]) -> int:
     """Run one command; 0 when all was done, 2 for wrong input (one line on stderr)."""
     name = package()
     errors = importlib.import_module(f"{name}.core.errors")
-    parser = argparse.ArgumentParser(prog="patina", description="Measured materials from photo scans")
+    parser = argparse.ArgumentParser(
+        prog="patina", description="Measured materials from photo scans"
+    )
     choices = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     modules = {}
     for command, file in COMMANDS.items():

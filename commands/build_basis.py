@@ -23,13 +23,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     progress = Progress()
-    basis = build(
-        arguments.encodings, progress=lambda stage, done: progress(Step(stage, done))
-    )
+    basis = build(arguments.encodings, progress=lambda stage, done: progress(Step(stage, done)))
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     storage.save(arguments.out, basis)
     size = arguments.out.stat().st_size
-    print(f"wrote {arguments.out}: {size / 1e6:.2f} MB, version {storage.load(arguments.out).version}")
+    print(
+        f"wrote {arguments.out}: {size / 1e6:.2f} MB, version {storage.load(arguments.out).version}"
+    )
     if arguments.checksums is not None:
         count = write_checksums(arguments.checksums, CHECKSUMS_FILE)
         print(f"wrote {CHECKSUMS_FILE}: {count} files")

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.brdf import TabulatedBRDF, merl_file, metrics, nbrdf
 from ..core.errors import InputError
@@ -34,10 +35,16 @@ def read_truth(path: Path) -> TabulatedBRDF:
     """The table of a .binary, or of the encoding in a truth.json, at the cells' centres."""
     if path.suffix != ".json":
         return merl_file.read(path)
+    weights = truth_weights(path)
+    return TabulatedBRDF.from_function(lambda angles: nbrdf.evaluate(weights, angles))
+
+
+def truth_weights(path: Path) -> NDArray[np.float32]:
+    """(675,) the neural encoding in a truth.json. Raises InputError."""
     try:
         weights = np.array(json.loads(path.read_text("utf-8"))["weights"], np.float32)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"holds no neural encoding ({error})", file=path) from error
     if weights.shape != (nbrdf.WEIGHTS,):
         raise InputError(f"{weights.shape} weights, expected {nbrdf.WEIGHTS}", file=path)
-    return TabulatedBRDF.from_function(lambda angles: nbrdf.evaluate(weights, angles))
+    return weights

@@ -67,7 +67,9 @@ def _tell(out: Path, result: CaptureResult) -> None:
     for material in result.materials:
         unseen = (
             "" if material.held_out is None
-            else f", predicts an unseen photo to {100 * material.held_out.error:.1f} %"
+            else f", predicts an unseen photo to "
+            f"{100 * material.held_out.typical:.0f} % (typical pixel), "
+            f"{100 * material.held_out.error:.0f} % (relative RMS)"
         )  # fmt: skip
         print(f"{material.name}: {material.samples:,} samples{unseen}")
         for warning in material.warnings:

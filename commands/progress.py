@@ -19,5 +19,9 @@ class Progress:
     def __call__(self, step: Step) -> None:
         now = time.monotonic()
         if step.stage != self.stage or now - self.spoken > 5.0:
-            print(f"[{100 * self.share * step.fraction:3.0f} %] {step.stage}", file=sys.stderr, flush=True)
+            print(
+                f"[{100 * self.share * step.fraction:3.0f} %] {step.stage}",
+                file=sys.stderr,
+                flush=True,
+            )
             self.stage, self.spoken = step.stage, now

@@ -69,7 +69,9 @@ class PATINA_PT_fit(_Stage, bpy.types.Panel):
             box.label(text=material["name"], icon="MATERIAL")
             held = material.get("held_out")
             if held:
-                box.label(text=f"Predicts an unseen photo to {100 * held['error']:.1f} %")
+                box.label(
+                    text=f"Typical pixel of an unseen photo: {100 * held['typical']:.0f} % off"
+                )
             box.label(text=f"{material['samples']['used']:,} samples")
             for warning in material["warnings"]:
                 column = box.column(align=True)
@@ -90,7 +92,8 @@ class PATINA_PT_material(_Stage, bpy.types.Panel):
         for material in found:
             row = layout.row()
             row.label(text=material.name, icon="MATERIAL")
-            row.label(text="Principled only" if REASON_PROPERTY in material else "OSL + Principled")
+            missing = REASON_PROPERTY in material
+            row.label(text="Principled only" if missing else "OSL + Principled")
 
 
 CLASSES = (PATINA_PT_scan, PATINA_PT_photos, PATINA_PT_fit, PATINA_PT_material)

@@ -100,7 +100,7 @@ def _row(lamp_object: bpy.types.Object) -> Lamp:
         return Lamp(shown * SUN, tuple(rotation.col[2]), watts, beam, form=form)
     if lamp.type == "AREA":
         return _area(lamp, world, at, beam, watts, shown)
-    intensity = tuple(w / (4 * math.pi**2) for w in watts)
+    intensity = tuple(w / (4 * math.pi) for w in watts)
     cone, edge = NO_CONE, 0.0
     if lamp.type == "SPOT":
         cone = math.cos(lamp.spot_size / 2)
@@ -132,9 +132,11 @@ def _after_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
     """Cheap while nothing happens to lamps; a write here changes materials only, so no loop."""
     for update in depsgraph.updates:
         data = update.id
-        if isinstance(data, bpy.types.Light) or (
-            isinstance(data, bpy.types.Object) and data.type == "LIGHT"
-        ) or isinstance(data, bpy.types.Collection | bpy.types.Scene):
+        if (
+            isinstance(data, bpy.types.Light)
+            or (isinstance(data, bpy.types.Object) and data.type == "LIGHT")
+            or isinstance(data, bpy.types.Collection | bpy.types.Scene)
+        ):
             update_lamps(scene)
             return
 

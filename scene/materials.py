@@ -24,6 +24,7 @@ from ..core.appearance import osl_source
 from ..core.appearance.principled import Principled
 from ..core.appearance.principled_fit import PrincipledFit
 from ..core.basis import Basis, PrincipalBRDF
+from ..core.errors import PatinaError
 from .lamps import update_lamps
 from .osl_files import FILE_PROPERTY, pack
 
@@ -91,7 +92,7 @@ def create_material(
     return material
 
 
-class OslError(Exception):
+class OslError(PatinaError):
     """The shader did not compile; the message is for the user."""
 
 
@@ -190,7 +191,7 @@ def _osl_branch(
 
 @contextmanager
 def _no_compiling() -> Iterator[None]:
-    """Keep Cycles from compiling the script where it could not (the bpy wheel finds no oslquery)."""
+    """Keep Cycles from compiling the script where it cannot: the bpy wheel finds no oslquery."""
     render = bpy.context.scene.render
     engine = render.engine
     if engine != "CYCLES" or importlib.util.find_spec("oslquery") is not None:

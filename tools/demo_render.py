@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-import OpenEXR
+import OpenImageIO as oiio
 from mathutils import Matrix, Vector
 from mathutils.bvhtree import BVHTree
 from numpy.typing import NDArray
@@ -157,8 +157,8 @@ class Studio:
         with tempfile.TemporaryDirectory() as folder:
             render.filepath = str(Path(folder) / "photo.exr")
             bpy.ops.render.render(write_still=True)
-            with OpenEXR.File(render.filepath) as file:
-                return np.array(file.channels()["RGBA"].pixels, dtype=np.float64)
+            pixels = oiio.ImageBuf(render.filepath).get_pixels(oiio.FLOAT)
+            return np.asarray(pixels, dtype=np.float64)
 
 
 def _threshold(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:

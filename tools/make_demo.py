@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import OpenEXR
 import OpenImageIO as oiio
 import pycolmap
 from scipy.ndimage import binary_dilation, binary_erosion
@@ -50,7 +49,7 @@ IRRADIANCE = float(np.pi)
 
 LAMPS = {
     "key": (84.0, 28.0, ("view_03.jpg", "view_20.jpg")),
-    "side": (255.0, 22.0, ("view_15.jpg", "view_18.jpg")),
+    "side": (264.0, 22.0, ("view_15.jpg", "view_18.jpg")),
     "rim": (168.0, 22.0, ("view_08.jpg", "view_02.jpg")),
     "back": (330.0, 10.0, ("view_13.jpg", "view_06.jpg")),
 }
@@ -224,17 +223,24 @@ def exposed(rng: np.random.Generator, radiance: Array) -> Array:
 
 def write_exr(path: Path, pixels: Array) -> None:
     """Write linear RGB (height, width, 3) as half floats."""
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    with OpenEXR.File(header, {"RGB": pixels.astype(np.float16)}) as file:
-        file.write(str(path))
+    write_image(path, np.asarray(pixels, np.float32), "half")
 
 
 def write_mask(path: Path, inside: Array) -> None:
     """Write a boolean (height, width) as an 8-bit PNG, white = in."""
-    height, width = inside.shape
+    write_image(path, (inside * np.uint8(255))[..., None], "uint8")
+
+
+def write_image(path: Path, pixels: Array, kind: str) -> None:
+    """Write (height, width, channels); EXR without loss."""
+    height, width, channels = pixels.shape
+    spec = oiio.ImageSpec(width, height, channels, kind)
+    if path.suffix == ".exr":
+        spec.attribute("compression", "zip")
+        spec.attribute("DateTime", "2000:01:01 00:00:00")  # else the clock is written
     out = oiio.ImageOutput.create(str(path))
-    out.open(str(path), oiio.ImageSpec(width, height, 1, "uint8"))
-    out.write_image((inside * np.uint8(255))[..., None])
+    if not out.open(str(path), spec) or not out.write_image(np.ascontiguousarray(pixels)):
+        raise OSError(f"{path}: {out.geterror()}")
     out.close()
 
 

@@ -5,13 +5,12 @@ repeats its edge; blocks of all φd stand side by side, and rows of blocks hold 
 R, G, B, A. A bilinear lookup in two neighbouring blocks, blended, is exactly AngleGrid's trilinear
 interpolation. Slots: 0 and 1 are the two halves of µ + ln(ref + ε), the components follow.
 
-Half floats: the centre, split into a rounded value and its remainder, keeps 21 bits. The components
-keep 11: with coefficients of measured materials ρ changes by 0.03 % RMS (tests/core/test_osl_atlas).
+Half floats: the centre, split into a rounded value and its remainder, keeps 21 bits, the components
+keep 11. What that does to ρ is asserted in tests/core/test_osl_atlas.py.
 """
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..basis import AngleGrid, Basis
 from ..errors import InputError
+from ..photo import write_exr
 
 CENTRE_SLOTS = 2
 BORDER = 1
@@ -52,20 +52,11 @@ def texels(basis: Basis, count: int | None = None) -> NDArray[np.float16]:
 
 def write(path: Path, basis: Basis, count: int | None = None) -> Path:
     """Write the atlas as an EXR of half floats; the file appears whole or not at all."""
-    import OpenEXR  # a wheel of the extension's: wanted here only
-
-    partial = path.with_name(path.stem + ".part.exr")
-    header = {
-        "compression": OpenEXR.ZIP_COMPRESSION,
-        "type": OpenEXR.scanlineimage,
-        "patinaBasis": basis.version,
-    }
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        OpenEXR.File(header, {"RGBA": texels(basis, count)}).write(str(partial))
-        os.replace(partial, path)
     except OSError as error:
         raise InputError(f"cannot be written ({error.strerror})", file=path) from error
+    write_exr(path, texels(basis, count), half=True)
     return path
 
 
@@ -74,7 +65,9 @@ def file_name(basis: Basis) -> str:
     return f"patina_components_{basis.version}.exr"
 
 
-def lookup(atlas: NDArray[np.floating], grid: AngleGrid, u: NDArray[np.floating], group: int):
+def lookup(
+    atlas: NDArray[np.floating], grid: AngleGrid, u: NDArray[np.floating], group: int
+) -> NDArray[np.floating]:
     """(n, 4): what the shader reads at fractional nodes u (n, 3) = (θh, θd, φd); for the tests."""
     block_h, block_d = grid.n_h + 2 * BORDER, grid.n_d + 2 * BORDER
     p0 = np.minimum(np.floor(u[:, 2]).astype(int), grid.n_p - 1)
@@ -85,7 +78,9 @@ def lookup(atlas: NDArray[np.floating], grid: AngleGrid, u: NDArray[np.floating]
     return (1 - blend) * out[0] + blend * out[1]
 
 
-def _bilinear(image: NDArray[np.floating], x: NDArray, y: NDArray) -> NDArray[np.floating]:
+def _bilinear(
+    image: NDArray[np.floating], x: NDArray[np.floating], y: NDArray[np.floating]
+) -> NDArray[np.floating]:
     """Between texel centres at whole numbers."""
     x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
     f, g = (x - x0)[:, None], (y - y0)[:, None]

@@ -1,9 +1,9 @@
 """Fit the Principled BSDF to a BRDF, by the metric that predicts what the eye sees.
 
-The metric is the cosine-weighted cube root of Fores, Ferwerda, Gu 2012 ("Toward a perceptually based
-metric for BRDF modeling"), the one of several that agreed with observers; a plain L2 fits the peak
-and nothing else (Bieron and Peers 2020). Directions count as they do on the MERL grid, where
-those studies were made: uniform in sqrt(θh), θd and φd.
+The metric is the cosine-weighted cube root of Fores, Ferwerda, Gu 2012 ("Toward a perceptually
+based metric for BRDF modeling"), the one of several that agreed with observers; a plain L2 fits
+the peak and nothing else (Bieron and Peers 2020). Directions count as they do on the MERL grid,
+where those studies were made: uniform in sqrt(θh), θd and φd.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ class _Target:
         return self.weight * np.cbrt(f * self.where.cos_i[:, None]) - self.root
 
     def error(self, principled: Principled) -> float:
-        length = max(np.linalg.norm(self.root), 1e-12)
+        length = max(float(np.linalg.norm(self.root)), 1e-12)
         return float(np.linalg.norm(self.residual(principled)) / length)
 
     def lambertian(self) -> Array:

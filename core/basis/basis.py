@@ -89,16 +89,12 @@ class Basis:
         values = self.grid.interpolate(self._nodes[:, : 1 + k], angles)
         return values[:, 0], values[:, 1:]
 
-    def mapped(
-        self, rho: NDArray[np.floating], angles: Angles
-    ) -> NDArray[np.floating]:
+    def mapped(self, rho: NDArray[np.floating], angles: Angles) -> NDArray[np.floating]:
         """Mapped, centred observations x̂ − µ̂ (n, c) of reflectances ρ (n, c) in 1/sr."""
         centre, _ = self.rows(angles, 0)
         return mapping.log_weighted(rho, mapping.cos_map(angles)) - centre[:, None]
 
-    def evaluate(
-        self, coefficients: NDArray[np.floating], angles: Angles
-    ) -> NDArray[np.float32]:
+    def evaluate(self, coefficients: NDArray[np.floating], angles: Angles) -> NDArray[np.float32]:
         """ρ (..., c) in 1/sr of the BRDFs with coefficients (c, k), at angles of any shape."""
         c = np.atleast_2d(np.asarray(coefficients, np.float32))
         shape = np.shape(angles.theta_h)

@@ -1,7 +1,8 @@
 """Nodes in angle space on which a basis is stored, and trilinear interpolation between them.
 
 θh is spaced on a logarithm, s = ln(1 + θh/a) / ln(1 + 90°/a): a lobe one degree wide gets as many
-nodes as one of thirty. θd is uniform from 0° to 90° inclusive, φd uniform and periodic on [0°, 180°).
+nodes as one of thirty. θd is uniform from 0° to 90° inclusive; φd is uniform and periodic on
+[0°, 180°).
 The OSL shader reads the same nodes with the same weights (appearance/osl_atlas).
 """
 
@@ -64,9 +65,7 @@ class AngleGrid:
             )
         return index, weight
 
-    def interpolate(
-        self, node_values: NDArray[np.float32], angles: Angles
-    ) -> NDArray[np.float32]:
+    def interpolate(self, node_values: NDArray[np.float32], angles: Angles) -> NDArray[np.float32]:
         """Values (n, c) at n directions from node_values (size, c)."""
         index, weight = self.corners(angles)
         out = np.zeros((index.shape[1], node_values.shape[1]), np.float32)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,9 +43,11 @@ def save(path: Path, basis: Basis) -> None:
 def load(path: Path) -> Basis:
     """Read a basis written by :func:`save`. Raises InputError for anything else."""
     try:
-        with np.load(path, allow_pickle=False) as data:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
             if int(data["format"]) != FORMAT:
-                raise InputError(f"basis format {int(data['format'])}, expected {FORMAT}", file=path)
+                raise InputError(
+                    f"basis format {int(data['format'])}, expected {FORMAT}", file=path
+                )
             n_h, n_d, n_p, knee = (float(x) for x in data["grid"])
             return Basis(
                 grid=AngleGrid(int(n_h), int(n_d), int(n_p), knee),
@@ -55,7 +58,7 @@ def load(path: Path) -> Basis:
                 columns=int(data["columns"]),
                 provenance=str(data["provenance"]),
             )
-    except (OSError, KeyError, ValueError, EOFError) as error:
+    except (OSError, KeyError, ValueError, EOFError, BadZipFile) as error:
         raise InputError(f"not a Patina basis ({error})", file=path) from error
 
 

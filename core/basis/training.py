@@ -42,7 +42,28 @@ def train(
     grid: AngleGrid = DEFAULT_GRID,
     progress: Progress = lambda stage, fraction: None,
 ) -> Basis:
-    """Basis of the first ``count`` components, stored on ``grid``; streams, so memory stays flat."""
+    """Basis of the first ``count`` components, stored on ``grid``; streams: memory stays flat."""
+    directions, explained = principal(observations, count, progress)
+    nodes = Angles(*(a.ravel() for a in grid.nodes()))
+    stacked = np.empty((2 + directions.shape[1], grid.size), np.float32)
+    for start in range(0, grid.size, BLOCK):
+        progress("nodes", start / grid.size)
+        part = Angles(*(a[start : start + BLOCK] for a in nodes))
+        stacked[:, start : start + BLOCK] = exact_rows(observations, directions, part)
+    stacked = _fill_unmeasured(stacked.reshape(-1, *grid.shape))
+    return Basis(
+        grid, stacked[0], stacked[1], stacked[2:], explained, observations.columns, provenance
+    )
+
+
+def principal(
+    observations: Observations,
+    count: int,
+    progress: Progress = lambda stage, fraction: None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(W (columns, count), explained variance fractions): row i of W is also the coefficients of
+    training column i."""
+
     def centred_blocks() -> Iterator[NDArray[np.float32]]:
         for angles, rho, fraction in observations.cell_blocks():
             progress("principal components", fraction)
@@ -50,25 +71,19 @@ def train(
             yield logs - mean
 
     gram = components.gram_matrix(centred_blocks(), observations.columns)
-    directions, explained = components.principal_directions(gram, count)
-    nodes = Angles(*(a.ravel() for a in grid.nodes()))
-    mean = np.empty(grid.size, np.float32)
-    log_reference = np.empty(grid.size, np.float32)
-    scaled = np.empty((directions.shape[1], grid.size), np.float32)
-    for start in range(0, grid.size, BLOCK):
-        progress("nodes", start / grid.size)
-        block = slice(start, start + BLOCK)
-        part = Angles(*(a[block] for a in nodes))
-        rho = observations.at(part)
-        logs, mean[block], log_reference[block] = _mapped(rho, part)
-        scaled[:, block] = directions.T @ (logs - mean[block])
-        unmeasured = rho[0] < 0
-        mean[block][unmeasured] = np.nan
-    stacked = np.concatenate([mean[None], log_reference[None], scaled])
-    stacked = _fill_unmeasured(stacked.reshape(-1, *grid.shape))
-    return Basis(
-        grid, stacked[0], stacked[1], stacked[2:], explained, observations.columns, provenance
-    )
+    return components.principal_directions(gram, count)
+
+
+def exact_rows(
+    observations: Observations, directions: NDArray[np.float64], angles: Angles
+) -> NDArray[np.float32]:
+    """(2 + k, n): µ, ln(ref + ε) and the scaled components at directions (n,), straight from the
+    observations; µ is NaN where nothing was measured."""
+    rho = observations.at(angles)
+    logs, mean, log_reference = _mapped(rho, angles)
+    scaled = directions.T.astype(np.float32) @ (logs - mean)
+    mean[rho[0] < 0] = np.nan
+    return np.concatenate([mean[None], log_reference[None], scaled])
 
 
 def _mapped(

@@ -26,10 +26,13 @@ def read(path: Path) -> TabulatedBRDF:
     try:
         size = os.path.getsize(path)
         with open(path, "rb") as file:
-            header = np.frombuffer(file.read(12), HEADER)
-            if header.size != 3 or tuple(header) != merl_grid.SHAPE:
+            head = file.read(12)
+            if len(head) < 12:
+                raise InputError(f"{size} bytes: the file is truncated", file=path)
+            dimensions = tuple(int(n) for n in np.frombuffer(head, HEADER))
+            if dimensions != merl_grid.SHAPE:
                 raise InputError(
-                    f"header {tuple(int(n) for n in header)}, expected {merl_grid.SHAPE}: "
+                    f"dimensions {dimensions}, expected {merl_grid.SHAPE}: "
                     "not an isotropic MERL file",
                     file=path,
                 )

@@ -5,6 +5,7 @@ Importance Sampling". Used to compute the embedded basis and to check fits; no f
 from __future__ import annotations
 
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,9 @@ WEIGHTS = 675  # 6·21 + 21 + 21·21 + 21 + 21·3 + 3
 def load(path: Path) -> tuple[list[str], NDArray[np.float32]]:
     """(names, weights (n, 675)) from an .npz of encodings."""
     try:
-        with np.load(path) as data:
+        with open(path, "rb") as file, np.load(file) as data:
             names, weights = [str(n) for n in data["names"]], np.asarray(data["weights"])
-    except (OSError, KeyError, ValueError) as error:
+    except (OSError, KeyError, ValueError, BadZipFile) as error:
         raise InputError(f"not a set of neural BRDF encodings ({error})", file=path) from error
     if weights.shape != (len(names), WEIGHTS):
         raise InputError(

@@ -22,7 +22,7 @@ class TabulatedBRDF:
 
     @classmethod
     def from_function(cls, evaluate: Callable[[Angles], NDArray[np.floating]]) -> TabulatedBRDF:
-        """Table of ``evaluate(angles) -> (n, 3)``; cells with light or view below the horizon: -1."""
+        """Table of ``evaluate(angles) -> (n, 3)``; -1 where light or view is below the horizon."""
         centres = merl_grid.node_angles(0.5)
         seen = merl_grid.visible(centres)
         values = np.full((3, *merl_grid.SHAPE), -1.0, np.float32)

@@ -35,10 +35,12 @@ def read_capture(path: Path) -> Capture:
 
     scan = top.table("scan")
     cameras, mesh = scan.file_path("cameras"), scan.file_path("mesh")
-    images = scan.file_path("images", required=False)
+    images = scan.optional_file_path("images")
     scan.close()
     lights = tuple(_light(section) for section in top.tables("light"))
     materials = tuple(_material(section) for section in top.tables("material"))
+    _refuse_twins(top, "light", [light.name for light in lights])
+    _refuse_twins(top, "material", [material.name for material in materials])
     photos = tuple(
         _photo(section, {light.name for light in lights}, {m.name for m in materials})
         for section in top.tables("photo")
@@ -48,11 +50,6 @@ def read_capture(path: Path) -> Capture:
     top.close()
     if not photos:
         raise top.error("no [[photo]]: at least one lit photo is needed", "photo")
-    for kind, names in (("light", [x.name for x in lights]), ("material", [x.name for x in materials])):
-        for place, name in enumerate(names):
-            if name in names[:place]:
-                raise top.error(f"the name {name!r} is used twice", kind, place, "name")
-    assert cameras is not None and mesh is not None  # required above
     return Capture(
         file=path.resolve(),
         cameras=cameras,
@@ -64,6 +61,12 @@ def read_capture(path: Path) -> Capture:
         fit=fit,
         lines=lines,
     )
+
+
+def _refuse_twins(top: Section, kind: str, names: list[str]) -> None:
+    for place, name in enumerate(names):
+        if name in names[:place]:
+            raise top.error(f"the name {name!r} is used twice", kind, place, "name")
 
 
 def _light(section: Section) -> DistantLight:
@@ -84,15 +87,13 @@ def _light(section: Section) -> DistantLight:
     if irradiance is not None and not (irradiance > 0).all():
         raise section.error(f"found {irradiance.tolist()}, expected positive numbers", "irradiance")
     section.close()
-    assert name is not None
     return DistantLight(name, direction / length, irradiance)
 
 
 def _material(section: Section) -> MaterialEntry:
     name = section.text("name")
-    faces = section.text("faces", required=False)
+    faces = section.optional_text("faces")
     section.close()
-    assert name is not None
     if name == SHADOW_MASK:
         raise section.error(f"{SHADOW_MASK!r} is the name of the shadow masks", "name")
     if any(c in name for c in '/\\:*?"<>|') or name.strip(". ") != name:
@@ -111,10 +112,8 @@ def _photo(section: Section, lights: set[str], materials: set[str]) -> PhotoEntr
         if name != SHADOW_MASK and name not in materials:
             raise entries.error(f"no [[material]] is named {name!r}", name)
         path = entries.file_path(name)
-        assert path is not None
         masks[name] = path
     section.close()
-    assert file is not None and camera is not None and light is not None
     if light not in lights:
         known = ", ".join(sorted(lights)) or "none"
         raise section.error(f"no [[light]] is named {light!r}; there are: {known}", "light")

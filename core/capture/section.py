@@ -36,23 +36,28 @@ class Section:
             raise self.error(f"the key {name!r} is missing", name)
         return self.data.get(name)
 
-    def text(self, name: str, required: bool = True) -> str | None:
-        value = self.get(name, required)
-        if value is not None and (not isinstance(value, str) or not value):
+    def text(self, name: str) -> str:
+        """A text that must be there."""
+        value = self.get(name, required=True)
+        if not isinstance(value, str) or not value:
             raise self.error(f"found {value!r}, expected a text", name)
         return value
 
-    def file_path(self, name: str, required: bool = True) -> Path | None:
-        """A file or folder that must exist, relative to the capture file."""
-        value = self.text(name, required)
-        return None if value is None else self.existing(value, name)
+    def optional_text(self, name: str) -> str | None:
+        """A text, or None where the key is absent."""
+        return None if self.get(name) is None else self.text(name)
 
-    def existing(self, value: str, *key: str | int) -> Path:
-        path = Path(value)
+    def file_path(self, name: str) -> Path:
+        """A file or folder that must exist, relative to the capture file."""
+        path = Path(self.text(name))
         path = path if path.is_absolute() else self.file.parent / path
         if not path.exists():
-            raise self.error(f"no such file: {path}", *key)
+            raise self.error(f"no such file: {path}", name)
         return path
+
+    def optional_file_path(self, name: str) -> Path | None:
+        """The same, or None where the key is absent."""
+        return None if self.get(name) is None else self.file_path(name)
 
     def number(
         self, name: str, default: float, low: float = -math.inf, high: float = math.inf

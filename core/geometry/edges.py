@@ -10,9 +10,7 @@ from scipy.ndimage import binary_dilation, generate_binary_structure, iterate_st
 STEEPEST_SLOPE = 12.0
 
 
-def silhouette(
-    depth: NDArray[np.floating], footprint: NDArray[np.floating]
-) -> NDArray[np.bool_]:
+def silhouette(depth: NDArray[np.floating], footprint: NDArray[np.floating]) -> NDArray[np.bool_]:
     """(h, w) pixels on either side of an outline or of a jump in depth.
 
     depth: (h, w) along the ray, NaN where nothing is hit; footprint: (h, w) a pixel's width there.
@@ -34,9 +32,7 @@ def silhouette(
     return edge
 
 
-def shadow_edge(
-    lit: NDArray[np.bool_], seen: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
+def shadow_edge(lit: NDArray[np.bool_], seen: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(h, w) pixels on either side of a boundary between light and shadow on the surface."""
     edge = np.zeros(lit.shape, bool)
     down = (lit[1:] != lit[:-1]) & seen[1:] & seen[:-1]

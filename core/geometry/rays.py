@@ -41,9 +41,7 @@ class RayScene:
         TriangleMesh(scene, np.ascontiguousarray(triangles))
         return cls(mesh, origin, scene)
 
-    def first_hits(
-        self, start: NDArray[np.float64], directions: NDArray[np.float64]
-    ) -> Hits:
+    def first_hits(self, start: NDArray[np.float64], directions: NDArray[np.float64]) -> Hits:
         """First hits of rays from one point ``start`` (3,) along ``directions`` (n, 3)."""
         n = len(directions)
         face = np.empty(n, np.int32)

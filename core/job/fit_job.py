@@ -94,8 +94,9 @@ class FitJob(Job):
 
         results = []
         for index, material in enumerate(capture.materials):
-            start, share = 0.4 + 0.55 * index / len(capture.materials), 0.55 / len(
-                capture.materials
+            start, share = (
+                0.4 + 0.55 * index / len(capture.materials),
+                0.55 / len(capture.materials),
             )
             yield Step(f"fitting {material.name}", start)
             table = SampleTable.join(tables.pop(material.name))
@@ -158,9 +159,7 @@ class FitJob(Job):
         raise self.capture.error(found, "material", index, "name")
 
 
-def material_warnings(
-    table: SampleTable, fit: PaperFit, irradiance_known: bool
-) -> tuple[str, ...]:
+def material_warnings(table: SampleTable, fit: PaperFit, irradiance_known: bool) -> tuple[str, ...]:
     """What an artist should know about this material before trusting it."""
     found = list(fit.warnings)
     near_peak = int((table.theta_h < np.radians(5)).sum())

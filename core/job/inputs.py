@@ -93,9 +93,7 @@ def material_pixels(
 ) -> tuple[dict[str, NDArray[np.bool_]], NDArray[np.bool_]]:
     """({material: (n,) its pixels}, (n,) pixels in the shadow mask) of one photo's SurfaceView."""
     photo = capture.photos[place]
-    masks = {
-        name: _mask(capture, place, name).ravel()[view.pixel] for name in photo.masks
-    }
+    masks = {name: _mask(capture, place, name).ravel()[view.pixel] for name in photo.masks}
     shadow = masks.pop(SHADOW_MASK, np.zeros(len(view.pixel), bool))
     found = {}
     for index, material in enumerate(capture.materials):

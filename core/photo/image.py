@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, PatinaError
 
 LINEAR = {".exr"}
+FIXED_DATE = "2000:01:01 00:00:00"  # else the clock is written: same pixels, other bytes
 
 
 def read_radiance(path: Path) -> NDArray[np.float32]:
@@ -90,6 +91,7 @@ def _write(path: Path, pixels: NDArray, kind: str) -> None:
     spec = oiio.ImageSpec(width, height, channels, kind)
     if path.suffix == ".exr":
         spec.attribute("compression", "zip")
+        spec.attribute("DateTime", FIXED_DATE)
     output = oiio.ImageOutput.create(str(path))
     if output is None:
         raise PatinaError(f"{path}: cannot write images of this kind ({oiio.geterror()})")

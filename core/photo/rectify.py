@@ -9,9 +9,7 @@ from scipy.ndimage import map_coordinates
 from ..scan import Camera
 
 
-def rectify(
-    pixels: NDArray[np.floating], camera: Camera, target: Camera
-) -> NDArray[np.float32]:
+def rectify(pixels: NDArray[np.floating], camera: Camera, target: Camera) -> NDArray[np.float32]:
     """The photo (h, w, c) of ``camera`` as the pinhole ``target`` would have taken it.
 
     Bilinear; directions the photo does not hold are 0. Streams by row blocks.

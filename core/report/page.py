@@ -16,19 +16,7 @@ from . import display
 from .polar import Curve, polar_chart
 from .sphere import lit_sphere
 
-STYLE = """
-:root{color-scheme:light}body{font:15px/1.5 system-ui,sans-serif;margin:2.5rem auto;max-width:1180px;
-padding:0 1.2rem;color:#223;background:#f6f6f4}h1{font-weight:600;margin-bottom:.2rem}
-h2{font-weight:600;margin:2.2rem 0 .6rem}p.sub{color:#667;margin-top:0}figure{margin:0}
-figcaption{color:#556;font-size:13px;padding:.25rem 0}img{display:block;width:100%;border-radius:6px}
-.material{display:grid;grid-template-columns:260px 1fr;gap:1.4rem;align-items:start}
-.charts{display:grid;grid-template-columns:repeat(3,1fr);gap:.8rem}.charts svg{background:#fff;
-border-radius:6px;width:100%}.triple{display:grid;grid-template-columns:repeat(3,1fr);gap:.5rem;
-margin-bottom:1rem}table{border-collapse:collapse;margin:.6rem 0}td,th{padding:.2rem .9rem .2rem 0;
-text-align:left;font-weight:400;vertical-align:top}th{color:#667}.warn{background:#fff3d6;padding:.5rem .8rem;
-border-radius:6px;margin:.4rem 0}.key{display:inline-block;width:9em;height:.7em;border-radius:3px;
-background:linear-gradient(90deg,#3b4cc0,#ececec,#b40426)}
-"""
+STYLE = Path(__file__).parents[2] / "assets" / "report" / "style.css"
 LONGEST = 640
 
 
@@ -52,7 +40,7 @@ def write_report(folder: Path, result: CaptureResult) -> Iterator[float]:
     title = escape(result.capture.file.name)
     (folder / "index.html").write_text(
         f"<!doctype html><html lang='en'><meta charset='utf-8'><title>Patina: {title}</title>"
-        f"<style>{STYLE}</style><h1>Patina report</h1><p class='sub'>{title} · "
+        f"<style>{STYLE.read_text('utf-8')}</style><h1>Patina report</h1><p class='sub'>{title} · "
         f"{len(result.capture.photos)} lit photos · {len(result.scan.mesh.faces):,} faces · basis "
         f"{result.basis.version}</p>{''.join(body)}</html>",
         "utf-8",
@@ -71,37 +59,49 @@ def _material_section(folder: Path, material: MaterialResult) -> str:
         for incidence in (15, 45, 70)
     )
     warnings = "".join(f"<p class='warn'>{escape(w)}</p>" for w in material.warnings)
-    rows = "".join(
-        f"<tr><th>{key}</th><td>{value}</td></tr>" for key, value in _figures(material)
-    )
+    rows = "".join(f"<tr><th>{key}</th><td>{value}</td></tr>" for key, value in _figures(material))
     return (
         f"<h2>{escape(material.name)}</h2><div class='material'><figure><img src='{escape(name)}' "
         f"alt='lit sphere'><figcaption>Lit sphere, key light π at the upper left</figcaption>"
-        f"</figure><div>{warnings}<table>{rows}</table></div></div><div class='charts'>{charts}</div>"
+        f"</figure><div>{warnings}<table>{rows}</table></div></div>"
+        f"<div class='charts'>{charts}</div>"
     )
 
 
 def _figures(material: MaterialResult) -> list[tuple[str, str]]:
-    fit, p = material.fit, material.principled.principled
+    fit, p, spread = material.fit, material.principled.principled, material.spread
     held = material.held_out
     unseen = (
         "only one photo: nothing to hold out"
         if held is None
-        else f"predicts a photo it has not seen to {100 * held.error:.1f} % (relative RMS)"
+        else f"predicts the typical pixel of an unseen photo to {100 * held.typical:.0f} %; "
+        f"{100 * held.error:.0f} % relative RMS, which highlights dominate"
     )
     colour = ", ".join(f"{c:.3f}" for c in p.base_color)
     return [
         ("held-out photos", unseen),
-        ("samples", f"{material.samples:,} lit pixels, {fit.reliable:,} on calm surface, "
-                    f"{len(fit.chosen)} chosen (condition number {fit.condition:.1f})"),
-        ("cosine similarity", f"{fit.similarity.max():.4f}, the best of {len(fit.similarity)} trials "
-                              f"(worst {fit.similarity.min():.4f})"),
-        ("spread of trials", f"± {100 * material.spread.median:.0f} % median, "
-                             f"± {100 * material.spread.at_highlight:.0f} % at the highlight"),
-        ("Principled", f"base colour {colour} · metallic {p.metallic:.2f} · roughness "
-                       f"{p.roughness:.2f} · specular {p.specular_ior_level:.2f} · coat "
-                       f"{p.coat_weight:.2f} (cube-root error {100 * material.principled.error:.1f} %)"),
-    ]  # fmt: skip
+        (
+            "samples",
+            f"{material.samples:,} lit pixels, {fit.reliable:,} on calm surface, "
+            f"{len(fit.chosen)} chosen (condition number {fit.condition:.1f})",
+        ),
+        (
+            "cosine similarity",
+            f"{fit.similarity.max():.4f}, the best of {len(fit.similarity)} trials "
+            f"(worst {fit.similarity.min():.4f})",
+        ),
+        (
+            "spread of trials",
+            f"± {100 * spread.median:.0f} % median, "
+            f"± {100 * spread.at_highlight:.0f} % at the highlight",
+        ),
+        (
+            "Principled",
+            f"base colour {colour} · metallic {p.metallic:.2f} · roughness {p.roughness:.2f} · "
+            f"specular {p.specular_ior_level:.2f} · coat {p.coat_weight:.2f} "
+            f"(cube-root error {100 * material.principled.error:.1f} %)",
+        ),
+    ]
 
 
 def _photo_row(folder: Path, result: CaptureResult, place: int) -> str:

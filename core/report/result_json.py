@@ -69,9 +69,7 @@ def _material(result: CaptureResult, material: MaterialResult) -> dict[str, Any]
         "samples": {
             "used": material.samples,
             "on_calm_surface": fit.reliable,
-            "per_photo": dict(
-                zip((p.file.name for p in photos), material.per_photo, strict=True)
-            ),
+            "per_photo": dict(zip((p.file.name for p in photos), material.per_photo, strict=True)),
         },
         "chosen": [
             {
@@ -94,6 +92,7 @@ def _material(result: CaptureResult, material: MaterialResult) -> dict[str, Any]
         else {
             "measure": "relative RMS error of lit pixels, each photo predicted from the others",
             "error": held.error,
+            "typical": held.typical,
             "per_photo": {photos[i].file.name: e for i, e in held.per_photo.items()},
         },
         "uncertainty": {

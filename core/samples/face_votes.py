@@ -26,7 +26,7 @@ class FaceVotes:
         self.counts[material] += np.bincount(faces, minlength=self.counts.shape[1])
 
     def winners(self, mesh: Mesh) -> NDArray[np.int32]:
-        """(f,) the material with most votes; faces nobody voted on follow their nearest neighbour."""
+        """(f,) the material with most votes; a face nobody saw follows its nearest neighbour."""
         winners = self.counts.argmax(axis=0).astype(np.int32)
         voted = self.counts.sum(axis=0) > 0
         if voted.any() and not voted.all() and len(self.counts) > 1:

@@ -46,9 +46,7 @@ def light_surface(rays: RayScene, view: SurfaceView, light: DistantLight) -> Lig
     return Lighting(cos_i, shadowed)
 
 
-def trusted_pixels(
-    view: SurfaceView, lighting: Lighting, margins: Margins
-) -> NDArray[np.bool_]:
+def trusted_pixels(view: SurfaceView, lighting: Lighting, margins: Margins) -> NDArray[np.bool_]:
     """(n,) lit pixels away from outlines, shadow edges and grazing angles."""
     cos_o = np.einsum("ij,ij->i", view.normal, view.view)
     lit = view.image(~lighting.shadowed, fill=0).astype(bool)

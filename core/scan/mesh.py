@@ -35,9 +35,7 @@ class Mesh:
         for k in range(3):
             a = corners[:, (k + 1) % 3] - corners[:, k]
             b = corners[:, (k + 2) % 3] - corners[:, k]
-            angle = np.arctan2(
-                np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b)
-            )
+            angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
             for axis in range(3):
                 normals[:, axis] += np.bincount(
                     self.faces[:, k], angle * face_normals[:, axis], len(self.vertices)

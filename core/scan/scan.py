@@ -15,7 +15,7 @@ from .mesh import Mesh, read_mesh
 
 @dataclass(frozen=True)
 class Scan:
-    """A scanned object: its mesh, the cameras that saw it and where its own photos lie, if known."""
+    """A scanned object: its mesh, the cameras that saw it, where its own photos lie (if known)."""
 
     mesh: Mesh
     cameras: tuple[Camera, ...]

@@ -20,7 +20,17 @@ SETUP = (
 )  # fmt: skip
 ROOMS = ("core", "scene", "operators", "panels", "commands")
 LIBRARIES = {"numpy", "scipy", "pycolmap", "OpenImageIO", "embreex", "trimesh"}
-BLENDER = {"bpy", "bpy_extras", "mathutils", "bmesh", "gpu", "gpu_extras", "blf", "addon_utils"}
+BLENDER = {
+    "bpy",
+    "_cycles",
+    "bpy_extras",
+    "mathutils",
+    "bmesh",
+    "gpu",
+    "gpu_extras",
+    "blf",
+    "addon_utils",
+}
 # The list of the Blender extensions platform.
 TAGS = {
     "3D View", "Add Curve", "Add Mesh", "Animation", "Bake", "Camera", "Compositing",

@@ -31,10 +31,30 @@ def new_scene(size: int = 64, samples: int = 1, osl: bool = False) -> bpy.types.
     camera.location = (0, 0, 5)
     scene.collection.objects.link(camera)
     scene.camera = camera
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=512, ring_count=256, radius=1.0)
-    sphere = bpy.context.object
-    sphere.data.shade_smooth()
+    sphere = bpy.data.objects.new("sphere", _sphere_mesh(512, 256))
+    scene.collection.objects.link(sphere)
+    bpy.context.view_layer.update()
     return sphere
+
+
+def _sphere_mesh(segments: int, rings: int) -> bpy.types.Mesh:
+    """Smooth unit sphere with its poles on the y axis, out of the camera's sight."""
+    u = np.arange(segments) / segments * 2 * np.pi
+    v = np.linspace(0, np.pi, rings + 1)
+    around, down = np.meshgrid(u, v)
+    points = np.stack(
+        [np.sin(down) * np.sin(around), np.cos(down), np.sin(down) * np.cos(around)], axis=-1
+    )
+    column, row = np.meshgrid(np.arange(segments), np.arange(rings))
+    after = (column + 1) % segments
+    corners = [row * segments + column, (row + 1) * segments + column,
+               (row + 1) * segments + after, row * segments + after]  # fmt: skip
+    faces = np.stack(corners, axis=-1).reshape(-1, 4)
+    # the poles' quads have an edge of length 0: smooth normals still come out right
+    mesh = bpy.data.meshes.new("sphere")
+    mesh.from_pydata(points.reshape(-1, 3).tolist(), [], faces.tolist())
+    mesh.shade_smooth()
+    return mesh
 
 
 def sky(strength: float) -> None:
@@ -76,7 +96,7 @@ def normals() -> tuple[np.ndarray, np.ndarray]:
 
 def render(folder: Path) -> np.ndarray:
     """(h, w, 3) linear radiance, row 0 on top."""
-    import OpenEXR
+    import OpenImageIO as oiio
 
     scene = bpy.context.scene
     settings = scene.render.image_settings
@@ -86,8 +106,4 @@ def render(folder: Path) -> np.ndarray:
     settings.color_mode = "RGB"
     scene.render.filepath = str(folder / "render.exr")
     bpy.ops.render.render(write_still=True)
-    with OpenEXR.File(scene.render.filepath) as file:
-        channels = file.channels()
-        if "RGB" in channels:
-            return np.array(channels["RGB"].pixels)
-        return np.stack([channels[c].pixels for c in "RGB"], axis=-1)
+    return np.array(oiio.ImageBuf(scene.render.filepath).get_pixels(oiio.FLOAT))[..., :3]

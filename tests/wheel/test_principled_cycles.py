@@ -71,4 +71,4 @@ def test_principled_is_what_cycles_renders(node, case, tmp_path):
     error = np.abs(image[kept] - expected[kept])
     # what is left is the sphere's tessellation, and grows with the lobe's sharpness
     assert np.sqrt(np.sum(error**2) / np.sum(expected[kept] ** 2)) < 0.005
-    assert (error / np.maximum(expected[kept], 1e-3)).max() < 0.01
+    assert (error / np.maximum(expected[kept], 1e-3)).max() < 0.015

@@ -1,0 +1,208 @@
+"""From files to a material on the mesh, with the operators an artist presses."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy_extras.object_utils import world_to_camera_view
+from mathutils import Vector
+from support import ROOT, extension
+
+
+def made():
+    """tests/make_capture.py, which knows nothing of the extension."""
+    name = "make_capture"
+    if name not in sys.modules:
+        spec = importlib.util.spec_from_file_location(name, ROOT / "tests" / "make_capture.py")
+        sys.modules[name] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(sys.modules[name])
+    return sys.modules[name]
+
+
+def folder() -> Path:
+    return Path(tempfile.mkdtemp(prefix="patina-test-"))
+
+
+def counts() -> dict[str, int]:
+    kinds = (
+        "objects",
+        "meshes",
+        "cameras",
+        "lights",
+        "materials",
+        "images",
+        "collections",
+        "texts",
+    )
+    return {kind: len(getattr(bpy.data, kind)) for kind in kinds}
+
+
+def lenses():
+    """(model, parameters, width, height): off-centre, portrait, distorted, oblong pixels."""
+    yield "SIMPLE_PINHOLE", (900.0, 500.0, 350.0), 1000, 700
+    yield "SIMPLE_PINHOLE", (900.0, 431.7, 388.2), 1000, 700
+    yield "PINHOLE", (1500.0, 1500.0, 300.3, 610.9), 700, 1000
+    yield "SIMPLE_PINHOLE", (2400.0, 2010.0, 1498.0), 4000, 3000
+    yield "SIMPLE_RADIAL", (900.0, 480.0, 360.0, -0.08), 1000, 700
+    yield "OPENCV", (1100.0, 1090.0, 330.0, 520.0, -0.1, 0.02, 0.001, -0.002), 700, 1000
+    yield "PINHOLE", (1100.0, 1080.0, 510.0, 340.0), 1000, 700
+    yield "OPENCV_FISHEYE", (700.0, 702.0, 505.0, 345.0, 0.01, -0.003, 0.0, 0.0), 1000, 700
+
+
+def test_cameras_stand_at_their_pixel() -> None:
+    """Blender's projection against pycolmap's, over the whole frame: < 0.01 px."""
+    core, scene_cameras = extension("core.scan"), extension("scene.cameras")
+    rng = np.random.default_rng(0)
+    scene = bpy.context.scene
+    worst = 0.0
+    for (model, parameters, width, height), (rotation, translation) in zip(
+        lenses(), made().poses(8), strict=True
+    ):
+        camera = core.Camera(
+            f"{model}-{width}", width, height, model, parameters,
+            core.Pose(rotation, translation),
+        )  # fmt: skip
+        seen = camera if camera.pinhole else camera.rectified()
+        stood = scene_cameras.create_camera(camera, np.zeros(3), 3.0, scene.collection)
+        scene_cameras.look_through(scene, stood)
+        bpy.context.view_layer.update()
+        pixels = rng.uniform((0, 0), (width, height), (400, 2))
+        pixels[:4] = [(0, 0), (width, 0), (0, height), (width, height)]
+        points = camera.pose.centre + seen.rays(pixels) * rng.uniform(2, 9, (400, 1))
+        expected = seen.project(points)
+        assert np.abs(expected - pixels).max() < 1e-6
+        for point, there in zip(points, expected, strict=True):
+            view = world_to_camera_view(scene, stood, Vector(point))
+            here = np.array([view.x * width, (1 - view.y) * height])
+            worst = max(worst, float(np.abs(here - there).max()))
+    print(f"     largest difference {worst:.5f} px")
+    assert worst < 0.01
+
+
+def test_rectified_photos_show_what_the_pinhole_sees() -> None:
+    """A photo of a distorted lens, resampled: a dot lands where the pinhole projects its point."""
+    core, photo = extension("core.scan"), extension("core.photo")
+    rotation, translation = next(iter(made().poses(1)))
+    camera = core.Camera(
+        "x",
+        400,
+        300,
+        "SIMPLE_RADIAL",
+        (350.0, 190.0, 160.0, -0.12),
+        core.Pose(rotation, translation),
+    )
+    target = camera.rectified()
+    for x, y in ((40.0, 30.0), (200.0, 150.0), (350.0, 250.0)):
+        rows, columns = np.indices((300, 400)) + 0.5
+        dot = np.exp(-((columns - x) ** 2 + (rows - y) ** 2) / 18.0)[..., None] * np.ones(3)
+        out = photo.rectify(dot.astype(np.float32), camera, target)[..., 0]
+        found = np.array([(out * columns).sum(), (out * rows).sum()]) / out.sum()
+        point = camera.pose.centre + camera.rays(np.array([[x, y]])) * 4.0
+        assert np.abs(found - target.project(point)[0]).max() < 0.05
+
+
+def test_import_builds_the_scene() -> None:
+    path = made().make_capture(folder() / "ball", photos=4)
+    assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
+    scene = bpy.context.scene
+    mesh = scene.patina.mesh
+    assert mesh is not None and len(mesh.data.polygons) == 20 * 4**5
+    stood = [o for o in scene.objects if o.type == "CAMERA" and "patina_lit" in o]
+    suns = [o for o in scene.objects if o.type == "LIGHT" and "patina_light" in o]
+    assert len(stood) == len(suns) == 4
+    for camera in stood:
+        background = camera.data.background_images[0]
+        assert background.frame_method == "CROP"
+        assert tuple(background.image.size) == (made().WIDTH, made().HEIGHT)
+    for sun, direction in zip(
+        sorted(suns, key=lambda o: o.name), made().light_directions(4), strict=True
+    ):
+        bpy.context.view_layer.update()
+        assert np.allclose(sun.matrix_world.to_3x3().col[2], direction, atol=1e-5)
+        assert np.isclose(sun.data.energy, made().IRRADIANCE)
+    assert scene.camera in stood
+    first = scene.camera
+    bpy.ops.patina.next_photo()
+    assert scene.camera in stood and scene.camera != first
+
+
+def test_a_wrong_capture_is_one_message_and_makes_nothing() -> None:
+    path = made().make_capture(folder() / "ball", photos=2)
+    path.write_text(path.read_text().replace("lit_2.exr", "gone.exr"))
+    before = counts()
+    try:
+        bpy.ops.patina.import_capture(filepath=str(path))
+    except RuntimeError as error:
+        assert "photo 2.file" in str(error) and "gone.exr" in str(error)
+        assert "Traceback" not in str(error)
+    else:
+        raise AssertionError("a missing photo was accepted")
+    assert counts() == before
+
+
+def test_the_fit_operator_gives_the_numbers_of_the_api() -> None:
+    path = made().make_capture(folder() / "ball", photos=4)
+    bpy.ops.patina.import_capture(filepath=str(path))
+    assert bpy.ops.patina.fit() == {"FINISHED"}
+    said = json.loads(bpy.data.texts["Patina result"].as_string())
+    job = extension("core.job").FitJob(extension("core.capture").read_capture(path))
+    job.drain()
+    expected = job.result.materials[0].fit.brdf.coefficients
+    assert np.array_equal(np.array(said["materials"][0]["coefficients"]), expected)
+
+    mesh = bpy.context.scene.patina.mesh
+    assert [m.name for m in mesh.data.materials] == ["surface"]
+    tree = mesh.data.materials[0].node_tree
+    portable = next(
+        n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial" and n.target == "ALL"
+    )
+    assert portable.is_active_output
+    assert portable.inputs["Surface"].links[0].from_node.bl_idname == "ShaderNodeBsdfPrincipled"
+    measured = [n for n in tree.nodes if n.bl_idname == "ShaderNodeScript"]
+    if extension("scene.materials").osl_missing() is None:
+        assert measured and measured[0].outputs[0].links[0].to_node.target == "CYCLES"
+        names = [s.name for s in measured[0].inputs]
+        assert "Coefficient 1" in names and "Coefficient 6" in names
+    else:
+        assert not measured and "patina_without_osl" in mesh.data.materials[0]
+
+    before = counts()
+    bpy.ops.patina.fit()  # again: replaces, does not pile up
+    assert counts()["materials"] == before["materials"]
+
+
+def test_results_survive_saving_and_loading() -> None:
+    path = made().make_capture(folder() / "ball", photos=3)
+    bpy.ops.patina.import_capture(filepath=str(path))
+    bpy.ops.patina.fit()
+    blend = folder() / "saved.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    scene = bpy.context.scene
+    assert scene.patina.capture == str(path)
+    assert scene.patina.mesh.data.materials[0]["patina_measured"] == "surface"
+    assert extension("scene.properties").stored_result()["materials"][0]["name"] == "surface"
+
+
+def test_georeferenced_scans_keep_their_precision() -> None:
+    """The same ball 500 km from the origin: Blender's float32 would be off by centimetres."""
+    core, frame = extension("core.scan"), extension("scene.frame")
+    vertices, faces = made().sphere_mesh(4)
+    far = np.array([500_000.0, 4_000_000.0, 120.0])
+    mesh = core.Mesh(vertices + far, faces.astype(np.int32))
+    origin = frame.frame_origin(mesh)
+    assert np.abs(origin - far).max() < 2
+    target = extension("scene.meshes").create_mesh_object(
+        "far", mesh, origin, bpy.context.scene.collection
+    )
+    found = np.empty(3 * len(vertices), np.float32)
+    target.data.vertices.foreach_get("co", found)
+    assert np.abs(found.reshape(-1, 3) - (vertices + far - origin)).max() < 1e-6
+    assert (frame.frame_origin(core.Mesh(vertices, faces.astype(np.int32))) == 0).all()

@@ -1,0 +1,216 @@
+"""The basis: regression against published figures, physics, round trips, storage."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from patina.core.angles import Angles, half_difference, merl_grid
+from patina.core.basis import Basis, PrincipalBRDF, mapping, storage
+from patina.core.basis.components import gram_matrix, principal_directions
+from patina.core.basis.merl_folder import cached_basis, checksums
+from patina.core.brdf import TabulatedBRDF, merl_file, nbrdf
+from patina.core.errors import InputError
+from patina.core.fit import ridge
+
+# Nielsen et al. 2015, n = 5, as (φd, θh, θd) in degrees, and the observations published with them
+DIRECTIONS = np.radians(
+    [
+        [36.2, 1.4, 4.0],
+        [86.5, 76.7, 13.1],
+        [85.5, 7.6, 78.9],
+        [144.8, 2.5, 73.8],
+        [80.4, 12.9, 51.6],
+    ]
+)
+OBSERVED = np.array(
+    [[0.09394814, 0.01236500, 0.00221087], [0.09005638, 0.00315711, 0.00270478],
+     [1.38033974, 1.21132099, 1.19253075], [0.97795460, 0.85147798, 0.84648135],
+     [0.10845871, 0.05911538, 0.05381590]]
+)  # fmt: skip
+PUBLISHED = Angles(DIRECTIONS[:, 1], DIRECTIONS[:, 2], DIRECTIONS[:, 0])
+
+coefficients = st.lists(st.floats(-0.2, 0.2), min_size=15, max_size=15).map(
+    lambda c: np.array(c).reshape(3, 5)
+)
+
+
+@pytest.fixture(scope="module")
+def basis() -> Basis:
+    return Basis.default()
+
+
+def test_default_is_small_and_rich(basis: Basis, root: Path) -> None:
+    assert basis.count >= 25 and basis.columns == 300
+    assert (root / "assets" / "basis" / "nbrdf_basis.npz").stat().st_size < 4e6
+    explained = basis.explained.cumsum()
+    for k, share in ((1, 0.590), (2, 0.863), (3, 0.943), (5, 0.981), (10, 0.993), (20, 0.998)):
+        assert abs(explained[k - 1] - share) < 0.003
+
+
+def test_published_directions_are_well_conditioned(basis: Basis) -> None:
+    assert np.linalg.cond(basis.rows(PUBLISHED, 5)[1]) == pytest.approx(6.0, abs=0.3)
+
+
+def test_published_observations_give_a_red_glossy_material(basis: Basis) -> None:
+    _, q = basis.rows(PUBLISHED, 5)
+    brdf = PrincipalBRDF(basis, ridge.solve(q, basis.mapped(OBSERVED, PUBLISHED)))
+    body = Angles(np.radians([50.0]), np.radians([20.0]), np.radians([90.0]))
+    red, green, blue = brdf.evaluate(body)[0]
+    assert red > 3 * max(green, blue)
+    grazing = Angles(np.radians([4.0]), np.radians([76.0]), np.radians([90.0]))
+    gloss = brdf.evaluate(grazing)[0]  # a colourless sheen, as of a dielectric
+    assert gloss.min() > 0.5 and gloss.max() < 2.5 * gloss.min()
+    assert np.allclose(brdf.evaluate(PUBLISHED)[2], OBSERVED[2], rtol=0.15)
+
+
+def test_the_nearest_measured_material_is_a_red_paint(basis: Basis, shared: Path) -> None:
+    _, q = basis.rows(PUBLISHED, 5)
+    brdf = PrincipalBRDF(basis, ridge.solve(q, basis.mapped(OBSERVED, PUBLISHED)))
+    names, weights = nbrdf.load(shared / "data" / "brdf" / "nbrdf_merl.npz")
+    nodes = basis.grid.nodes()
+    rng = np.random.default_rng(0)
+    seen = np.flatnonzero(merl_grid.visible(nodes).ravel())
+    some = seen[rng.permutation(len(seen))[:4000]]
+    angles = Angles(*(a.ravel()[some] for a in nodes))
+    weight = mapping.cos_map(angles)
+    ours = mapping.log_weighted(brdf.evaluate(angles), weight)
+    far = [
+        np.sqrt(np.mean((mapping.log_weighted(nbrdf.evaluate(w, angles), weight) - ours) ** 2))
+        for w in weights
+    ]
+    nearest = [names[i] for i in np.argsort(far)[:6]]
+    assert any("red" in name for name in nearest), nearest
+
+
+@settings(max_examples=25, deadline=None)
+@given(c=coefficients, seed=st.integers(0, 1000))
+def test_reciprocal_and_never_negative(c: np.ndarray, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    pair = rng.normal(size=(2, 200, 3))
+    pair /= np.linalg.norm(pair, axis=-1, keepdims=True)
+    pair[..., 2] = np.abs(pair[..., 2])
+    normal = np.broadcast_to(np.array([0.0, 0, 1]), pair[0].shape)
+    brdf = PrincipalBRDF(Basis.default(), c)
+    there = brdf.evaluate(half_difference(normal, pair[0], pair[1]))
+    back = brdf.evaluate(half_difference(normal, pair[1], pair[0]))
+    assert (there >= 0).all() and np.isfinite(there).all()
+    assert np.allclose(there, back, rtol=2e-3, atol=1e-6)
+
+
+@settings(max_examples=20, deadline=None)
+@given(c=coefficients)
+def test_projecting_a_member_finds_its_coefficients(c: np.ndarray) -> None:
+    basis = Basis.default()
+    nodes = basis.grid.nodes()
+    seen = merl_grid.visible(nodes)
+    angles = Angles(*(a[seen][::11] for a in nodes))
+    rho = basis.evaluate(c, angles)
+    bright = (rho > 1e-4).all(axis=1)  # what maps below ln ε is black, and black is not invertible
+    angles = Angles(*(a[bright] for a in angles))
+    if bright.sum() > 2000:
+        assert np.allclose(basis.project(rho[bright], angles, 5), c, atol=2e-3)
+
+
+@given(rho=st.floats(0, 1e4), weight=st.floats(0.01, 1))
+def test_mapping_round_trip(rho: float, weight: float) -> None:
+    w = np.array([weight])
+    back = mapping.unlog_weighted(mapping.log_weighted(np.array([[rho]]), w), w)
+    assert back[0, 0] == pytest.approx(rho, rel=1e-9, abs=1e-9)
+
+
+def test_components_by_gram_equal_those_by_svd() -> None:
+    rng = np.random.default_rng(2)
+    x = rng.normal(size=(12, 400)) * np.linspace(3, 0.1, 12)[:, None]
+    w, explained = principal_directions(gram_matrix([x[:, :150], x[:, 150:]], 12), 4)
+    singular = np.linalg.svd(x, compute_uv=False)
+    scaled = x.T @ w
+    assert np.allclose(np.linalg.norm(scaled, axis=0), singular[:4])
+    assert np.allclose(explained, singular**2 / (singular**2).sum())
+
+
+def test_storage_round_trip_and_refusal(basis: Basis, tmp_path: Path) -> None:
+    path = tmp_path / "b.npz"
+    storage.save(path, basis)
+    back = storage.load(path)
+    assert back.version == basis.version and back.provenance == basis.provenance
+    path.write_bytes(path.read_bytes()[:5000])
+    with pytest.raises(InputError, match=r"b\.npz"):
+        storage.load(path)
+
+
+def test_interpolation_is_exact_at_nodes_and_periodic(basis: Basis) -> None:
+    nodes = basis.grid.nodes()
+    centre, rows = basis.rows(Angles(*(a.ravel()[::97] for a in nodes)), 3)
+    assert np.allclose(centre, (basis.mean + basis.log_reference).ravel()[::97], atol=1e-4)
+    assert np.allclose(rows.T, basis.components[:3].reshape(3, -1)[:, ::97], atol=1e-3)
+    at = [np.array([0.4]), np.array([0.7])]
+    start, end = (basis.rows(Angles(*at, np.array([p])), 3)[1] for p in (1e-7, np.pi - 1e-7))
+    assert np.allclose(start, end, atol=1e-3)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("merl")
+    rng = np.random.default_rng(5)
+    for name in "abc":
+        brdf = PrincipalBRDF(Basis.default(), rng.normal(0, 0.05, (3, 6)))
+        merl_file.write(folder / f"{name}.binary", TabulatedBRDF.from_function(brdf.evaluate))
+    return folder
+
+
+class TestMerlFolder:
+    """Three made-up 'genuine' files stand for the hundred."""
+
+    @staticmethod
+    def sums(folder: Path) -> dict[str, str]:
+        return {
+            p.name: hashlib.sha256(p.read_bytes()).hexdigest()
+            for p in sorted(folder.glob("*.binary"))
+        }
+
+    def test_basis_spans_its_own_materials_and_is_cached(
+        self, folder: Path, tmp_path: Path
+    ) -> None:
+        stages: list[str] = []
+        made = cached_basis(
+            folder, lambda stage, _: stages.append(stage), self.sums(folder), tmp_path
+        )
+        assert made.columns == 9 and "principal components" in stages
+        table = merl_file.read(folder / "a.binary")
+        centres = merl_grid.node_angles(0.5)
+        angles = Angles(*(a[table.valid][::37] for a in centres))
+        rho = np.moveaxis(table.values, 0, -1)[table.valid][::37]
+        fit = made.evaluate(made.project(rho, angles, made.count, eta=1e-6), angles)
+        weight = mapping.cos_map(angles)
+        off = mapping.log_weighted(fit, weight) - mapping.log_weighted(rho, weight)
+        assert np.sqrt(np.mean(off**2)) < 0.03
+        stages.clear()
+        again = cached_basis(
+            folder, lambda stage, _: stages.append(stage), self.sums(folder), tmp_path
+        )
+        assert again.version == storage.load(next(tmp_path.glob("*.npz"))).version
+        assert "principal components" not in stages
+
+    def test_missing_truncated_and_altered_files_are_named(
+        self, folder: Path, tmp_path: Path
+    ) -> None:
+        good = self.sums(folder)
+        with pytest.raises(InputError, match=r"missing.*zzz\.binary"):
+            cached_basis(folder, expected={**good, "zzz.binary": "0"}, cache=tmp_path)
+        with pytest.raises(InputError, match=r"b\.binary.*genuine"):
+            cached_basis(folder, expected={**good, "b.binary": "0"}, cache=tmp_path)
+        short = tmp_path / "c.binary"
+        short.write_bytes((folder / "c.binary").read_bytes()[:-8])
+        with pytest.raises(InputError, match=r"c\.binary.*not whole"):
+            cached_basis(tmp_path, expected={"c.binary": good["c.binary"]}, cache=tmp_path)
+
+    def test_the_hundred_sums_ship(self, shared: Path) -> None:
+        listed = (shared / "data" / "brdf" / "merl_sha256.csv").read_text().split()
+        ours = checksums()
+        assert len(ours) == 100 and all(digest in " ".join(listed) for digest in ours.values())

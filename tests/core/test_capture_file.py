@@ -1,0 +1,199 @@
+"""Every mistake in a capture: one line that names the file and the key, before anything is made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from patina.core.capture import read_capture
+from patina.core.errors import InputError, PatinaError
+from patina.core.job import FitJob
+from tests import make_capture as made
+
+
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made.make_capture(tmp_path_factory.mktemp("ball"), photos=3)
+
+
+def edited(ball: Path, tmp_path: Path, change: Callable[[str], str]) -> Path:
+    """A capture beside a copy of the files, its text changed."""
+    import shutil
+
+    folder = tmp_path / "copy"
+    shutil.copytree(ball.parent, folder)
+    text = (folder / ball.name).read_text()
+    changed = change(text)
+    assert changed != text
+    (folder / ball.name).write_text(changed)
+    return folder / ball.name
+
+
+def after_light_2(added: str) -> Callable[[str], str]:
+    return lambda t: t.replace('light = "lamp2"\n', f'light = "lamp2"\n{added}\n', 1)
+
+
+def replaced(old: str, new: str) -> Callable[[str], str]:
+    return lambda t: t.replace(old, new, 1)
+
+
+def added(tail: str) -> Callable[[str], str]:
+    return lambda t: f"{t}\n{tail}\n"
+
+
+TEXT_MISTAKES = {
+    "unknown key": (added("[fit]\nsample = 3"), r"\[fit\.sample\].*unknown key"),
+    "unknown table": (added("[fitt]"), r"\[fitt\].*unknown key"),
+    "missing photo": (replaced("lit_2.exr", "gone.exr"), r"photo 2\.file.*no such file"),
+    "missing mesh": (replaced("mesh.ply", "gone.ply"), r"scan\.mesh.*no such file"),
+    "missing key": (replaced('camera = "view_02.jpg"\n', ""), r"photo 2\.camera.*missing"),
+    "unknown light": (replaced('light = "lamp2"', 'light = "sun"'), r"no \[\[light\]\]"),
+    "label": (replaced("view_02.jpg", "view_99.jpg"), r"photo 2\.camera.*view_99"),
+    "two lights of a name": (replaced('name = "lamp2"', 'name = "lamp1"'), "used twice"),
+    "short vector": (
+        replaced("irradiance = [3.0, 3.0, 3.0]", "irradiance = [3.0]"),
+        r"light 1\.irradiance.*three numbers",
+    ),
+    "text for a number": (added('[fit]\nsamples = "six"'), r"fit\.samples.*whole number"),
+    "light not read yet": (replaced("direction", "position"), "not read by this"),
+    "not TOML": (added("[[["), "not valid TOML"),
+    "unknown face attribute": (
+        added('[[material]]\nname = "a"\nfaces = "x"'),
+        r"material 1\.faces.*no integer face attribute",
+    ),
+    "mask of no material": (
+        after_light_2('masks = {gold = "lit_1.exr"}'),
+        r"photo 2\.masks\.gold.*no \[\[material\]\]",
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", TEXT_MISTAKES)
+def test_mistakes_in_the_text(ball: Path, tmp_path: Path, mistake: str) -> None:
+    change, message = TEXT_MISTAKES[mistake]
+    path = edited(ball, tmp_path, change)
+    refused(path, message)
+
+
+def refused(path: Path, message: str) -> None:
+    with pytest.raises(PatinaError, match=message) as caught:
+        FitJob(read_capture(path)).drain()
+    text = str(caught.value)
+    assert "\n" not in text and path.name in text, text
+
+
+def test_the_line_is_named(ball: Path, tmp_path: Path) -> None:
+    path = edited(ball, tmp_path, lambda t: t.replace("view_02.jpg", "view_99.jpg"))
+    line = path.read_text().splitlines().index('camera = "view_99.jpg"') + 1
+    refused(path, rf"ball\.capture\.toml:{line}: \[photo 2\.camera\]")
+
+
+def copy_with(ball: Path, tmp_path: Path) -> Path:
+    return edited(ball, tmp_path, lambda t: t + "\n")
+
+
+def test_photo_of_another_size(ball: Path, tmp_path: Path) -> None:
+    path = copy_with(ball, tmp_path)
+    made.write_exr(path.parent / "lit_2.exr", np.ones((90, 121, 3)))
+    refused(path, r"photo 2\.file.*121 × 90.*120 × 90")
+
+
+def test_pixels_that_are_no_numbers(ball: Path, tmp_path: Path) -> None:
+    path = copy_with(ball, tmp_path)
+    pixels = np.ones((90, 120, 3))
+    pixels[4, 5] = np.nan
+    made.write_exr(path.parent / "lit_2.exr", pixels)
+    refused(path, r"photo 2\.file.*1 pixels that are not numbers")
+
+
+def test_truncated_photo(ball: Path, tmp_path: Path) -> None:
+    path = copy_with(ball, tmp_path)
+    photo = path.parent / "lit_2.exr"
+    photo.write_bytes(photo.read_bytes()[:700])
+    refused(path, r"photo 2\.file")
+
+
+def test_mesh_without_faces(ball: Path, tmp_path: Path) -> None:
+    path = copy_with(ball, tmp_path)
+    made.write_ply(path.parent / "mesh.ply", np.eye(3), np.zeros((0, 3), int))
+    refused(path, r"mesh\.ply.*no faces")
+
+
+def test_mesh_in_another_frame(ball: Path, tmp_path: Path) -> None:
+    path = copy_with(ball, tmp_path)
+    vertices, faces = made.sphere_mesh(2)
+    made.write_ply(path.parent / "mesh.ply", vertices + np.array([500, 0, 0]), faces)
+    refused(path, r"scan\.mesh.*another frame")
+
+
+def test_broken_meshes(ball: Path, tmp_path: Path) -> None:
+    path = copy_with(ball, tmp_path)
+    mesh = path.parent / "mesh.ply"
+    whole = mesh.read_bytes()
+    for broken in (b"", b"ply\n", whole[:400], whole[: len(whole) // 2], b"\x00" * 64):
+        mesh.write_bytes(broken)
+        refused(path, r"mesh\.ply")
+    vertices, faces = made.sphere_mesh(2)
+    vertices[3] = np.nan
+    made.write_ply(mesh, vertices, faces)
+    refused(path, r"not finite")
+    faces[0, 0] = 99999
+    made.write_ply(mesh, np.nan_to_num(vertices), faces)
+    refused(path, r"mesh\.ply")
+
+
+def test_broken_cameras(ball: Path, tmp_path: Path) -> None:
+    path = copy_with(ball, tmp_path)
+    cameras = path.parent / "sparse" / "images.bin"
+    cameras.unlink()
+    refused(path, r"scan\.cameras.*no COLMAP model")
+
+
+def test_everything_masked(ball: Path, tmp_path: Path) -> None:
+    path = edited(
+        ball,
+        tmp_path,
+        lambda t: (
+            t.replace('light = "lamp1"\n', 'light = "lamp1"\nmasks = {gold = "none.png"}\n', 1)
+            + '\n[[material]]\nname = "gold"\n'
+        ),
+    )
+    made.write_png(path.parent / "none.png", np.zeros((90, 120)))
+    refused(path, r"material 1\.name.*all pixels are masked")
+
+
+def test_mask_of_another_size(ball: Path, tmp_path: Path) -> None:
+    path = edited(
+        ball,
+        tmp_path,
+        lambda t: (
+            t.replace('light = "lamp1"\n', 'light = "lamp1"\nmasks = {gold = "m.png"}\n', 1)
+            + '\n[[material]]\nname = "gold"\n'
+        ),
+    )
+    made.write_png(path.parent / "m.png", np.zeros((90, 121)))
+    refused(path, r"photo 1\.masks\.gold.*121 × 90")
+
+
+def test_light_from_behind_everything(ball: Path, tmp_path: Path) -> None:
+    rotation, _ = next(iter(made.poses(3)))
+    behind = rotation.T @ np.array([0.0, 0.0, 1.0])  # along the first camera's view
+    given = ", ".join(f"{x:.9g}" for x in behind)
+    path = edited(
+        ball, tmp_path,
+        lambda t: t.replace(t[t.index("direction = ["): t.index("]", t.index("direction = [")) + 1],
+                            f"direction = [{given}]", 1),
+    )  # fmt: skip
+    refused(path, r"light 1\.direction.*behind everything")
+
+
+def test_a_good_capture_is_read_whole(ball: Path) -> None:
+    capture = read_capture(ball)
+    assert [light.name for light in capture.lights] == ["lamp1", "lamp2", "lamp3"]
+    assert capture.materials[0].name == "surface"
+    assert capture.fit.paper.samples == 6 and capture.fit.paper.curvature == 0.2
+    with pytest.raises(InputError):
+        read_capture(ball.with_name("nothing.toml"))

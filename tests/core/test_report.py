@@ -1,0 +1,92 @@
+"""Pictures and numbers of the report, on a capture with a known answer."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from patina.core.brdf import TabulatedBRDF, metrics
+from patina.core.capture import read_capture
+from patina.core.job import CaptureResult, FitJob
+from patina.core.photo import read_encoded
+from patina.core.report import display, result_json, write_report
+from patina.core.report.polar import Curve, polar_chart
+from patina.core.report.sphere import lit_sphere
+from tests import make_capture as made
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory: pytest.TempPathFactory) -> FitJob:
+    path = made.make_capture(tmp_path_factory.mktemp("ball"), photos=3)
+    job = FitJob(read_capture(path))
+    job.drain()
+    return job
+
+
+@pytest.fixture(scope="module")
+def result(job: FitJob) -> CaptureResult:
+    assert job.result is not None
+    return job.result
+
+
+def test_the_page_shows_every_picture_it_names(result: CaptureResult, tmp_path: Path) -> None:
+    fractions = list(write_report(tmp_path / "report", result))
+    assert fractions == sorted(fractions) and len(fractions) == 4
+    page = (tmp_path / "report" / "index.html").read_text()
+    pictures = {p.name for p in (tmp_path / "report").glob("*.png")}
+    assert len(pictures) == 3 * 3 + 1
+    assert all(f"src='{name}'" in page for name in pictures)
+    assert "http" not in page.replace("http://www.w3.org/2000/svg", "")
+    assert read_encoded(tmp_path / "report" / "photo_00_predicted.png").mean() > 0.05
+
+
+def test_result_json_says_what_design_asks(result: CaptureResult, job: FitJob) -> None:
+    said = json.loads(json.dumps(result_json.describe(result, job.stages)))
+    material = said["materials"][0]
+    assert np.array(material["coefficients"]).shape == (3, 6)
+    assert material["samples"]["used"] == sum(material["samples"]["per_photo"].values()) > 1000
+    assert len(material["chosen"]) == 6 and set(material["held_out"]["per_photo"]) == {
+        f"lit_{i}.exr" for i in (1, 2, 3)
+    }
+    for chosen in material["chosen"]:
+        assert 0 <= chosen["pixel"][0] < made.WIDTH and 0 <= chosen["pixel"][1] < made.HEIGHT
+    assert {s["name"] for s in said["stages"]} >= {"reading the scan", "sampling the photos"}
+    assert all(s["seconds"] >= 0 for s in said["stages"])
+    assert said["basis"]["version"] == result.basis.version
+
+
+def test_difference_picture_has_the_sign_of_the_difference() -> None:
+    measured = np.ones((1, 3, 3))
+    predicted = np.array([[[0.0] * 3, [1.0] * 3, [2.0] * 3]])
+    dark, right, bright = display.difference_picture(predicted, measured, 1.0)[0].astype(int)
+    assert dark[2] > dark[0] and bright[0] > bright[2] and abs(right[0] - right[2]) < 3
+
+
+def test_white_sphere_has_the_radiance_of_lambert() -> None:
+    radiance, coverage = lit_sphere(lambda a: np.full((len(a.theta_h), 3), 1 / np.pi), 101)
+    assert radiance.max() == pytest.approx(1.0, abs=0.02)
+    assert coverage[50, 50] == 1 and coverage[0, 0] == 0
+
+
+def test_polar_chart_is_wellformed_and_scaled() -> None:
+    from xml.etree import ElementTree
+
+    chart = polar_chart([Curve("x", lambda a: np.full((len(a.theta_h), 3), 0.3))], 45)
+    tree = ElementTree.fromstring(chart)
+    lines = [e for e in tree.iter() if e.tag.endswith("polyline")]
+    assert len(lines) == 3
+    tops = [min(float(p.split(",")[1]) for p in e.get("points").split()) for e in lines]
+    assert np.allclose(tops, 172 - 150 * np.cbrt(0.3 / 0.5), atol=0.2)
+
+
+def test_metrics_of_known_differences() -> None:
+    a = TabulatedBRDF.from_function(lambda x: np.full((len(x.theta_h), 3), 0.4))
+    b = TabulatedBRDF.from_function(lambda x: np.full((len(x.theta_h), 3), 0.5))
+    found = metrics.compare(a, b)
+    assert found.relative_l2 == pytest.approx(0.2, rel=1e-5)
+    assert found.log_relative_rms == pytest.approx(abs(np.log(0.8)), rel=0.02)
+    same = metrics.compare(a, a)
+    assert same.relative_l2 == same.log_relative_rms == same.cube_root_rms == 0

@@ -1,0 +1,125 @@
+"""Geometry and samples against a sphere traced by the quadratic formula."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from patina.core.angles import half_difference
+from patina.core.capture import read_capture
+from patina.core.geometry import RayScene, edges, view_surface
+from patina.core.geometry.curvature import mean_curvature
+from patina.core.job import inputs
+from patina.core.samples import Margins, SampleTable, sample_photo
+from patina.core.samples.face_votes import FaceVotes
+from patina.core.samples.take import light_surface, trusted_pixels
+from patina.core.scan import Mesh
+from tests import make_capture as made
+
+
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made.make_capture(tmp_path_factory.mktemp("ball"))
+
+
+@pytest.fixture(scope="module")
+def tables(ball: Path) -> tuple[SampleTable, list]:
+    capture = read_capture(ball)
+    scan = inputs.open_scan(capture)
+    rays = RayScene.build(scan.mesh)
+    found, views = [], []
+    for place, photo in enumerate(capture.photos):
+        light = capture.light(photo.light)
+        view = view_surface(rays, inputs.camera_of(capture, scan, place))
+        lighting = light_surface(rays, view, light)
+        keep = trusted_pixels(view, lighting, Margins())
+        found.append(sample_photo(view, lighting, light, inputs.radiance_of(capture, place), keep))
+        views.append(view)
+    return SampleTable.join(found), views
+
+
+def test_samples_read_the_true_reflectance(tables: tuple[SampleTable, list]) -> None:
+    table, _ = tables
+    light = table.light[table.photo]
+    truth = made.blinn(table.normal, light, table.view)
+    ratio = table.rho / truth
+    assert len(table) > 5000
+    assert abs(np.median(ratio) - 1) < 1e-3
+    assert np.percentile(np.abs(ratio - 1), 95) < 0.02  # the mesh has facets, the sphere has not
+
+
+def test_points_and_normals_are_those_of_the_sphere(tables: tuple[SampleTable, list]) -> None:
+    for view in tables[1]:
+        radius = np.linalg.norm(view.point - made.CENTRE, axis=1)
+        assert np.abs(radius - 1).max() < 2e-3
+        exact = (view.point - made.CENTRE) / radius[:, None]
+        away = np.degrees(np.arccos(np.clip(np.sum(exact * view.normal, axis=1), -1, 1)))
+        assert np.percentile(away, 99) < 0.2
+
+
+def test_angles_in_the_table_belong_to_its_vectors(tables: tuple[SampleTable, list]) -> None:
+    table, _ = tables
+    again = half_difference(
+        table.normal.astype(float), table.light[table.photo], table.view.astype(float)
+    )
+    assert np.allclose(again.theta_h, table.theta_h, atol=1e-5)
+    assert np.allclose(again.theta_d, table.theta_d, atol=1e-5)
+
+
+def test_curvature_of_a_sphere_is_its_radius_in_pixels(tables: tuple[SampleTable, list]) -> None:
+    """Where the sphere faces the camera, 1/curvature is its radius in pixels."""
+    view = tables[1][0]
+    facing = np.einsum("ij,ij->i", view.normal, view.view) > 0.995
+    pixels = made.FOCAL / (made.DISTANCE - 1.0)  # of one unit at the nearest point
+    assert np.median(np.abs(view.curvature[facing])) == pytest.approx(1 / pixels, rel=0.06)
+
+
+def test_curvature_of_a_plane_is_zero_and_of_a_wave_known() -> None:
+    x = np.arange(60)[None, :] * np.ones((40, 1))
+    slope = 0.3 * np.cos(x / 5)  # depth 1.5 sin(x/5)
+    normal = np.dstack([-slope, np.zeros_like(slope), np.ones_like(slope)])
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+    found = mean_curvature(normal)
+    expected = -0.5 * 0.06 * np.sin(x / 5)
+    assert np.isnan(found[0]).all()
+    assert np.abs(found - expected)[1:-1, 1:-1].max() < 0.001
+    assert np.nanmax(np.abs(mean_curvature(np.full((9, 9, 3), 1 / np.sqrt(3))))) < 1e-6
+
+
+def test_a_ball_shades_the_floor_where_geometry_says() -> None:
+    """A sphere over a plane, light from 45°: the shadow's centre is one height away."""
+    vertices, faces = made.sphere_mesh(4)
+    vertices = 0.3 * (vertices - made.CENTRE) + [0, 0, 1.0]
+    floor = np.array([[-3, -3, 0], [3, -3, 0], [3, 3, 0], [-3, 3, 0]], float)
+    mesh = Mesh(
+        np.concatenate([vertices, floor]),
+        np.concatenate([faces, np.array([[0, 1, 2], [0, 2, 3]]) + len(vertices)]).astype(np.int32),
+    )
+    rays = RayScene.build(mesh)
+    x = np.linspace(-2, 2, 401)
+    points = np.stack([x, np.zeros_like(x), np.full_like(x, 1e-4)], axis=1)
+    dark = rays.occluded(points, np.array([np.sqrt(0.5), 0, np.sqrt(0.5)]))
+    half = 0.3 * np.sqrt(2)
+    assert x[dark].min() == pytest.approx(-1 - half, abs=0.02)
+    assert x[dark].max() == pytest.approx(-1 + half, abs=0.02)
+
+
+def test_silhouettes_are_jumps_not_slopes() -> None:
+    depth = np.full((20, 30), np.nan)
+    depth[4:16, 4:26] = 3.0 + 0.02 * np.arange(22)  # steep, but one surface
+    depth[4:16, 15:26] += 1.0
+    found = edges.silhouette(depth, np.full(depth.shape, 0.01))
+    assert found[10, 14] and found[10, 15] and found[4, 10] and found[3, 10]
+    assert not found[10, 8] and not found[10, 20]
+    assert edges.widen(found, 2)[10, 12] and not edges.widen(found, 2)[10, 10]
+
+
+def test_faces_take_the_material_most_pixels_saw() -> None:
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [5, 0, 0], [5, 1, 0]], float)
+    mesh = Mesh(vertices, np.array([[0, 1, 2], [0, 2, 3], [1, 4, 5]], np.int32))
+    votes = FaceVotes.empty(3, 2)
+    votes.add(0, np.array([0, 0, 0, 1]))
+    votes.add(1, np.array([0, 1, 1]))
+    assert votes.winners(mesh).tolist() == [0, 1, 0]  # the last saw none: its neighbour's

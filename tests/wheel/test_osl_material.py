@@ -1,0 +1,220 @@
+"""The OSL material in Cycles, against the numpy BRDF it was made from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy")
+pytestmark = [pytest.mark.blender, pytest.mark.slow]
+
+import bpy  # noqa: E402
+
+from patina.core.angles import Angles, half_difference, merl_grid  # noqa: E402
+from patina.core.appearance.principled import Principled  # noqa: E402
+from patina.core.appearance.principled_fit import fit_principled  # noqa: E402
+from patina.core.basis import Basis, PrincipalBRDF  # noqa: E402
+from patina.core.brdf import nbrdf  # noqa: E402
+from patina.scene import lamps, materials, osl_files  # noqa: E402
+from tests.wheel import cycles_sphere  # noqa: E402
+
+VIEW = np.array([0.0, 0.0, 1.0])
+LIGHT = np.array([0.6, 0.2, 0.77]) / np.linalg.norm([0.6, 0.2, 0.77])
+MATERIALS = [("analytic", 5), ("dark-red-paint", 5), ("alum-bronze", 10), ("pink-fabric", 20)]
+
+if materials.osl_missing():
+    pytest.skip(f"{materials.osl_missing()}", allow_module_level=True)
+
+
+def _brdf(name: str, count: int, shared: Path | None) -> PrincipalBRDF:
+    """A material projected onto the basis; 'analytic' is a rough glossy Principled."""
+    if name == "analytic":
+        evaluate = Principled(base_color=np.array([0.4, 0.1, 0.05]), roughness=0.35).evaluate
+    else:
+        names, weights = nbrdf.load(shared / "data" / "brdf" / "nbrdf_merl.npz")
+
+        def evaluate(angles: Angles) -> np.ndarray:
+            return nbrdf.evaluate(weights[names.index(name)], angles)
+
+    centres = merl_grid.node_angles(0.5)
+    seen = np.flatnonzero(merl_grid.visible(centres))
+    chosen = np.random.default_rng(0).choice(seen, 20000, replace=False)
+    angles = Angles(*(a.ravel()[chosen] for a in centres))
+    basis = Basis.default()
+    return PrincipalBRDF(basis, basis.project(evaluate(angles), angles, count, eta=1.0))
+
+
+@pytest.fixture(params=MATERIALS, ids=lambda m: f"{m[0]}-{m[1]}")
+def brdf(request) -> PrincipalBRDF:
+    name, count = request.param
+    return _brdf(name, count, None if name == "analytic" else request.getfixturevalue("shared"))
+
+
+def _material(brdf: PrincipalBRDF, sphere: bpy.types.Object) -> bpy.types.Material:
+    fit = fit_principled(brdf.evaluate)
+    exr = osl_files.ensure_components(brdf.basis)
+    material = materials.create_material("measured", brdf, fit, exr)
+    assert materials.REASON_PROPERTY not in material
+    sphere.data.materials.clear()
+    sphere.data.materials.append(material)
+    return material
+
+
+def _expected(brdf: PrincipalBRDF, light: np.ndarray) -> np.ndarray:
+    """Radiance per irradiance, (h, w, 3), for directions to the light (…, 3)."""
+    normal, _ = cycles_sphere.normals()
+    light, view = np.broadcast_to(light, normal.shape), np.broadcast_to(VIEW, normal.shape)
+    cos_i = np.einsum("...i,...i->...", normal, light)
+    return brdf.evaluate(half_difference(normal, light, view)) * np.maximum(cos_i, 0)[..., None]
+
+
+def _relative_rms(image: np.ndarray, expected: np.ndarray) -> float:
+    return float(np.sqrt(np.sum((image - expected) ** 2) / np.sum(expected**2)))
+
+
+def test_under_the_sun(brdf, tmp_path):
+    sphere = cycles_sphere.new_scene(size=80, osl=True)
+    cycles_sphere.sun(LIGHT, 2.0)
+    _material(brdf, sphere)
+    image = cycles_sphere.render(tmp_path)
+    normal, inside = cycles_sphere.normals()
+    kept = inside & (normal @ LIGHT > 0.1) & (normal @ VIEW > 0.1)
+    assert _relative_rms(image[kept], 2.0 * _expected(brdf, LIGHT)[kept]) < 0.003
+
+
+def test_under_a_uniform_sky(brdf, tmp_path):
+    sphere = cycles_sphere.new_scene(size=64, samples=64, osl=True)
+    bpy.context.scene.cycles.filter_width = 1.0
+    cycles_sphere.sky(1.0)
+    _material(brdf, sphere)
+    image = cycles_sphere.render(tmp_path)
+    normal, inside = cycles_sphere.normals()
+    # nearer the rim, the cosine changes too much inside a pixel
+    kept = inside & (normal @ VIEW > 0.4)
+    cosines = np.linspace(0.4, 1, 13)
+    table = np.array([_albedo(brdf, mu) for mu in cosines])
+    expected = np.stack([np.interp(normal[kept][:, 2], cosines, t) for t in table.T], axis=-1)
+    np.testing.assert_allclose(image[kept].mean(axis=0), expected.mean(axis=0), rtol=0.005)
+
+
+def _albedo(brdf: PrincipalBRDF, mu: float) -> np.ndarray:
+    """∫ρ cosθi dωi (3,) seen from cosine mu, by quadrature over half vectors, fine near n."""
+    view = np.array([np.sqrt(1 - mu * mu), 0.0, mu])
+    knee, n_t, n_p = 0.01, 160, 60
+    span = np.log1p(np.pi / 2 / knee)
+    theta = knee * np.expm1((np.arange(n_t) + 0.5) / n_t * span)
+    step = (theta + knee) * span / n_t * 2 * np.pi / n_p
+    t, p = np.meshgrid(theta, (np.arange(n_p) + 0.5) / n_p * 2 * np.pi, indexing="ij")
+    half = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1)
+    cos_d = half @ view
+    light = 2 * cos_d[..., None] * half - view
+    weight = np.sin(t) * step[:, None] * 4 * cos_d * light[..., 2]
+    kept = (light[..., 2] > 0) & (cos_d > 0)
+    wide = np.broadcast_to(view, light[kept].shape)
+    normal = np.broadcast_to(VIEW, wide.shape)
+    return np.sum(brdf.evaluate(half_difference(normal, light[kept], wide)) * weight[kept][:, None],
+                  axis=0)  # fmt: skip
+
+
+LAMPS = {
+    "point": ("POINT", {"shadow_soft_size": 0.0}),
+    "spot": ("SPOT", {"shadow_soft_size": 0.0, "spot_size": 0.6, "spot_blend": 0.4}),
+    "small area": ("AREA", {"size": 0.01}),
+}
+
+
+@pytest.mark.parametrize("kind", LAMPS)
+def test_other_lamps_bring_what_they_bring_to_a_diffuse_surface(kind, tmp_path):
+    """Cycles' own diffuse BSDF tells the irradiance; no unit of ours is trusted."""
+    lamp_type, settings = LAMPS[kind]
+    sphere = cycles_sphere.new_scene(size=48, osl=True)
+    lamp = bpy.data.lights.new(kind, lamp_type)
+    lamp.energy = 100.0
+    for name, value in settings.items():
+        setattr(lamp, name, value)
+    lamp_object = cycles_sphere.sun(np.array([2.0, 1.0, 3.0]))
+    lamp_object.data, lamp_object.location = lamp, (2.0, 1.0, 3.0)
+    lamp_object.visible_camera = False
+    brdf = _brdf("analytic", 5, None)
+    _material(brdf, sphere)
+    image = cycles_sphere.render(tmp_path)
+    white = bpy.data.materials.new("white")
+    white.use_nodes = True
+    tree = white.node_tree
+    tree.nodes.clear()
+    diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    diffuse.inputs["Color"].default_value = (1, 1, 1, 1)
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(diffuse.outputs[0], output.inputs[0])
+    sphere.data.materials[0] = white
+    lambert = cycles_sphere.render(tmp_path) * np.pi  # E cosθ
+    normal, inside = cycles_sphere.normals()
+    light = np.array([2.0, 1.0, 3.0]) - normal
+    light /= np.linalg.norm(light, axis=-1, keepdims=True)
+    cos_i = np.einsum("...i,...i->...", normal, light)
+    expected = _expected(brdf, light) * lambert / np.maximum(cos_i, 1e-3)[..., None]
+    kept = inside & (cos_i > 0.2) & (normal @ VIEW > 0.2)
+    assert expected[kept].max() > 0
+    assert _relative_rms(image[kept], expected[kept]) < 0.01
+
+
+def test_two_outputs_and_the_inputs_an_artist_sees():
+    sphere = cycles_sphere.new_scene(osl=True)
+    material = _material(_brdf("analytic", 5, None), sphere)
+    outputs = {n.target: n for n in material.node_tree.nodes if n.type == "OUTPUT_MATERIAL"}
+    assert set(outputs) == {"ALL", "CYCLES"}
+    assert outputs["ALL"].is_active_output and not outputs["CYCLES"].is_active_output
+    source = {k: n.inputs["Surface"].links[0].from_node.type for k, n in outputs.items()}
+    assert source == {"ALL": "BSDF_PRINCIPLED", "CYCLES": "SCRIPT"}
+    (node,) = osl_files.script_nodes(material)
+    shown = [s.name for s in node.inputs if not s.hide]
+    assert [s for s in shown if s.startswith("Coefficient")] == [
+        f"Coefficient {i}" for i in range(1, 6)
+    ]
+    assert not [s for s in shown if s.startswith("Lamp")]
+
+
+def test_the_components_come_back_when_the_blend_moves(tmp_path):
+    sphere = cycles_sphere.new_scene(osl=True)
+    basis = Basis.default()
+    first, second = tmp_path / "first", tmp_path / "second"
+    first.mkdir()
+    second.mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(first / "a.blend"))
+    _material(_brdf("analytic", 5, None), sphere)
+    exr = osl_files.ensure_components(basis)
+    assert exr.parent == first
+    bpy.ops.wm.save_mainfile()
+    (first / "a.blend").rename(second / "a.blend")
+    original = exr.read_bytes()
+    exr.unlink()
+    bpy.ops.wm.open_mainfile(filepath=str(second / "a.blend"))
+    assert osl_files.restore() == []
+    (node,) = osl_files.script_nodes(bpy.data.materials["measured"])
+    path = Path(node.inputs["components"].default_value)
+    assert path.parent == second and path.read_bytes() == original
+
+
+def test_handlers_come_and_go():
+    groups = ("load_post", "save_post", "depsgraph_update_post", "render_pre")
+    before = {g: list(getattr(bpy.app.handlers, g)) for g in groups}
+    for module in (osl_files, lamps):
+        module.register()
+    added = {g: len(getattr(bpy.app.handlers, g)) - len(before[g]) for g in groups}
+    assert added == dict.fromkeys(groups, 1)
+    for module in (osl_files, lamps):
+        module.unregister()
+    assert {g: list(getattr(bpy.app.handlers, g)) for g in groups} == before
+
+
+def test_without_osl_the_portable_material_is_made_and_says_so(monkeypatch):
+    sphere = cycles_sphere.new_scene(osl=True)
+    monkeypatch.setattr(materials, "osl_missing", lambda: "no OSL here")
+    brdf = _brdf("analytic", 5, None)
+    exr = osl_files.ensure_components(brdf.basis)
+    material = materials.create_material("plain", brdf, fit_principled(brdf.evaluate), exr)
+    sphere.data.materials.append(material)
+    assert material[materials.REASON_PROPERTY] == "no OSL here"
+    assert [n.target for n in material.node_tree.nodes if n.type == "OUTPUT_MATERIAL"] == ["ALL"]

@@ -1,0 +1,67 @@
+"""The embedded basis: variance explained, cost of its coarse grid, unseen materials."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+
+
+def run(data: Path) -> None:
+    """Print the tables of docs/measurements.md, section "The basis"."""
+    from patina.core.angles import Angles, cosines, merl_grid
+    from patina.core.basis import Basis, PrincipalBRDF
+    from patina.core.basis.build_default import NeuralObservations
+    from patina.core.basis.training import exact_rows, principal
+    from patina.core.brdf import TabulatedBRDF, metrics, nbrdf
+
+    print("## basis\n")
+    basis = Basis.default()
+    observations = NeuralObservations(nbrdf.load(data / "brdf" / "nbrdf_merl.npz")[1])
+    since = time.perf_counter()
+    directions, explained = principal(observations, basis.count)
+    print(f"principal components of 300 columns: {time.perf_counter() - since:.1f} s")
+    total = explained.cumsum()
+    shares = ", ".join(f"{k}: {100 * total[k - 1]:.1f} %" for k in (1, 2, 3, 5, 10, 20, 40))
+    print(f"variance explained by components {shares}")
+
+    centres = merl_grid.node_angles(0.5)
+    cos_i, cos_o = cosines(*centres)
+    rng = np.random.default_rng(1)
+    for limit in (80, 90):
+        seen = np.flatnonzero((np.minimum(cos_i, cos_o) > np.cos(np.radians(limit))).ravel())
+        pick = rng.choice(seen, 60_000, replace=False)
+        angles = Angles(*(a.ravel()[pick] for a in centres))
+        exact = exact_rows(observations, directions, angles)
+        centre, rows = basis.rows(angles)
+        difference = (centre[:, None] + rows @ directions.T.astype(np.float32)) - (
+            (exact[0] + exact[1])[:, None] + exact[2:].T @ directions.T.astype(np.float32)
+        )
+        per_column = np.sqrt(np.mean(difference**2, axis=0))
+        print(
+            f"interpolating the embedded grid {basis.grid.shape}, to {limit} degrees: log-relative "
+            f"RMS {np.sqrt(np.mean(difference**2)):.4f} (median material "
+            f"{np.median(per_column):.4f}, worst {per_column.max():.4f})"
+        )
+
+    print("\nvalidation materials (not in MERL) projected onto k components, to 80 degrees\n")
+    print("| material | log RMS k=5 | k=20 | k=40 | cube-root RMS k=5 | k=20 | k=40 |")
+    print("|---|---|---|---|---|---|---|")
+    names, weights = nbrdf.load(data / "brdf" / "nbrdf_validation.npz")
+    rows_out = []
+    for name, w in zip(names, weights, strict=True):
+        truth = TabulatedBRDF.from_function(lambda angles, w=w: nbrdf.evaluate(w, angles))
+        valid = truth.valid
+        near = valid & (np.minimum(cos_i, cos_o) > np.cos(np.radians(80)))
+        angles = Angles(*(a[near] for a in centres))
+        rho = np.moveaxis(truth.values, 0, -1)[near]
+        found = []
+        for k in (5, 20, 40):
+            fit = PrincipalBRDF(basis, basis.project(rho, angles, k))
+            found.append(metrics.compare(fit.table(), truth))
+        figures = [f.log_relative_rms for f in found] + [f.cube_root_rms for f in found]
+        rows_out.append(figures)
+        print(f"| {name} | " + " | ".join(f"{x:.3f}" for x in figures) + " |", flush=True)
+    median = np.median(rows_out, axis=0)
+    print("| **median** | " + " | ".join(f"{x:.3f}" for x in median) + " |\n")

@@ -1,0 +1,55 @@
+"""What the sampler reads against the truth, with scanned and with exact normals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+
+def run(data: Path) -> None:
+    """Print the table of docs/measurements.md, section "Samples"."""
+    from patina.commands.compare import truth_weights
+    from patina.core.brdf import nbrdf
+    from patina.core.capture import read_capture
+    from patina.core.geometry import RayScene, view_surface
+    from patina.core.job.inputs import camera_of, open_scan, radiance_of
+    from patina.core.samples import Margins, SampleTable, sample_photo
+    from patina.core.samples.take import light_surface, trusted_pixels
+    from patina.core.scan.mesh import read_mesh
+
+    print("## sampling\n")
+    print("ln(measured / true reflectance), mean of the channels: median and robust scatter\n")
+    print("| capture | mesh | samples | all angles | theta_h < 3 degrees (samples) |")
+    print("|---|---|---|---|---|")
+    scans = data / "scans"
+    exact = read_mesh(scans / "bunny_truth.ply")
+    for name in ("bunny_bronze", "bunny_red", "bunny_fabric"):
+        capture = read_capture(scans / name / "scan.capture.toml")
+        weights = truth_weights(scans / name / "truth.json")
+        scan = open_scan(capture)
+        for label, mesh in (("scanned", scan.mesh), ("exact", exact)):
+            rays = RayScene.build(mesh)
+            tables = []
+            for place, photo in enumerate(capture.photos):
+                light = capture.light(photo.light)
+                view = view_surface(rays, camera_of(capture, scan, place))
+                lighting = light_surface(rays, view, light)
+                keep = trusted_pixels(view, lighting, Margins())
+                radiance = radiance_of(capture, place)
+                tables.append(sample_photo(view, lighting, light, radiance, keep))
+            table = SampleTable.join(tables)
+            truth = nbrdf.evaluate(weights, table.angles).mean(axis=1)
+            ratio = np.log(np.maximum(table.rho.mean(axis=1), 1e-6) / truth)
+            peak = ratio[table.theta_h < np.radians(3)]
+            print(
+                f"| {name} | {label} | {len(table):,} | {_robust(ratio)} | "
+                f"{_robust(peak)} ({len(peak):,}) |",
+                flush=True,
+            )
+    print()
+
+
+def _robust(x: np.ndarray) -> str:
+    median = np.median(x)
+    return f"{median:+.4f} ± {1.4826 * np.median(np.abs(x - median)):.4f}"
