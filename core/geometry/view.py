@@ -53,7 +53,7 @@ def view_surface(rays: RayScene, camera: Camera) -> SurfaceView:
     centre = camera.pose.centre
     hits = rays.first_hits(centre, directions)
     pixel = np.flatnonzero(hits.face >= 0).astype(np.int32)
-    found = Hits(*(a[pixel] for a in hits))
+    found = Hits(hits.face[pixel], hits.u[pixel], hits.v[pixel])
     point, normal = rays.points(found), rays.normals(found)
     view = -directions[pixel]
 

@@ -138,5 +138,5 @@ def _relative_error(predicted: np.ndarray, measured: np.ndarray) -> float:
     """‖L̂ − L‖ / ‖L‖ over all pixels with a prediction, edges and shadows included."""
     known = np.isfinite(predicted[..., 0])
     difference = (predicted - measured)[known].astype(np.float64)
-    size = measured[known].astype(np.float64)
-    return float(np.linalg.norm(difference) / max(np.linalg.norm(size), 1e-300))
+    size = float(np.linalg.norm(measured[known].astype(np.float64)))
+    return float(np.linalg.norm(difference)) / max(size, 1e-300)

@@ -31,17 +31,21 @@ class Mesh:
         corners = self.vertices[self.faces]
         face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         face_normals /= np.maximum(np.linalg.norm(face_normals, axis=1, keepdims=True), 1e-300)
-        normals = np.zeros_like(self.vertices)
+        # vertices are split where a texture has seams; the surface is smooth across them
+        welded = _welded(self.vertices)
+        joints = welded[self.faces]
+        normals = np.zeros((int(welded.max()) + 1, 3))
         for k in range(3):
             a = corners[:, (k + 1) % 3] - corners[:, k]
             b = corners[:, (k + 2) % 3] - corners[:, k]
             angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
             for axis in range(3):
                 normals[:, axis] += np.bincount(
-                    self.faces[:, k], angle * face_normals[:, axis], len(self.vertices)
+                    joints[:, k], angle * face_normals[:, axis], len(normals)
                 )
         length = np.linalg.norm(normals, axis=1, keepdims=True)
-        return np.where(length > 1e-12, normals / np.maximum(length, 1e-12), [0.0, 0.0, 1.0])
+        normals = np.where(length > 1e-12, normals / np.maximum(length, 1e-12), [0.0, 0.0, 1.0])
+        return normals[welded]
 
     @cached_property
     def size(self) -> float:
@@ -65,19 +69,26 @@ def read_mesh(path: Path) -> Mesh:
         raise InputError(f"cannot be read ({error.strerror})", file=path) from error
     except Exception as error:  # trimesh raises whatever the parser met
         raise InputError(f"not a readable {kind.upper()} mesh ({error})", file=path) from error
-    if isinstance(loaded, trimesh.Scene):
-        parts = [g for g in loaded.geometry.values() if isinstance(g, trimesh.Trimesh)]
-        loaded = trimesh.util.concatenate(parts) if parts else None
-    faces = getattr(loaded, "faces", None)
-    if faces is None or len(faces) == 0:
+    parts = list(loaded.geometry.values()) if isinstance(loaded, trimesh.Scene) else [loaded]
+    surfaces = [part for part in parts if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+    if not surfaces:
         raise InputError("the mesh has no faces (a point cloud?): export the surface", file=path)
-    vertices = np.asarray(loaded.vertices, np.float64)
-    faces = np.asarray(faces, np.int32)
+    joined: trimesh.Trimesh
+    joined = surfaces[0] if len(surfaces) == 1 else trimesh.util.concatenate(surfaces)  # type: ignore[assignment]
+    vertices = np.asarray(joined.vertices, np.float64)
+    faces = np.asarray(joined.faces, np.int32)
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise InputError("faces refer to vertices that are not there", file=path)
     if not np.isfinite(vertices).all():
         raise InputError("vertices are not finite numbers (NaN)", file=path)
-    return Mesh(vertices, faces, _integer_properties(loaded, len(faces)))
+    return Mesh(vertices, faces, _integer_properties(joined, len(faces)))
+
+
+def _welded(vertices: NDArray[np.float64]) -> NDArray[np.intp]:
+    """(v,) a number for every distinct position."""
+    rows = np.ascontiguousarray(vertices + 0.0)  # −0 and 0 are one place
+    as_bytes = rows.view(np.dtype((np.void, rows.dtype.itemsize * 3))).ravel()
+    return np.unique(as_bytes, return_inverse=True)[1].ravel()
 
 
 def _integer_properties(loaded: trimesh.Trimesh, count: int) -> dict[str, NDArray[np.int32]]:

@@ -1,0 +1,92 @@
+"""Meshes: formats, seams, polygons, attributes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from patina.core.capture import read_capture
+from patina.core.job import FitJob
+from patina.core.scan.mesh import read_mesh
+from tests import make_capture as made
+
+
+def write_obj_with_seams(path: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
+    """Every face with texture coordinates of its own, as an unwrapped scan has at its seams."""
+    lines = ["# a comment", "o ball", *(f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices)]
+    lines += [f"vt {i % 7 / 7:.4f} {i % 5 / 5:.4f}" for i in range(3 * len(faces))]
+    for i, (a, b, c) in enumerate(faces):
+        t = 3 * i
+        lines.append(f"f {a + 1}/{t + 1} {b + 1}/{t + 2} {c + 1}/{t + 3}")
+    path.write_text("\n".join(lines) + "\n")
+
+
+def test_normals_are_smooth_across_texture_seams(tmp_path: Path) -> None:
+    vertices, faces = made.sphere_mesh(4)
+    path = tmp_path / "seams.obj"
+    write_obj_with_seams(path, vertices, faces)
+    mesh = read_mesh(path)
+    assert len(mesh.faces) == len(faces)
+    outward = (mesh.vertices - made.CENTRE) / np.linalg.norm(
+        mesh.vertices - made.CENTRE, axis=1, keepdims=True
+    )
+    off = np.degrees(np.arccos(np.clip(np.sum(outward * mesh.vertex_normals, axis=1), -1, 1)))
+    assert off.max() < 0.2  # 2° and more where seams cut the normals
+
+
+def test_the_same_surface_from_every_format(tmp_path: Path) -> None:
+    vertices, faces = made.sphere_mesh(2)
+    made.write_ply(tmp_path / "a.ply", vertices, faces)
+    write_obj_with_seams(tmp_path / "b.obj", vertices, faces)
+    a, b = read_mesh(tmp_path / "a.ply"), read_mesh(tmp_path / "b.obj")
+    assert np.allclose(a.vertices[a.faces], b.vertices[b.faces], atol=1e-7)
+
+
+def test_polygons_are_cut_into_triangles(tmp_path: Path) -> None:
+    path = tmp_path / "quad.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n")
+    mesh = read_mesh(path)
+    corners = mesh.vertices[mesh.faces]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] / 2
+    assert len(mesh.faces) == 2 and area.sum() == pytest.approx(1.0)
+
+
+def test_coordinates_keep_their_precision(tmp_path: Path) -> None:
+    vertices, faces = made.sphere_mesh(1)
+    far = np.array([500_000.0, 4_000_000.0, 0.0])
+    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in vertices + far]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
+    path = tmp_path / "far.obj"
+    path.write_text("\n".join(lines))
+    assert np.abs(read_mesh(path).vertices - far - vertices).max() < 1e-5
+
+
+def test_materials_by_face_attribute(tmp_path: Path) -> None:
+    """Two halves of the ball of two colours; the mesh says which face is which."""
+    vertices, faces = made.sphere_mesh(5)
+    path = made.make_capture(
+        tmp_path / "ball",
+        photos=4,
+        brdf=two_halves,
+        extra='[[material]]\nname = "lower"\nfaces = "part"\n'
+        '[[material]]\nname = "upper"\nfaces = "part"\n[fit]\nheld_out = false',
+    )
+    upper = vertices[faces].mean(axis=1)[:, 2] > made.CENTRE[2]
+    made.write_ply(path.parent / "mesh.ply", vertices, faces, upper.astype(int))
+    job = FitJob(read_capture(path))
+    job.drain()
+    assert job.result is not None
+    lower, higher = job.result.materials
+    assert (job.result.face_material == upper).all()
+    assert lower.samples > 1000 and higher.samples > 1000
+    for material, brightest in ((lower, 0), (higher, 2)):
+        body = material.fit.chosen.rho[np.argmax(material.fit.chosen.theta_h)]
+        assert int(np.argmax(body)) == brightest
+
+
+def two_halves(normal: np.ndarray, light: np.ndarray, view: np.ndarray) -> np.ndarray:
+    """On a sphere the normal says where a point lies: blue above, red below."""
+    blue = made.blinn(normal, light, view)[:, ::-1]
+    return np.where(normal[:, 2:] > 0, blue, made.blinn(normal, light, view))
