@@ -69,9 +69,7 @@ class PATINA_PT_fit(_Stage, bpy.types.Panel):
             box.label(text=material["name"], icon="MATERIAL")
             held = material.get("held_out")
             if held:
-                box.label(
-                    text=f"Typical pixel of an unseen photo: {100 * held['typical']:.0f} % off"
-                )
+                box.label(text=f"Predicts unseen photos to {100 * held['typical']:.0f} %")
             box.label(text=f"{material['samples']['used']:,} samples")
             for warning in material["warnings"]:
                 column = box.column(align=True)

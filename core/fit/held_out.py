@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..basis import Basis
 from ..errors import FitError
 from ..predict import predict_radiance
 from ..samples import SampleTable
 from .paper import PaperSettings, fit_paper
+
+DARK = 0.05  # of the median radiance: below it relative errors are those of the noise
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """One photo predicted from the others. missed, size: sums of squares of L̂ − L and of L;
+    relative: (m,) |L̂ − L| / L of its pixels that are not dark, channel means."""
+
+    photo: int
+    missed: float
+    size: float
+    relative: NDArray[np.floating]
 
 
 @dataclass(frozen=True)
@@ -25,39 +39,43 @@ class HeldOut:
     per_photo: dict[int, float]
 
 
-def held_out_error(
-    table: SampleTable,
-    basis: Basis,
-    settings: PaperSettings,
-    progress: Callable[[float], None] = lambda fraction: None,
-) -> HeldOut | None:
-    """None where fewer than two photos see the material."""
-    photos = np.unique(table.photo)
-    if len(photos) < 2:
+def photos_to_hold_out(table: SampleTable) -> list[int]:
+    """The photos that see the material; none where there are fewer than two."""
+    photos = np.unique(table.photo).tolist()
+    return photos if len(photos) > 1 else []
+
+
+def leave_out(
+    table: SampleTable, photo: int, basis: Basis, settings: PaperSettings
+) -> LeftOut | None:
+    """Fit without a photo and predict it; None where the rest is too little to fit."""
+    out = table.photo == photo
+    try:
+        fit = fit_paper(table.select(~out), basis, replace(settings, seed=settings.seed + 1))
+    except FitError:
         return None
-    per_photo: dict[int, float] = {}
-    wrong = total = 0.0
-    relative = []
-    for done, photo in enumerate(photos):
-        progress(done / len(photos))
-        out = table.photo == photo
-        try:
-            fit = fit_paper(table.select(~out), basis, replace(settings, seed=settings.seed + 1))
-        except FitError:
-            continue  # this photo carries nearly all samples: the rest cannot speak for it
-        held = table.select(out)
-        difference = predict_radiance(basis, fit.brdf.coefficients, held) - held.radiance
-        level = held.radiance.mean(axis=1)
-        bright = level > 0.05 * np.median(level)  # relative errors of the noise say nothing
-        relative.append(np.abs(difference.mean(axis=1))[bright] / level[bright])
-        missed = float(np.sum(np.square(difference, dtype=np.float64)))
-        size = float(np.sum(np.square(held.radiance, dtype=np.float64)))
-        per_photo[int(photo)] = float(np.sqrt(missed / max(size, 1e-300)))
-        wrong, total = wrong + missed, total + size
-    if not per_photo:
+    held = table.select(out)
+    difference = predict_radiance(basis, fit.brdf.coefficients, held) - held.radiance
+    level = held.radiance.mean(axis=1)
+    bright = level > DARK * np.median(level)
+    return LeftOut(
+        photo=photo,
+        missed=float(np.sum(np.square(difference, dtype=np.float64))),
+        size=float(np.sum(np.square(held.radiance, dtype=np.float64))),
+        relative=np.abs(difference.mean(axis=1))[bright] / level[bright],
+    )
+
+
+def summarise(parts: Sequence[LeftOut]) -> HeldOut | None:
+    """All held-out photos together; None where there are none."""
+    if not parts:
         return None
     return HeldOut(
-        error=float(np.sqrt(wrong / max(total, 1e-300))),
-        typical=float(np.median(np.concatenate(relative))),
-        per_photo=per_photo,
+        error=_ratio(sum(p.missed for p in parts), sum(p.size for p in parts)),
+        typical=float(np.median(np.concatenate([p.relative for p in parts]))),
+        per_photo={p.photo: _ratio(p.missed, p.size) for p in parts},
     )
+
+
+def _ratio(missed: float, size: float) -> float:
+    return float(np.sqrt(missed / max(size, 1e-300)))

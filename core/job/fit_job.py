@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..appearance.principled_fit import PrincipledFit, fit_principled
 from ..basis import Basis
 from ..capture import Capture
 from ..errors import FitError
 from ..fit import PaperFit, fit_paper
-from ..fit.held_out import HeldOut, held_out_error
+from ..fit.held_out import HeldOut, leave_out, photos_to_hold_out, summarise
 from ..fit.spread import Spread, candidate_spread
 from ..geometry import RayScene, view_surface
 from ..samples import SampleTable, sample_photo
@@ -47,8 +48,17 @@ class CaptureResult:
     rays: RayScene
     basis: Basis
     materials: tuple[MaterialResult, ...]
-    face_material: np.ndarray
+    face_material: NDArray[np.int32]
     warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Taken:
+    """Samples of every material, photo by photo; surface pixels its masks mark; faces' votes."""
+
+    tables: dict[str, list[SampleTable]]
+    marked: dict[str, int]
+    votes: FaceVotes
 
 
 class FitJob(Job):
@@ -61,6 +71,7 @@ class FitJob(Job):
         self.result: CaptureResult | None = None
 
     def run(self) -> Iterator[Step]:
+        """Scan, photos, then one material after the other."""
         capture = self.capture
         yield Step("reading the scan", 0.0)
         basis = self.basis or Basis.default()
@@ -69,11 +80,29 @@ class FitJob(Job):
         inputs.check_photos(capture, scan)
         yield Step("reading the scan", 0.03)
         rays = RayScene.build(scan.mesh)
+        taken = yield from self._take_samples(scan, rays)
+        results = []
+        for index in range(len(capture.materials)):
+            results.append((yield from self._fit_material(index, taken, basis)))
+        yield Step("materials on the mesh", 0.97)
+        self.result = CaptureResult(
+            capture=capture,
+            scan=scan,
+            rays=rays,
+            basis=basis,
+            materials=tuple(results),
+            face_material=self._face_material(scan, taken.votes),
+            warnings=(),
+        )
 
-        tables: dict[str, list[SampleTable]] = {m.name: [] for m in capture.materials}
-        votes = FaceVotes.empty(len(scan.mesh.faces), len(capture.materials))
-        lit_by: dict[str, int] = {light.name: 0 for light in capture.lights}
-        marked = {m.name: 0 for m in capture.materials}
+    def _take_samples(self, scan: Scan, rays: RayScene) -> Generator[Step, None, _Taken]:
+        capture = self.capture
+        taken = _Taken(
+            tables={m.name: [] for m in capture.materials},
+            marked={m.name: 0 for m in capture.materials},
+            votes=FaceVotes.empty(len(scan.mesh.faces), len(capture.materials)),
+        )
+        lit_by = {light.name: 0 for light in capture.lights}
         for place, photo in enumerate(capture.photos):
             yield Step("sampling the photos", 0.05 + 0.35 * place / len(capture.photos))
             view = view_surface(rays, inputs.camera_of(capture, scan, place))
@@ -85,56 +114,57 @@ class FitJob(Job):
             radiance = inputs.radiance_of(capture, place)
             for index, material in enumerate(capture.materials):
                 pixels = where[material.name]
-                marked[material.name] += int(pixels.sum())
-                votes.add(index, view.face[pixels])
-                tables[material.name].append(
+                taken.marked[material.name] += int(pixels.sum())
+                taken.votes.add(index, view.face[pixels])
+                taken.tables[material.name].append(
                     sample_photo(view, lighting, light, radiance, trusted & pixels)
                 )
         self._check_light(lit_by)
+        return taken
 
-        results = []
-        for index, material in enumerate(capture.materials):
-            start, share = (
-                0.4 + 0.55 * index / len(capture.materials),
-                0.55 / len(capture.materials),
+    def _fit_material(
+        self, index: int, taken: _Taken, basis: Basis
+    ) -> Generator[Step, None, MaterialResult]:
+        capture = self.capture
+        name = capture.materials[index].name
+        share = 0.55 / len(capture.materials)
+        start = 0.4 + share * index
+        yield Step(f"fitting {name}", start)
+        table = SampleTable.join(taken.tables.pop(name))
+        self._check_samples(index, table, taken.marked[name])
+        try:
+            fit = fit_paper(table, basis, capture.fit.paper)
+        except FitError as error:
+            raise capture.error(str(error), "material", index, "name") from error
+        left_out = []
+        unseen = photos_to_hold_out(table) if capture.fit.held_out else []
+        for done, photo in enumerate(unseen):
+            yield Step(
+                f"predicting unseen photos of {name}",
+                start + share * (0.3 + 0.5 * done / len(unseen)),
             )
-            yield Step(f"fitting {material.name}", start)
-            table = SampleTable.join(tables.pop(material.name))
-            self._check_samples(index, table, marked[material.name])
-            try:
-                fit = fit_paper(table, basis, capture.fit.paper)
-            except FitError as error:
-                raise capture.error(str(error), "material", index, "name") from error
-            yield Step(f"predicting unseen photos of {material.name}", start + 0.4 * share)
-            held = held_out_error(table, basis, capture.fit.paper) if capture.fit.held_out else None
-            yield Step(f"Principled material of {material.name}", start + 0.8 * share)
-            known = all(
-                capture.light(photo.light).irradiance is not None for photo in capture.photos
-            )
-            results.append(
-                MaterialResult(
-                    name=material.name,
-                    fit=fit,
-                    samples=len(table),
-                    per_photo=tuple(
-                        np.bincount(table.photo, minlength=len(capture.photos)).tolist()
-                    ),
-                    held_out=held,
-                    spread=candidate_spread(basis, fit.candidates),
-                    principled=fit_principled(fit.brdf.evaluate),
-                    irradiance_known=known,
-                    warnings=material_warnings(table, fit, known),
-                )
-            )
-        yield Step("materials on the mesh", 0.97)
-        attributes = [m.faces for m in capture.materials if m.faces is not None]
-        self.result = CaptureResult(
-            capture, scan, rays, basis, tuple(results),
-            scan.mesh.face_attributes[attributes[0]].clip(0, len(capture.materials) - 1)
-            if attributes
-            else votes.winners(scan.mesh),
-            warnings=(),
-        )  # fmt: skip
+            left_out.append(leave_out(table, photo, basis, capture.fit.paper))
+        yield Step(f"Principled material of {name}", start + 0.8 * share)
+        known = all(capture.light(photo.light).irradiance is not None for photo in capture.photos)
+        return MaterialResult(
+            name=name,
+            fit=fit,
+            samples=len(table),
+            per_photo=tuple(np.bincount(table.photo, minlength=len(capture.photos)).tolist()),
+            held_out=summarise([part for part in left_out if part is not None]),
+            spread=candidate_spread(basis, fit.candidates),
+            principled=fit_principled(fit.brdf.evaluate),
+            irradiance_known=known,
+            warnings=material_warnings(table, fit, known),
+        )
+
+    def _face_material(self, scan: Scan, votes: FaceVotes) -> NDArray[np.int32]:
+        """What the mesh says where a material is given by its faces, else what the masks say."""
+        for material in self.capture.materials:
+            if material.faces is not None:
+                last = len(self.capture.materials) - 1
+                return scan.mesh.face_attributes[material.faces].clip(0, last)
+        return votes.winners(scan.mesh)
 
     def _check_light(self, lit_by: dict[str, int]) -> None:
         for place, light in enumerate(self.capture.lights):
