@@ -6,41 +6,65 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
+import numpy as np
+from numpy.typing import NDArray
 
 from ..core.capture import Capture
 from ..core.job import CaptureResult, Stage
-from ..core.scan import Scan
+from ..core.scan import Camera, Scan
 from . import materials, osl_files
 from .apply import apply_result, measured_materials
-from .scan_collection import ScanCollection, create_scan_collection
+from .scan_collection import ScanCollection, create_reconstruction, create_scan_collection
+
+RECTIFIED = "rectified"  # folder beside the .blend for resampled photos of distorted lenses
 
 
-def write_import(path: Path, capture: Capture, scan: Scan) -> None:
-    """Mesh, cameras with photos, lights. Rectified photos lie in photos/ beside the file."""
+def write_import(path: Path, final: Path, capture: Capture, scan: Scan) -> None:
+    """Mesh, cameras with photos, lights. final: where the file will be moved to, with all that
+    lies beside it."""
     _imported(path, capture, scan)
-    _save(path)
+    _save(path, final)
+
+
+def write_reconstruction(
+    path: Path,
+    final: Path,
+    cameras: Sequence[Camera],
+    points: tuple[NDArray[np.float64], NDArray[np.uint8]],
+    images: Path | None,
+) -> None:
+    """Cameras and sparse points of a reconstruction that has no mesh yet."""
+    scene = _new_file()
+    create_reconstruction(scene, final.stem, cameras, points, images, path.parent / RECTIFIED)
+    _save(path, final)
 
 
 def write_blend(
     path: Path, final: Path, result: CaptureResult, stages: Sequence[Stage]
 ) -> list[str]:
-    """The same with the fitted materials on the mesh; returns notes for the user.
-
-    final: where the file will be moved to; what lies beside it is pointed at there.
-    """
+    """A capture with the fitted materials on its mesh; returns notes for the user."""
     _imported(path, result.capture, result.scan)
-    _save(path)  # the components' EXR goes beside a saved file
+    _save(path, final)  # the components' EXR goes beside a saved file
     notes = apply_result(bpy.context.scene, result, stages)
     for material in measured_materials():
         for node in osl_files.script_nodes(material):
             socket = node.inputs[osl_files.SOCKET]
             moved = final.absolute().parent / Path(socket.default_value).name
             socket.default_value = moved.as_posix()
-    _save(path)
+    _save(path, final)
     return notes
 
 
 def _imported(path: Path, capture: Capture, scan: Scan) -> ScanCollection:
+    scene = _new_file()
+    made = create_scan_collection(scene, capture, scan, path.parent / RECTIFIED)
+    scene.patina.capture = str(capture.file)
+    scene.patina.mesh = made.mesh
+    return made
+
+
+def _new_file() -> bpy.types.Scene:
+    """An empty file with a black world, Cycles, and the photos' own transfer curve."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True, load_ui=False)
     scene = bpy.context.scene
     scene.world = bpy.data.worlds.new("Black")
@@ -55,16 +79,20 @@ def _imported(path: Path, capture: Capture, scan: Scan) -> ScanCollection:
         if materials.osl_missing() is None:
             scene.cycles.shading_system = True
     scene.view_settings.view_transform = "Standard"  # as the photos are shown
-    made = create_scan_collection(scene, capture, scan, path.parent / "photos")
-    scene.patina.capture = str(capture.file)
-    scene.patina.mesh = made.mesh
-    return made
+    return scene
 
 
-def _save(path: Path) -> None:
-    """Save with pictures by relative paths (the folder will be moved) and without a .blend1."""
+def _save(path: Path, final: Path) -> None:
+    """Save with pictures by paths relative to ``final`` and without a .blend1."""
+    here, there = path.absolute().parent, final.absolute().parent
     for image in bpy.data.images:
-        if image.source == "FILE" and image.packed_file is None:
-            image.filepath = bpy.path.relpath(image.filepath, start=str(path.parent))
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), check_existing=False, compress=True)
+        if image.source != "FILE" or image.filepath.startswith("//"):
+            continue  # no file of its own, or done at an earlier save
+        picture = Path(image.filepath)
+        if picture.is_relative_to(here):
+            picture = there / picture.relative_to(here)
+        image.filepath = bpy.path.relpath(str(picture), start=str(there))
+    bpy.ops.wm.save_as_mainfile(
+        filepath=str(path), check_existing=False, compress=True, relative_remap=False
+    )
     path.with_suffix(".blend1").unlink(missing_ok=True)

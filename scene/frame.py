@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.scan import Mesh
-
 FAR = 100.0  # sizes of the object: farther from the origin, Blender's float32 would lose precision
 
 
-def frame_origin(mesh: Mesh) -> NDArray[np.float64]:
-    """(3,) the scan-frame point put at Blender's origin: zero, unless the scan is georeferenced
-    or otherwise far away; then the mesh's centre, rounded to whole units."""
-    centre = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
-    if np.linalg.norm(centre) <= FAR * mesh.size:
+def frame_origin(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3,) the scan-frame point put at Blender's origin: zero, unless the scan's points (n, 3) are
+    georeferenced or otherwise far away; then their centre, rounded to whole units."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    centre = 0.5 * (low + high)
+    if np.linalg.norm(centre) <= FAR * np.linalg.norm(high - low):
         return np.zeros(3)
     return np.round(centre)

@@ -29,6 +29,25 @@ def create_mesh_object(
     return result
 
 
+def create_points_object(
+    name: str,
+    positions: NDArray[np.float64],
+    colours: NDArray[np.uint8],
+    collection: bpy.types.Collection,
+) -> bpy.types.Object:
+    """Sparse points (n, 3) as vertices with a colour attribute "Col"."""
+    data = bpy.data.meshes.new(name)
+    data.vertices.add(len(positions))
+    data.vertices.foreach_set("co", positions.astype(np.float32).ravel())
+    attribute = data.color_attributes.new("Col", "BYTE_COLOR", "POINT")
+    srgb = np.concatenate([colours / 255.0, np.ones((len(colours), 1))], axis=1)
+    attribute.data.foreach_set("color_srgb", srgb.astype(np.float32).ravel())
+    data.update()
+    result = bpy.data.objects.new(name, data)
+    collection.objects.link(result)
+    return result
+
+
 def assign_materials(
     target: bpy.types.Object,
     materials: list[bpy.types.Material],

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.capture import Capture
-from ..core.scan import Scan
+from ..core.scan import Camera, Scan
 from . import cameras, lights, meshes, photos
 from .frame import frame_origin
 
@@ -34,25 +36,12 @@ def create_scan_collection(
     rectified: folder for resampled photos of distorted lenses.
     """
     name = capture.file.name.removesuffix(".toml").removesuffix(".capture")
-    top = bpy.data.collections.new(f"Patina {name}")
-    scene.collection.children.link(top)
-    camera_room = bpy.data.collections.new(f"{name} cameras")
-    light_room = bpy.data.collections.new(f"{name} lights")
-    top.children.link(camera_room)
-    top.children.link(light_room)
-
-    origin = frame_origin(scan.mesh)
-    mesh = meshes.create_mesh_object(name, scan.mesh, origin, top)
+    top, camera_room, light_room = _rooms(scene, name, ("cameras", "lights"))
     used = scan.mesh.vertices[np.unique(scan.mesh.faces)]
+    origin = frame_origin(used)
     centre = 0.5 * (used.min(axis=0) + used.max(axis=0)) - origin
-    made = {}
-    for camera in scan.cameras:
-        distance = float(np.linalg.norm(camera.pose.centre - origin - centre))
-        made[camera.label] = cameras.create_camera(camera, origin, distance, camera_room)
-        own = _own_photo(scan, camera.label)
-        if own is not None:
-            shown = photos.photo_for(camera, own, rectified)
-            cameras.put_photo_behind(made[camera.label], shown)
+    mesh = meshes.create_mesh_object(name, scan.mesh, origin, top)
+    made = _cameras(scan.cameras, scan.images, origin, centre, camera_room, rectified)
     for photo in capture.photos:
         camera = scan.camera(photo.camera)
         if camera is not None:
@@ -66,23 +55,65 @@ def create_scan_collection(
     for other in list(suns.values())[1:]:  # one light at a time, as the photos were taken
         other.hide_render = True
         other.hide_set(True)
-    if capture.photos:
-        first = scan.camera(capture.photos[0].camera)
-        if first is not None:
-            cameras.look_through(scene, made[first.label])
-    elif made:
-        cameras.look_through(scene, next(iter(made.values())))
+    first = scan.camera(capture.photos[0].camera)
+    if first is not None:
+        cameras.look_through(scene, made[first.label])
     return ScanCollection(top, mesh, made, suns)
 
 
-def _own_photo(scan: Scan, label: str) -> Path | None:
-    """The scan's own photo of a camera, where the capture says where the photos lie."""
-    if scan.images is None:
+def create_reconstruction(
+    scene: bpy.types.Scene,
+    name: str,
+    found: Sequence[Camera],
+    points: tuple[NDArray[np.float64], NDArray[np.uint8]],
+    images: Path | None,
+    rectified: Path,
+) -> None:
+    """A reconstruction without a mesh: its cameras and its sparse points."""
+    top, camera_room = _rooms(scene, name, ("cameras",))
+    positions = points[0] if len(points[0]) else np.array([c.pose.centre for c in found])
+    origin = frame_origin(positions)
+    centre = np.median(positions, axis=0) - origin
+    if len(points[0]):
+        meshes.create_points_object(f"{name} points", points[0] - origin, points[1], top)
+    made = _cameras(found, images, origin, centre, camera_room, rectified)
+    cameras.look_through(scene, next(iter(made.values())))
+
+
+def _rooms(
+    scene: bpy.types.Scene, name: str, parts: Sequence[str]
+) -> tuple[bpy.types.Collection, ...]:
+    """A collection and one inside it for every part."""
+    top = bpy.data.collections.new(f"Patina {name}")
+    scene.collection.children.link(top)
+    rooms = [bpy.data.collections.new(f"{name} {part}") for part in parts]
+    for room in rooms:
+        top.children.link(room)
+    return (top, *rooms)
+
+
+def _cameras(
+    found: Sequence[Camera],
+    images: Path | None,
+    origin: NDArray[np.float64],
+    centre: NDArray[np.float64],
+    room: bpy.types.Collection,
+    rectified: Path,
+) -> dict[str, bpy.types.Object]:
+    made = {}
+    for camera in found:
+        distance = float(np.linalg.norm(camera.pose.centre - origin - centre))
+        made[camera.label] = cameras.create_camera(camera, origin, distance, room)
+        own = _own_photo(images, camera.label)
+        if own is not None:
+            shown = photos.photo_for(camera, own, rectified)
+            cameras.put_photo_behind(made[camera.label], shown)
+    return made
+
+
+def _own_photo(images: Path | None, label: str) -> Path | None:
+    """The scan's own photo of a camera, where it is known where the photos lie."""
+    if images is None:
         return None
-    exact = scan.images / label
-    if exact.is_file():
-        return exact
-    return next(
-        (p for s in PICTURES if (p := scan.images / f"{label}{s}").is_file()),
-        None,
-    )
+    names = [label, *(f"{label}{suffix}" for suffix in PICTURES)]
+    return next((images / name for name in names if (images / name).is_file()), None)
