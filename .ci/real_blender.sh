@@ -3,6 +3,8 @@
 #   real_blender.sh install [DIR]       Blender 4.3 with Python 3.13 (about 2 minutes, 1.5 GB)
 #   real_blender.sh blender DIR ARGS    that Blender; sees the current folder, the checkout,
 #                                       the data beside it and Patina's cache, at the same paths
+#   real_blender.sh picture DIR PNG     photographs tools/window_scene.py in a real window (the
+#                                       extension as `run.py headless` has installed it)
 # Debian's build has no OSL and no USD: those are tested on the bpy wheel.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -60,5 +62,24 @@ blender)
   bind "$dir" "${PATINA_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/patina}"
   bind "$dir" "$PWD"
   exec chroot "$dir" /bin/bash -c 'cd "$0" && exec blender "$@"' "$PWD" "$@" ;;
-*) sed -n '2,6p' "$0"; exit 2 ;;
+picture)
+  [ "${IN_NAMESPACE:-}" = 1 ] || IN_NAMESPACE=1 exec unshare --mount bash "${BASH_SOURCE[0]}" picture "$@"
+  dir=$1 png=$(realpath "$2")
+  cache=${PATINA_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/patina}
+  system "$dir"
+  bind "$dir" "$here"
+  bind "$dir" "$cache"
+  command -v "$dir/usr/bin/xdotool" >/dev/null || inside "$dir" apt-get install -y -qq \
+    --no-install-recommends xvfb xauth xdotool imagemagick fonts-dejavu-core >/dev/null
+  BLENDER_USER_RESOURCES="$cache/blender-4.3-cp313" inside "$dir" /bin/bash -c '
+    cd "$0"; Xvfb :97 -screen 0 1600x900x24 +extension GLX >/dev/null 2>&1 & screen=$!
+    export DISPLAY=:97 LIBGL_ALWAYS_SOFTWARE=1; sleep 2
+    blender --factory-startup --addons bl_ext.user_default.patina -P tools/window_scene.py \
+      >/dev/null 2>&1 & window=$!
+    for _ in $(seq 120); do [ -e /tmp/window-ready ] && break; sleep 1; done
+    sleep 20  # shaders
+    xdotool mousemove 1309 203 click 1  # the tab of the sidebar
+    sleep 4; rm -f /tmp/window-ready; import -window root /tmp/window.png; kill $window $screen' "$here"
+  mv "$dir/tmp/window.png" "$png" ;;
+*) sed -n '2,9p' "$0"; exit 2 ;;
 esac

@@ -1,0 +1,97 @@
+"""`run.py pictures`: docs/images/demo.jpg, from the embedded capture and nothing else.
+
+From left to right: a lit photo, the prediction of it, the signed difference, and the measured
+materials under a sky they were not photographed in (Cycles, OSL).
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+import OpenImageIO as oiio
+
+from .common import ROOT
+from .package import load_patina
+
+TARGET = ROOT / "docs" / "images" / "demo.jpg"
+PHOTO = 0  # of the capture: the key light from the front
+GAP = 12
+SAMPLES = 1024
+
+
+def main() -> int:
+    """Fit, render, compose; returns the exit code."""
+    patina = load_patina()
+    patina.register()
+    from patina.commands.demo import CAPTURE
+    from patina.commands.fit import fit_to_folder
+    from patina.core.geometry import view_surface
+    from patina.core.job import inputs
+    from patina.core.report import display
+
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "demo"
+        result = fit_to_folder(CAPTURE, out)
+        camera = inputs.camera_of(result.capture, result.scan, PHOTO)
+        box = display.crop_box(view_surface(result.rays, camera).seen, margin=12)
+        panels = [
+            read(out / "report" / f"photo_{PHOTO:02d}_{kind}.png")
+            for kind in ("measured", "predicted", "difference")
+        ]
+        panels.append(relit(out / "scene.blend", Path(folder), box))
+    height = min(panel.shape[0] for panel in panels)
+    strip = [np.full((height, GAP, 3), 255, np.uint8)] * (2 * len(panels) - 1)
+    strip[::2] = [panel[:height] for panel in panels]
+    TARGET.parent.mkdir(parents=True, exist_ok=True)
+    write(TARGET, np.concatenate(strip, axis=1))
+    print(f"wrote {TARGET}: {TARGET.stat().st_size / 1000:.0f} kB")
+    return 0
+
+
+def relit(blend: Path, folder: Path, box: tuple[slice, slice]) -> np.ndarray:
+    """(h, w, 3) the materials in Blender's own studio world, cropped as the report's pictures."""
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    scene = bpy.context.scene
+    for lamp in [o for o in scene.objects if o.type == "LIGHT"]:
+        lamp.hide_render = True
+    worlds = Path(bpy.utils.system_resource("DATAFILES")) / "studiolights" / "world"
+    tree = scene.world.node_tree
+    sky = tree.nodes.new("ShaderNodeTexEnvironment")
+    sky.image = bpy.data.images.load(str(worlds / "courtyard.exr"))
+    turn, place = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
+    tree.links.new(place.outputs["Generated"], turn.inputs["Vector"])
+    tree.links.new(turn.outputs["Vector"], sky.inputs["Vector"])
+    up = scene.camera.matrix_world.to_3x3() @ type(scene.camera.location)((0, 1, 0))
+    turn.inputs["Rotation"].default_value = up.rotation_difference((0, 0, 1)).to_euler()
+    background = tree.nodes["Background"]
+    tree.links.new(sky.outputs["Color"], background.inputs["Color"])
+    background.inputs["Strength"].default_value = 1.0
+    scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, False
+    # not film_transparent: rays that left through a portal would count as transparent film too
+    scene.render.image_settings.file_format = "PNG"
+    scene.render.filepath = str(folder / "relit.png")
+    bpy.ops.render.render(write_still=True)
+    return read(Path(scene.render.filepath))[box]
+
+
+def read(path: Path) -> np.ndarray:
+    """(h, w, 3) 8-bit pixels."""
+    return oiio.ImageBuf(str(path)).get_pixels(oiio.UINT8)[..., :3]
+
+
+def write(path: Path, pixels: np.ndarray) -> None:
+    """Write a JPEG for the docs."""
+    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "uint8")
+    spec.attribute("Compression", "jpeg:88")
+    out = oiio.ImageOutput.create(str(path))
+    out.open(str(path), spec)
+    out.write_image(np.ascontiguousarray(pixels))
+    out.close()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
