@@ -12,8 +12,10 @@ from __future__ import annotations
 import argparse
 import importlib
 import importlib.util
+import signal
 import sys
 from pathlib import Path
+from typing import NoReturn
 
 INSTALLED = "bl_ext.user_default.patina"
 COMMANDS = {
@@ -50,9 +52,8 @@ def main(arguments: list[str]) -> int:
     """Run one command; 0 when all was done, 2 for wrong input (one line on stderr)."""
     name = package()
     errors = importlib.import_module(f"{name}.core.errors")
-    parser = argparse.ArgumentParser(
-        prog="patina", description="Measured materials from photo scans"
-    )
+    signal.signal(signal.SIGTERM, _stop)  # after the libraries, some of which set their own
+    parser = _Parser(prog="patina", description="Measured materials from photo scans")
     choices = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     modules = {}
     for command, file in COMMANDS.items():
@@ -68,6 +69,17 @@ def main(arguments: list[str]) -> int:
         print("patina: stopped; nothing was written", file=sys.stderr)
         return 130
     return 0
+
+
+class _Parser(argparse.ArgumentParser):
+    """A mistake on the command line is one line too."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message} (--help says more)\n")
+
+
+def _stop(*_: object) -> NoReturn:
+    raise KeyboardInterrupt
 
 
 def own_arguments() -> list[str]:

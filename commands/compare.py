@@ -24,6 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
+    if not 1.0 <= arguments.limit <= 90.0:
+        raise InputError(f"found {arguments.limit:g}, expected 1 to 90 degrees", key="--limit")
     fit = merl_file.read(arguments.fit)
     found = metrics.compare(fit, read_truth(arguments.truth), arguments.limit)
     print(f"relative L2 (all cells in view)            {found.relative_l2:.4f}")
@@ -43,8 +45,10 @@ def truth_weights(path: Path) -> NDArray[np.float32]:
     """(675,) the neural encoding in a truth.json. Raises InputError."""
     try:
         weights = np.array(json.loads(path.read_text("utf-8"))["weights"], np.float32)
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError(f"holds no neural encoding ({error})", file=path) from error
     if weights.shape != (nbrdf.WEIGHTS,):
         raise InputError(f"{weights.shape} weights, expected {nbrdf.WEIGHTS}", file=path)
+    if not (np.abs(weights) < 1e6).all():
+        raise InputError("the neural encoding has numbers beyond all measure", file=path)
     return weights

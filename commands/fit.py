@@ -14,7 +14,7 @@ from ..core.job import CaptureResult, FitJob, Stage
 from ..core.job.job import Step, peak_memory
 from ..core.report import result_json, write_report
 from .progress import Progress
-from .staging import staged_folder
+from .staging import check_out, staged_folder
 
 HELP = "fit every material of a capture and write them"
 
@@ -30,6 +30,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 def fit_to_folder(capture_file: Path, out: Path) -> CaptureResult:
     """Fit a capture and leave result.json, NAME.binary, scene.blend and report/ in ``out``."""
+    out = check_out(out)
     progress = Progress(share=0.85)
     job = FitJob(read_capture(capture_file))
     job.drain(progress)

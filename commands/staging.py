@@ -12,15 +12,32 @@ from pathlib import Path
 from ..core.errors import InputError
 
 
+def check_out(out: Path) -> Path:
+    """The folder as an absolute path; refused at once, before any work, where it cannot be one."""
+    if not str(out).strip() or str(out) == ".":
+        out = Path.cwd()
+    out = Path(os.path.abspath(out))
+    try:
+        if out.is_symlink() and not out.exists():
+            raise InputError("is a link that leads nowhere", file=out, key="--out")
+        if out.exists() and not out.is_dir():
+            raise InputError("is a file, expected a folder to write into", file=out, key="--out")
+        nearest = next(p for p in (out, *out.parents) if p.exists())
+        if not nearest.is_dir() or not os.access(nearest, os.W_OK):
+            raise InputError("cannot be written", file=out, key="--out")
+        os.stat(out.parent if out.parent.exists() else nearest)
+    except OSError as error:
+        raise InputError(f"cannot be written ({error.strerror})", file=out, key="--out") from error
+    return out
+
+
 @contextmanager
 def staged_folder(out: Path) -> Iterator[Path]:
     """A folder whose files move into ``out`` when the block ends well, and vanish when it does not.
 
     Files of the same names are replaced; whatever else lies in ``out`` stays as it is.
     """
-    out = Path(os.path.abspath(out))
-    if out.exists() and not out.is_dir():
-        raise InputError("is a file, expected a folder to write into", file=out, key="--out")
+    out = check_out(out)
     try:
         existed = out.is_dir()
         if not existed:
@@ -31,14 +48,23 @@ def staged_folder(out: Path) -> Iterator[Path]:
         raise InputError(f"cannot be written ({error.strerror})", file=out, key="--out") from error
     try:
         yield staging
-        for source in sorted(staging.rglob("*")):
-            target = out / source.relative_to(staging)
-            if source.is_dir():
-                target.mkdir(parents=True, exist_ok=True)
-            else:
-                target.parent.mkdir(parents=True, exist_ok=True)
-                os.replace(source, target)
+        _move(staging, out)
     except OSError as error:
         raise InputError(f"cannot be written ({error})", file=out, key="--out") from error
     finally:
         shutil.rmtree(staging, ignore_errors=True)
+
+
+def _move(staging: Path, out: Path) -> None:
+    """Every file to its place; first make sure that all of them have one."""
+    places = [(source, out / source.relative_to(staging)) for source in sorted(staging.rglob("*"))]
+    for source, target in places:
+        if target.exists() and target.is_dir() != source.is_dir():
+            kind = "a folder" if target.is_dir() else "a file"
+            raise InputError(f"is {kind} and stands in the way of a result", file=target)
+    for source, target in places:
+        if source.is_dir():
+            target.mkdir(parents=True, exist_ok=True)
+        else:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(source, target)

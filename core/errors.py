@@ -2,7 +2,20 @@
 
 from __future__ import annotations
 
+import zlib
 from pathlib import Path
+from zipfile import BadZipFile
+
+# what numpy raises for a file that is no .npz, or a damaged one
+UNREADABLE_NPZ = (
+    OSError,
+    KeyError,
+    ValueError,
+    EOFError,
+    NotImplementedError,
+    BadZipFile,
+    zlib.error,
+)
 
 
 class PatinaError(Exception):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.capture import Capture
+from ..core.errors import PatinaError
 from ..core.job import CaptureResult, Stage
 from ..core.scan import Camera, Scan
 from . import materials, osl_files
@@ -92,7 +93,10 @@ def _save(path: Path, final: Path) -> None:
         if picture.is_relative_to(here):
             picture = there / picture.relative_to(here)
         image.filepath = bpy.path.relpath(str(picture), start=str(there))
-    bpy.ops.wm.save_as_mainfile(
-        filepath=str(path), check_existing=False, compress=True, relative_remap=False
-    )
+    try:
+        bpy.ops.wm.save_as_mainfile(
+            filepath=str(path), check_existing=False, compress=True, relative_remap=False
+        )
+    except RuntimeError as error:
+        raise PatinaError(f"{final}: cannot be written ({error})") from error
     path.with_suffix(".blend1").unlink(missing_ok=True)

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from ..angles import Angles, merl_grid
 from ..brdf import nbrdf
+from ..errors import InputError
 from .basis import Basis, Progress
-from .training import BLOCK, train
+from .training import BLOCK, DEFAULT_COUNT, train
 
 PROVENANCE = (
     "Mean, reference and principal components (Nielsen's log mapping) of the neural encodings of "
@@ -60,6 +61,10 @@ def build(
     unknown = sorted(set(exclude) - set(names))
     if unknown:
         raise ValueError(f"no such materials: {unknown}")
+    if 3 * (len(names) - len(exclude)) <= DEFAULT_COUNT:
+        raise InputError(
+            f"{len(names)} materials, too few for {DEFAULT_COUNT} components", file=encodings
+        )
     kept = [i for i, name in enumerate(names) if name not in exclude]
     note = f" Without {', '.join(sorted(exclude))}." if exclude else ""
     return train(NeuralObservations(weights[kept]), PROVENANCE + note, progress=progress)

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import UNREADABLE_NPZ, InputError
 from .basis import Basis
 from .grid import AngleGrid
 
@@ -58,7 +57,7 @@ def load(path: Path) -> Basis:
                 columns=int(data["columns"]),
                 provenance=str(data["provenance"]),
             )
-    except (OSError, KeyError, ValueError, EOFError, BadZipFile) as error:
+    except UNREADABLE_NPZ as error:
         raise InputError(f"not a Patina basis ({error})", file=path) from error
 
 

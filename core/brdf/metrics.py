@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import Angles, cosines, merl_grid
+from ..errors import PatinaError
 from .table import TabulatedBRDF
 
 EPSILON = 1e-3  # as in Nielsen's mapping: below it reflectance × cosines counts as black
@@ -30,6 +31,8 @@ def compare(fit: TabulatedBRDF, truth: TabulatedBRDF, limit: float = 80.0) -> Di
     """Differences over the cells valid in both; limit in degrees."""
     centres = merl_grid.node_angles(0.5)
     both = fit.valid & truth.valid
+    if not (truth.values[:, both] > 0).any():
+        raise PatinaError("nothing to compare: the truth has no reflectance where the fit has any")
     angles = Angles(*(a[both] for a in centres))
     a, b = fit.values[:, both].astype(np.float64), truth.values[:, both].astype(np.float64)
     cos_i, cos_o = cosines(*angles)

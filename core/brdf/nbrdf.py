@@ -5,13 +5,12 @@ Importance Sampling". Used to compute the embedded basis and to check fits; no f
 from __future__ import annotations
 
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import Angles
-from ..errors import InputError
+from ..errors import UNREADABLE_NPZ, InputError
 
 WEIGHTS = 675  # 6·21 + 21 + 21·21 + 21 + 21·3 + 3
 
@@ -20,14 +19,17 @@ def load(path: Path) -> tuple[list[str], NDArray[np.float32]]:
     """(names, weights (n, 675)) from an .npz of encodings."""
     try:
         with open(path, "rb") as file, np.load(file) as data:
-            names, weights = [str(n) for n in data["names"]], np.asarray(data["weights"])
-    except (OSError, KeyError, ValueError, BadZipFile) as error:
+            names = [str(n) for n in data["names"]]
+            weights = np.asarray(data["weights"]).astype(np.float32)
+    except UNREADABLE_NPZ as error:
         raise InputError(f"not a set of neural BRDF encodings ({error})", file=path) from error
     if weights.shape != (len(names), WEIGHTS):
         raise InputError(
             f"weights of shape {weights.shape}, expected ({len(names)}, {WEIGHTS})", file=path
         )
-    return names, weights.astype(np.float32)
+    if not np.isfinite(weights).all():
+        raise InputError("weights are not finite numbers", file=path)
+    return names, weights
 
 
 def evaluate(weights: NDArray[np.floating], angles: Angles) -> NDArray[np.float32]:

@@ -19,23 +19,34 @@ from .section import Section
 LIGHTS_TO_COME = ("sphere", "sun", "position", "mounted", "white", "intensity")
 
 
+WINDOWS_DEVICES = {
+    "CON",
+    "PRN",
+    "AUX",
+    "NUL",
+    *(f"{n}{i}" for n in ("COM", "LPT") for i in range(10)),
+}
+LARGEST_FILE = 1_000_000  # bytes; a capture of a thousand photos has a tenth of it
+LONGEST_LINE = 10_000
+
+
 def read_capture(path: Path) -> Capture:
     """The capture in a file. Raises InputError naming the key and the line."""
+    text = _text(path)
     try:
-        text = path.read_text("utf-8")
         data = tomllib.loads(text)
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", file=path) from error
-    except UnicodeDecodeError as error:
-        raise InputError("is not a text in UTF-8", file=path) from error
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"is not valid TOML ({error})", file=path) from error
+    except (ValueError, RecursionError) as error:  # a number or a nest beyond all bounds
+        raise InputError(f"is not a capture file ({error})", file=path) from error
     lines = key_lines(text)
     top = Section(data, path.resolve(), lines)
 
     scan = top.table("scan")
     cameras, mesh = scan.file_path("cameras"), scan.file_path("mesh")
     images = scan.optional_file_path("images")
+    if images is not None and not images.is_dir():
+        raise scan.error(f"expected a folder, found a file: {images}", "images")
     scan.close()
     lights = tuple(_light(section) for section in top.tables("light"))
     materials = tuple(_material(section) for section in top.tables("material"))
@@ -45,6 +56,7 @@ def read_capture(path: Path) -> Capture:
         _photo(section, {light.name for light in lights}, {m.name for m in materials})
         for section in top.tables("photo")
     )
+    _refuse_doubles(top, materials, {name for photo in photos for name in photo.masks})
     fit = _fit(top.table("fit"))
     top.table("diagnose").close()
     top.close()
@@ -63,9 +75,25 @@ def read_capture(path: Path) -> Capture:
     )
 
 
+def _text(path: Path) -> str:
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise InputError("is too large for a capture file", file=path)
+        text = path.read_text("utf-8-sig")
+    except (OSError, ValueError) as error:
+        if isinstance(error, UnicodeDecodeError):
+            raise InputError("is not a text in UTF-8", file=path) from error
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"cannot be read ({reason})", file=path) from error
+    if max(map(len, text.splitlines()), default=0) > LONGEST_LINE:
+        raise InputError("has a line too long for a capture file", file=path)
+    return text
+
+
 def _refuse_twins(top: Section, kind: str, names: list[str]) -> None:
     for place, name in enumerate(names):
-        if name in names[:place]:
+        # some file systems do not tell upper from lower case
+        if name.casefold() in [other.casefold() for other in names[:place]]:
             raise top.error(f"the name {name!r} is used twice", kind, place, "name")
 
 
@@ -96,9 +124,33 @@ def _material(section: Section) -> MaterialEntry:
     section.close()
     if name == SHADOW_MASK:
         raise section.error(f"{SHADOW_MASK!r} is the name of the shadow masks", "name")
-    if any(c in name for c in '/\\:*?"<>|') or name.strip(". ") != name:
-        raise section.error(f"{name!r} cannot be part of a file name", "name")
+    if not _is_file_name(name):
+        raise section.error(f"{name[:60]!r} cannot be part of a file name everywhere", "name")
     return MaterialEntry(name, faces)
+
+
+def _is_file_name(name: str) -> bool:
+    """True for what Linux, macOS and Windows all take as the start of a file's name."""
+    return (
+        name.isprintable()
+        and len(name.encode()) <= 100
+        and not any(c in name for c in '/\\:*?"<>|')
+        and name.strip(". ") == name
+        and name.split(".")[0].upper() not in WINDOWS_DEVICES
+    )
+
+
+def _refuse_doubles(top: Section, materials: tuple[MaterialEntry, ...], masked: set[str]) -> None:
+    """Two materials that are both all of the object: the artist forgot the masks."""
+    whole = [i for i, m in enumerate(materials) if m.faces is None and m.name not in masked]
+    if len(whole) > 1:
+        raise top.error(
+            f"{materials[whole[0]].name!r} and {materials[whole[1]].name!r} would both be all of "
+            "the object: give them masks or faces",
+            "material",
+            whole[1],
+            "name",
+        )
 
 
 def _photo(section: Section, lights: set[str], materials: set[str]) -> PhotoEntry:
@@ -123,16 +175,20 @@ def _photo(section: Section, lights: set[str], materials: set[str]) -> PhotoEntr
 def _fit(section: Section) -> FitOptions:
     margins, paper = Margins(), PaperSettings()
     curvature = section.number("curvature", paper.curvature or 0.0, low=0.0)
+    samples = section.integer("samples", paper.samples, 1, 40)
+    subset = section.integer("subset", paper.subset, 10, 1_000_000)
+    if subset < 2 * samples:
+        raise section.error(f"found {subset}, expected at least twice the samples", "subset")
     options = FitOptions(
         margins=Margins(
-            silhouette=section.integer("silhouette_margin", margins.silhouette, 0, 1000),
-            shadow=section.integer("shadow_margin", margins.shadow, 0, 1000),
+            silhouette=section.integer("silhouette_margin", margins.silhouette, 0, 100),
+            shadow=section.integer("shadow_margin", margins.shadow, 0, 100),
             cosine=section.number("smallest_cosine", margins.cosine, 0.001, 0.99),
         ),
         paper=PaperSettings(
-            samples=section.integer("samples", paper.samples, 1, 40),
+            samples=samples,
             trials=section.integer("trials", paper.trials, 1, 10_000),
-            subset=section.integer("subset", paper.subset, 10, 1_000_000),
+            subset=subset,
             curvature=curvature if curvature > 0 else None,  # 0 switches the test off
             monotonicity=section.flag("monotonicity", paper.monotonicity),
             highest_intensity=section.flag("highest_intensity", paper.highest_intensity),

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .model import key_error
 
+LARGEST = 1e12  # of any component of a direction or an irradiance
+
 
 class Section:
     """A table and where it stands. Reading a key marks it as known; close() refuses the rest."""
@@ -51,8 +53,12 @@ class Section:
         """A file or folder that must exist, relative to the capture file."""
         path = Path(self.text(name))
         path = path if path.is_absolute() else self.file.parent / path
-        if not path.exists():
-            raise self.error(f"no such file: {path}", name)
+        try:
+            there = path.exists()
+        except (OSError, ValueError):  # a name too long for any file, or with a NUL in it
+            there = False
+        if not there:
+            raise self.error(f"no such file: {shortened(path)}", name)
         return path
 
     def optional_file_path(self, name: str) -> Path | None:
@@ -67,6 +73,8 @@ class Section:
             return default
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.error(f"found {value!r}, expected a number", name)
+        if isinstance(value, int) and abs(value) > 1e300:  # no float holds it
+            raise self.error(f"expected a number from {low:g} to {high:g}", name)
         if not (math.isfinite(value) and low <= value <= high):
             raise self.error(f"found {value}, expected a number from {low:g} to {high:g}", name)
         return float(value)
@@ -96,10 +104,11 @@ class Section:
             isinstance(value, list)
             and len(value) == 3
             and all(isinstance(x, int | float) and not isinstance(x, bool) for x in value)
-            and all(math.isfinite(x) for x in value)
+            and all(abs(x) <= LARGEST for x in value)  # also refuses NaN
         )
         if not good:
-            raise self.error(f"found {value!r}, expected three numbers [x, y, z]", name)
+            found = str(value) if len(str(value)) < 100 else "something else"
+            raise self.error(f"found {found}, expected three numbers [x, y, z]", name)
         return np.array(value, np.float64)
 
     def table(self, name: str) -> Section:
@@ -125,3 +134,9 @@ class Section:
             if name not in self.known:
                 known = ", ".join(sorted(self.known))
                 raise self.error(f"unknown key {name!r}; known here: {known}", name)
+
+
+def shortened(path: Path) -> str:
+    """The path for a message, its end where it is long."""
+    text = str(path)
+    return text if len(text) <= 300 else f"…{text[-300:]}"

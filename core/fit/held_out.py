@@ -70,9 +70,11 @@ def summarise(parts: Sequence[LeftOut]) -> HeldOut | None:
     """All held-out photos together; None where there are none."""
     if not parts:
         return None
+    relative = np.concatenate([p.relative for p in parts])
+    error = _ratio(sum(p.missed for p in parts), sum(p.size for p in parts))
     return HeldOut(
-        error=_ratio(sum(p.missed for p in parts), sum(p.size for p in parts)),
-        typical=float(np.median(np.concatenate([p.relative for p in parts]))),
+        error=error,
+        typical=float(np.median(relative)) if relative.size else error,
         per_photo={p.photo: _ratio(p.missed, p.size) for p in parts},
     )
 

@@ -23,6 +23,8 @@ from ..scan import Scan
 from . import inputs
 from .job import Job, Step
 
+LEAST_RHO, LARGEST_RHO = 1e-6, 1e4  # 1/sr: black velvet has 1e-3, mirrors' peaks 1e4
+
 
 @dataclass(frozen=True)
 class MaterialResult:
@@ -103,11 +105,13 @@ class FitJob(Job):
             votes=FaceVotes.empty(len(scan.mesh.faces), len(capture.materials)),
         )
         lit_by = {light.name: 0 for light in capture.lights}
+        seen_by = {light.name: 0 for light in capture.lights}
         for place, photo in enumerate(capture.photos):
             yield Step("sampling the photos", 0.05 + 0.35 * place / len(capture.photos))
             view = view_surface(rays, inputs.camera_of(capture, scan, place))
             light = capture.light(photo.light)
             lighting = light_surface(rays, view, light)
+            seen_by[photo.light] += len(view.pixel)
             lit_by[photo.light] += int((~lighting.shadowed).sum())
             where, in_shadow = inputs.material_pixels(capture, scan, view, place)
             trusted = trusted_pixels(view, lighting, capture.fit.margins) & ~in_shadow
@@ -119,7 +123,7 @@ class FitJob(Job):
                 taken.tables[material.name].append(
                     sample_photo(view, lighting, light, radiance, trusted & pixels)
                 )
-        self._check_light(lit_by)
+        self._check_light(seen_by, lit_by)
         return taken
 
     def _fit_material(
@@ -166,10 +170,11 @@ class FitJob(Job):
                 return scan.mesh.face_attributes[material.faces].clip(0, last)
         return votes.winners(scan.mesh)
 
-    def _check_light(self, lit_by: dict[str, int]) -> None:
+    def _check_light(self, seen_by: dict[str, int], lit_by: dict[str, int]) -> None:
+        if not any(seen_by.values()):
+            raise self.capture.error("no lit photo shows any of the mesh", "scan", "mesh")
         for place, light in enumerate(self.capture.lights):
-            used = any(photo.light == light.name for photo in self.capture.photos)
-            if used and lit_by[light.name] == 0:
+            if seen_by[light.name] and lit_by[light.name] == 0:
                 raise self.capture.error(
                     f"the light {light.name!r} stands behind everything its photos see: no pixel "
                     "is lit; direction points from the surface TO the light, in the scan's frame",
@@ -177,9 +182,18 @@ class FitJob(Job):
                 )  # fmt: skip
 
     def _check_samples(self, index: int, table: SampleTable, marked: int) -> None:
-        if len(table):
-            return
         name = self.capture.materials[index].name
+        if len(table):
+            level = float(np.median(table.rho))
+            if not LEAST_RHO < level < LARGEST_RHO:
+                raise self.capture.error(
+                    f"the typical reflectance of {name!r} is {level:.3g} / sr, which no surface "
+                    "has: check that the photos are linear and not black, exposure and irradiance",
+                    "material",
+                    index,
+                    "name",
+                )
+            return
         painted = self.capture.named_by_masks(name)
         found = (
             f"all pixels are masked out: no mask marks any surface as {name!r}"

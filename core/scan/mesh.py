@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -60,11 +61,17 @@ def read_mesh(path: Path) -> Mesh:
     if kind is None:
         expected = " or ".join(sorted(FORMATS))
         raise InputError(f"mesh format {path.suffix!r} is not read, expected {expected}", file=path)
+    if not path.is_file():
+        raise InputError("is not a file", file=path)
     try:
+        if kind == "obj":
+            _check_obj(path)
         with open(path, "rb") as file:
             loaded = trimesh.load(
                 file, file_type=kind, process=False, maintain_order=True, skip_materials=True
             )
+    except InputError:
+        raise
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", file=path) from error
     except Exception as error:  # trimesh raises whatever the parser met
@@ -77,11 +84,36 @@ def read_mesh(path: Path) -> Mesh:
     joined = surfaces[0] if len(surfaces) == 1 else trimesh.util.concatenate(surfaces)  # type: ignore[assignment]
     vertices = np.asarray(joined.vertices, np.float64)
     faces = np.asarray(joined.faces, np.int32)
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise InputError("a vertex is not made of three numbers", file=path)
+    if kind == "ply":
+        _check_ply_counts(path, len(vertices), len(faces))
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise InputError("faces refer to vertices that are not there", file=path)
     if not np.isfinite(vertices).all():
         raise InputError("vertices are not finite numbers (NaN)", file=path)
     return Mesh(vertices, faces, _integer_properties(joined, len(faces)))
+
+
+def _check_ply_counts(path: Path, vertices: int, faces: int) -> None:
+    """Refuse a PLY that holds less than its header says: it is truncated."""
+    with open(path, "rb") as file:
+        header = file.read(1 << 16).partition(b"end_header")[0]
+    for kind, there in (("vertex", vertices), ("face", faces)):
+        said = re.search(rf"^element {kind} (\d+)".encode(), header, re.MULTILINE)
+        if said and there < int(said.group(1)):
+            raise InputError(
+                f"is truncated: its header says {said.group(1).decode()} elements of kind "
+                f"{kind!r}, {there} are there",
+                file=path,
+            )
+
+
+def _check_obj(path: Path) -> None:
+    """Refuse index 0: OBJ counts from 1, and trimesh would take it for the last vertex."""
+    zero = re.compile(rb"^f[ \t](?:[^\r\n]*[ \t])?0+(?:[/ \t]|\r?$)", re.MULTILINE)
+    if zero.search(path.read_bytes()):
+        raise InputError("a face refers to vertex 0; OBJ files count from 1", file=path)
 
 
 def _welded(vertices: NDArray[np.float64]) -> NDArray[np.intp]:
