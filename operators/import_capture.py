@@ -9,8 +9,8 @@ import bpy
 from ..core.capture import read_capture
 from ..core.errors import PatinaError
 from ..core.job import inputs
+from ..scene.folders import rectified_folder
 from ..scene.scan_collection import create_scan_collection
-from ..scene.working_folder import working_folder
 from .report_errors import refuse
 
 DEMO = Path(__file__).parents[1] / "assets" / "demo" / "demo.capture.toml"
@@ -32,7 +32,7 @@ class PATINA_OT_import_capture(bpy.types.Operator):
             capture = read_capture(path)
             scan = inputs.open_scan(capture)
             inputs.check_photos(capture, scan)
-            made = create_scan_collection(context.scene, capture, scan, working_folder())
+            made = create_scan_collection(context.scene, capture, scan, rectified_folder(path))
         except PatinaError as error:
             return refuse(self, error)
         context.scene.patina.capture = str(path)

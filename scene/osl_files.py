@@ -16,6 +16,7 @@ from bpy.app.handlers import persistent
 
 from ..core.appearance import osl_atlas
 from ..core.basis import Basis
+from .folders import blend_folder
 
 log = logging.getLogger(__name__)
 
@@ -26,7 +27,7 @@ FILE_PROPERTY = "patina_components"  # on the material: the atlas' file name
 def ensure_components(basis: Basis) -> Path:
     """The atlas of a basis: on disk where this .blend expects it, and packed into the .blend."""
     name = osl_atlas.file_name(basis)
-    path = _folder() / name
+    path = blend_folder() / name
     if not path.is_file():
         packed = bpy.data.images.get(name)
         if packed is None or not _write_packed(packed, path):
@@ -63,7 +64,7 @@ def restore() -> list[str]:
         for node in script_nodes(material):
             if os.path.isfile(node.inputs[SOCKET].default_value):
                 continue
-            path = _folder() / name
+            path = blend_folder() / name
             image = bpy.data.images.get(name)
             if path.is_file() or (image is not None and _write_packed(image, path)):
                 node.inputs[SOCKET].default_value = path.as_posix()
@@ -83,25 +84,6 @@ def script_nodes(material: bpy.types.Material) -> list[bpy.types.Node]:
         for node in material.node_tree.nodes
         if node.bl_idname == "ShaderNodeScript" and SOCKET in node.inputs
     ]
-
-
-def _folder() -> Path:
-    """Beside the .blend where that can be written, else the extension's own folder."""
-    if bpy.data.filepath:
-        beside = Path(bpy.data.filepath).parent
-        if os.access(beside, os.W_OK):
-            return beside
-    return _own_folder()
-
-
-def _own_folder() -> Path:
-    package = __package__.rpartition(".")[0]
-    try:
-        return Path(bpy.utils.extension_path_user(package, path="components", create=True))
-    except ValueError:  # run from a checkout: not an extension
-        folder = Path(bpy.app.tempdir) / "patina_components"
-        folder.mkdir(parents=True, exist_ok=True)
-        return folder
 
 
 def _write_packed(image: bpy.types.Image, path: Path) -> bool:
@@ -130,8 +112,8 @@ def _after_save(*_: object) -> None:
     for material in bpy.data.materials:
         name = material.get(FILE_PROPERTY)
         image = bpy.data.images.get(name) if name else None
-        if image is not None and not (_folder() / name).is_file():
-            _write_packed(image, _folder() / name)
+        if image is not None and not (blend_folder() / name).is_file():
+            _write_packed(image, blend_folder() / name)
 
 
 def register() -> None:

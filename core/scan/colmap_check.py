@@ -88,11 +88,9 @@ def _parameter_counts() -> dict[int, int]:
     """COLMAP's model number → how many parameters its lens has, as pycolmap knows them."""
     counts = {}
     for model in pycolmap.CameraModelId.__members__.values():
-        try:
+        if model != pycolmap.CameraModelId.INVALID:
             lens = pycolmap.Camera.create_from_model_id(1, model, 1.0, 9, 9)
-        except Exception:  # INVALID is listed, but is no lens
-            continue
-        counts[int(model)] = len(lens.params)
+            counts[int(model)] = len(lens.params)
     return counts
 
 

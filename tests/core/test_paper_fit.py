@@ -9,37 +9,20 @@ import pytest
 
 from patina.core.angles import Angles
 from patina.core.basis import Basis
-from patina.core.capture import read_capture
 from patina.core.errors import FitError
 from patina.core.fit import PaperSettings, fit_paper, reliability, selection
 from patina.core.fit.held_out import leave_out, photos_to_hold_out, summarise
 from patina.core.fit.ridge import solve
 from patina.core.fit.spread import candidate_spread
-from patina.core.geometry import RayScene, view_surface
-from patina.core.job import inputs
 from patina.core.predict import similarity_sums
-from patina.core.samples import Margins, SampleTable, sample_photo
-from patina.core.samples.take import light_surface, trusted_pixels
+from patina.core.samples import SampleTable
 from tests import make_capture as made
+from tests.sampled import sampled
 
 
 @pytest.fixture(scope="module")
 def table(tmp_path_factory: pytest.TempPathFactory) -> SampleTable:
-    return sampled(made.make_capture(tmp_path_factory.mktemp("ball")))
-
-
-def sampled(path: Path) -> SampleTable:
-    capture = read_capture(path)
-    scan = inputs.open_scan(capture)
-    rays = RayScene.build(scan.mesh)
-    found = []
-    for place, photo in enumerate(capture.photos):
-        light = capture.light(photo.light)
-        view = view_surface(rays, inputs.camera_of(capture, scan, place))
-        lighting = light_surface(rays, view, light)
-        keep = trusted_pixels(view, lighting, Margins())
-        found.append(sample_photo(view, lighting, light, inputs.radiance_of(capture, place), keep))
-    return SampleTable.join(found)
+    return sampled(made.make_capture(tmp_path_factory.mktemp("ball")))[0]
 
 
 def test_ridge_solves_the_regularised_normal_equations() -> None:
@@ -165,9 +148,9 @@ def test_equal_candidates_have_no_spread() -> None:
 
 def test_unknown_irradiance_is_one_scale(tmp_path: Path) -> None:
     path = made.make_capture(tmp_path / "ball", photos=2)
-    known = sampled(path)
+    known, _ = sampled(path)
     path.write_text(path.read_text().replace("irradiance = [3.0, 3.0, 3.0]\n", ""))
-    unknown = sampled(path)
+    unknown, _ = sampled(path)
     assert np.allclose(unknown.rho, known.rho * made.IRRADIANCE, rtol=1e-5)
 
 

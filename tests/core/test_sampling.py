@@ -8,15 +8,13 @@ import numpy as np
 import pytest
 
 from patina.core.angles import half_difference
-from patina.core.capture import read_capture
-from patina.core.geometry import RayScene, edges, view_surface
+from patina.core.geometry import RayScene, edges
 from patina.core.geometry.curvature import mean_curvature
-from patina.core.job import inputs
-from patina.core.samples import Margins, SampleTable, sample_photo
+from patina.core.samples import SampleTable
 from patina.core.samples.face_votes import FaceVotes
-from patina.core.samples.take import light_surface, trusted_pixels
 from patina.core.scan import Mesh
 from tests import make_capture as made
+from tests.sampled import sampled
 
 
 @pytest.fixture(scope="module")
@@ -26,18 +24,7 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def tables(ball: Path) -> tuple[SampleTable, list]:
-    capture = read_capture(ball)
-    scan = inputs.open_scan(capture)
-    rays = RayScene.build(scan.mesh)
-    found, views = [], []
-    for place, photo in enumerate(capture.photos):
-        light = capture.light(photo.light)
-        view = view_surface(rays, inputs.camera_of(capture, scan, place))
-        lighting = light_surface(rays, view, light)
-        keep = trusted_pixels(view, lighting, Margins())
-        found.append(sample_photo(view, lighting, light, inputs.radiance_of(capture, place), keep))
-        views.append(view)
-    return SampleTable.join(found), views
+    return sampled(ball)
 
 
 def test_samples_read_the_true_reflectance(tables: tuple[SampleTable, list]) -> None:
