@@ -17,7 +17,6 @@ import sys
 from pathlib import Path
 from typing import NoReturn
 
-INSTALLED = "bl_ext.user_default.patina"
 COMMANDS = {
     "fit": "fit",
     "import": "import_",

@@ -14,7 +14,7 @@ USAGE = "usage: python3 run.py COMMAND ...  (--help after a command says more)"
 
 COMMANDS = {
     "demo": ("tools.headless:demo", "all of it on the embedded capture, into ./patina-demo"),
-    "headless": ("tools.headless:main", "a headless command: fit, diagnose, material, ..."),
+    "headless": ("tools.headless:main", "a headless command: fit, import, compare, basis ..."),
     "test": ("tools.checks:main", "ruff, mypy and pytest; with --blender also in Blender"),
     "build": ("tools.build:main", "the extension's zips, one per platform, into dist/"),
     "pictures": ("tools.make_pictures", "the pictures of docs/images, made anew"),

@@ -44,7 +44,3 @@ class InputError(PatinaError):
 
 class FitError(PatinaError):
     """The samples cannot support a fit (too few, all masked, nothing lit …)."""
-
-
-class Cancelled(PatinaError):
-    """The user asked a running job to stop."""

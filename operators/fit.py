@@ -24,10 +24,13 @@ class PATINA_OT_fit(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.scene.patina.capture:
-            return True
-        cls.poll_message_set("Import a capture first: it says which photos to measure")
-        return False
+        if not context.scene.patina.capture:
+            cls.poll_message_set("Import a capture first: it says which photos to measure")
+            return False
+        if context.scene.patina.stage:
+            cls.poll_message_set("A fit is running; ESC stops it")
+            return False
+        return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
@@ -74,6 +77,7 @@ class PATINA_OT_fit(bpy.types.Operator):
     def _start(self, context: bpy.types.Context) -> None:
         path = Path(bpy.path.abspath(context.scene.patina.capture))
         self._job, self._timer = FitJob(read_capture(path)), None
+        self._scene = context.scene.name  # by name: a reference does not survive undo
 
     def _show(self, context: bpy.types.Context) -> None:
         state = context.scene.patina
@@ -92,7 +96,11 @@ class PATINA_OT_fit(bpy.types.Operator):
         result = self._job.result
         if result is None:
             return
-        notes = apply_result(context.scene, result, self._job.stages)
+        scene = bpy.data.scenes.get(self._scene)
+        if scene is None:
+            self.report({"WARNING"}, "The scene is gone; the materials were not applied")
+            return
+        notes = apply_result(scene, result, self._job.stages)
         for material in result.materials:
             for warning in material.warnings:
                 self.report({"WARNING"}, f"{material.name}: {warning}")

@@ -27,22 +27,7 @@ class PATINA_OT_import_capture(bpy.types.Operator):
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})  # type: ignore[valid-type]
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        path = Path(bpy.path.abspath(self.filepath))
-        try:
-            capture = read_capture(path)
-            scan = inputs.open_scan(capture)
-            inputs.check_photos(capture, scan)
-            made = create_scan_collection(context.scene, capture, scan, rectified_folder(path))
-        except PatinaError as error:
-            return refuse(self, error)
-        context.scene.patina.capture = str(path)
-        context.scene.patina.mesh = made.mesh
-        self.report(
-            {"INFO"},
-            f"{len(made.cameras)} cameras, {len(capture.photos)} lit photos, "
-            f"{len(scan.mesh.faces):,} faces",
-        )
-        return {"FINISHED"}
+        return bring_in(self, context, Path(bpy.path.abspath(self.filepath)))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if self.filepath:
@@ -59,7 +44,26 @@ class PATINA_OT_import_demo(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return bpy.ops.patina.import_capture("EXEC_DEFAULT", filepath=str(DEMO))
+        return bring_in(self, context, DEMO)
+
+
+def bring_in(operator: bpy.types.Operator, context: bpy.types.Context, path: Path) -> set[str]:
+    """Read everything, then make everything; a mistake is reported and makes nothing."""
+    try:
+        capture = read_capture(path)
+        scan = inputs.open_scan(capture)
+        inputs.check_photos(capture, scan)
+        made = create_scan_collection(context.scene, capture, scan, rectified_folder(path))
+    except PatinaError as error:
+        return refuse(operator, error)
+    context.scene.patina.capture = str(path)
+    context.scene.patina.mesh = made.mesh
+    operator.report(
+        {"INFO"},
+        f"{len(made.cameras)} cameras, {len(capture.photos)} lit photos, "
+        f"{len(scan.mesh.faces):,} faces",
+    )
+    return {"FINISHED"}
 
 
 CLASSES = (PATINA_OT_import_capture, PATINA_OT_import_demo)

@@ -9,7 +9,7 @@ import bpy
 from ..operators.look_through import lit_cameras
 from ..scene.apply import measured_materials
 from ..scene.materials import REASON_PROPERTY
-from ..scene.properties import stored_result
+from ..scene.properties import capture_path, stored_result
 
 
 class _Stage:
@@ -63,7 +63,7 @@ class PATINA_PT_fit(_Stage, bpy.types.Panel):
             layout.label(text="ESC cancels", icon="CANCEL")
             return
         layout.operator("patina.fit", icon="SHADERFX")
-        result = stored_result()
+        result = stored_result(capture_path(context.scene))
         for material in (result or {}).get("materials", []):
             box = layout.box()
             box.label(text=material["name"], icon="MATERIAL")

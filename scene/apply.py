@@ -11,7 +11,8 @@ from ..core.report.result_json import describe
 from . import materials, meshes, osl_files
 from .properties import store_result
 
-MEASURED = "patina_measured"  # on the material: the name it has in the capture
+MEASURED = "patina_measured"  # on the material: the name it has in its capture
+CAPTURE = "patina_capture"  # on the material: the capture file it was measured from
 
 
 def measured_materials() -> list[bpy.types.Material]:
@@ -25,16 +26,18 @@ def apply_result(
     """Make the materials, put them on the scanned mesh where it is in the scene, and keep the
     description. Returns notes for the user. A material of an earlier fit is replaced."""
     atlas = osl_files.ensure_components(result.basis)
+    capture = str(result.capture.file)
     notes: list[str] = []
     made = []
     for fitted in result.materials:
-        old = next((m for m in measured_materials() if m[MEASURED] == fitted.name), None)
+        old = next((m for m in measured_materials() if _is(m, fitted.name, capture)), None)
         new = materials.create_material(fitted.name, fitted.fit.brdf, fitted.principled, atlas)
-        new[MEASURED] = fitted.name
+        new[MEASURED], new[CAPTURE] = fitted.name, capture
         if old is not None:
+            name = old.name
             old.user_remap(new)
             bpy.data.materials.remove(old)
-            new.name = fitted.name
+            new.name = name
         if materials.REASON_PROPERTY in new:
             notes.append(
                 f"{fitted.name}: only the Principled fit is wired, "
@@ -42,7 +45,13 @@ def apply_result(
             )
         made.append(new)
     mesh = scene.patina.mesh
-    if mesh is not None and mesh.type == "MESH":
-        meshes.assign_materials(mesh, made, result.face_material)
-    store_result(describe(result, stages, notes))
+    if mesh is None or mesh.type != "MESH" or mesh.name not in scene.objects:
+        notes.append("the scanned mesh is not in this scene: materials were made, not assigned")
+    elif not meshes.assign_materials(mesh, made, result.face_material):
+        notes.append(f"{mesh.name} no longer has the scan's faces: all wear the first material")
+    store_result(capture, describe(result, stages, notes))
     return notes
+
+
+def _is(material: bpy.types.Material, name: str, capture: str) -> bool:
+    return material[MEASURED] == name and material.get(CAPTURE) == capture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -92,7 +93,9 @@ def _save(path: Path, final: Path) -> None:
         picture = Path(image.filepath)
         if picture.is_relative_to(here):
             picture = there / picture.relative_to(here)
-        image.filepath = bpy.path.relpath(str(picture), start=str(there))
+        image.filepath = str(picture)
+        with contextlib.suppress(ValueError):  # on another drive: stays absolute
+            image.filepath = bpy.path.relpath(str(picture), start=str(there))
     try:
         bpy.ops.wm.save_as_mainfile(
             filepath=str(path), check_existing=False, compress=True, relative_remap=False

@@ -42,8 +42,16 @@ class Lamp:
 
 def scene_lamps(scene: bpy.types.Scene) -> list[Lamp]:
     """Every lamp that shines in the render, brightest first."""
-    rows = [_row(o) for o in scene.objects if o.type == "LIGHT" and not o.hide_render]
-    return sorted((r for r in rows if max(r.power) > 0), key=lambda r: -max(r.power))
+    rows = [_row(o) for o in _rendered(scene.collection) if o.type == "LIGHT"]
+    return sorted((r for r in rows if max(r.power) > 0), key=lambda r: (-max(r.power), r.at))
+
+
+def _rendered(collection: bpy.types.Collection) -> set[bpy.types.Object]:
+    """The objects below a collection that are not hidden in renders, by themselves or with it."""
+    if collection.hide_render:
+        return set()
+    found = {o for o in collection.objects if not o.hide_render}
+    return found.union(*(_rendered(child) for child in collection.children))
 
 
 def update_lamps(scene: bpy.types.Scene) -> int:

@@ -52,11 +52,14 @@ def assign_materials(
     target: bpy.types.Object,
     materials: list[bpy.types.Material],
     face_material: NDArray[np.int32],
-) -> None:
-    """Give every face the material of its number; the object's own materials are replaced."""
+) -> bool:
+    """Give every face the material of its number; the object's own materials are replaced. False
+    where the object no longer has the scan's faces: all of it then wears the first material."""
     target.data.materials.clear()
     for material in materials:
         target.data.materials.append(material)
-    if len(target.data.polygons) == len(face_material):
+    same = len(target.data.polygons) == len(face_material)
+    if same:
         target.data.polygons.foreach_set("material_index", face_material.astype(np.int32))
         target.data.update()
+    return same or len(materials) < 2

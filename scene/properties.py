@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import bpy
 
 TEXT_NAME = "Patina result"
+CAPTURE_KEY = "patina_capture"
 
 
 class PatinaScene(bpy.types.PropertyGroup):
@@ -34,17 +36,18 @@ class PatinaScene(bpy.types.PropertyGroup):
     )
 
 
-def store_result(description: dict[str, Any]) -> None:
-    """Keep a fit's description (result.json) in the .blend, as a text data-block."""
-    text = bpy.data.texts.get(TEXT_NAME) or bpy.data.texts.new(TEXT_NAME)
+def store_result(capture: str, description: dict[str, Any]) -> None:
+    """Keep a fit's description (result.json) in the .blend, one text data-block a capture."""
+    text = _text(capture) or bpy.data.texts.new(TEXT_NAME)
+    text[CAPTURE_KEY] = capture
     text.clear()
     text.write(json.dumps(description, indent=1))
     text.use_fake_user = True
 
 
-def stored_result() -> dict[str, Any] | None:
-    """The description of the last fit in this .blend, or None."""
-    text = bpy.data.texts.get(TEXT_NAME)
+def stored_result(capture: str) -> dict[str, Any] | None:
+    """The description of the last fit of that capture in this .blend, or None."""
+    text = _text(capture)
     if text is None:
         return None
     try:
@@ -52,6 +55,16 @@ def stored_result() -> dict[str, Any] | None:
     except ValueError:  # the artist typed into it
         return None
     return found if isinstance(found, dict) else None
+
+
+def capture_path(scene: bpy.types.Scene) -> str:
+    """The scene's capture file as an absolute path, "" where there is none."""
+    told = scene.patina.capture
+    return str(Path(bpy.path.abspath(told)).resolve()) if told else ""
+
+
+def _text(capture: str) -> bpy.types.Text | None:
+    return next((t for t in bpy.data.texts if t.get(CAPTURE_KEY) == capture), None)
 
 
 def register() -> None:

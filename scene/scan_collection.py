@@ -36,18 +36,23 @@ def create_scan_collection(
     rectified: folder for resampled photos of distorted lenses.
     """
     name = capture.file.name.removesuffix(".toml").removesuffix(".capture")
+    # photos first: one that cannot be read must leave nothing behind
+    own = _own_photos(scan.cameras, scan.images, rectified)
+    lit = []
+    for photo in capture.photos:
+        camera = scan.camera(photo.camera)
+        if camera is not None:
+            shown = photos.photo_for(camera, photo.file, rectified)
+            lit.append((camera.label, shown, photo.file.name))
     top, camera_room, light_room = _rooms(scene, name, ("cameras", "lights"))
     used = scan.mesh.vertices[np.unique(scan.mesh.faces)]
     origin = frame_origin(used)
     centre = 0.5 * (used.min(axis=0) + used.max(axis=0)) - origin
     mesh = meshes.create_mesh_object(name, scan.mesh, origin, top)
-    made = _cameras(scan.cameras, scan.images, origin, centre, camera_room, rectified)
-    for photo in capture.photos:
-        camera = scan.camera(photo.camera)
-        if camera is not None:
-            shown = photos.photo_for(camera, photo.file, rectified)
-            cameras.put_photo_behind(made[camera.label], shown)
-            made[camera.label]["patina_lit"] = photo.file.name
+    made = _cameras(scan.cameras, own, origin, centre, camera_room)
+    for label, shown, photo_name in lit:
+        cameras.put_photo_behind(made[label], shown)
+        made[label]["patina_lit"] = photo_name
     suns = {
         light.name: lights.create_sun(light, centre, scan.mesh.size, light_room)
         for light in capture.lights
@@ -70,13 +75,14 @@ def create_reconstruction(
     rectified: Path,
 ) -> None:
     """A reconstruction without a mesh: its cameras and its sparse points."""
+    own = _own_photos(found, images, rectified)
     top, camera_room = _rooms(scene, name, ("cameras",))
     positions = points[0] if len(points[0]) else np.array([c.pose.centre for c in found])
     origin = frame_origin(positions)
     centre = np.median(positions, axis=0) - origin
     if len(points[0]):
         meshes.create_points_object(f"{name} points", points[0] - origin, points[1], top)
-    made = _cameras(found, images, origin, centre, camera_room, rectified)
+    made = _cameras(found, own, origin, centre, camera_room)
     cameras.look_through(scene, next(iter(made.values())))
 
 
@@ -94,21 +100,28 @@ def _rooms(
 
 def _cameras(
     found: Sequence[Camera],
-    images: Path | None,
+    own: dict[str, Path],
     origin: NDArray[np.float64],
     centre: NDArray[np.float64],
     room: bpy.types.Collection,
-    rectified: Path,
 ) -> dict[str, bpy.types.Object]:
     made = {}
     for camera in found:
         distance = float(np.linalg.norm(camera.pose.centre - origin - centre))
         made[camera.label] = cameras.create_camera(camera, origin, distance, room)
-        own = _own_photo(images, camera.label)
-        if own is not None:
-            shown = photos.photo_for(camera, own, rectified)
-            cameras.put_photo_behind(made[camera.label], shown)
+        if camera.label in own:
+            cameras.put_photo_behind(made[camera.label], own[camera.label])
     return made
+
+
+def _own_photos(found: Sequence[Camera], images: Path | None, rectified: Path) -> dict[str, Path]:
+    """The scan's own photos, where it is known where they lie: label → file to show."""
+    there = ((camera, _own_photo(images, camera.label)) for camera in found)
+    return {
+        camera.label: photos.photo_for(camera, photo, rectified)
+        for camera, photo in there
+        if photo is not None
+    }
 
 
 def _own_photo(images: Path | None, label: str) -> Path | None:

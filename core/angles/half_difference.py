@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.floating]
+POLE = 1e-9  # sin θh below it is 0
 
 
 class Angles(NamedTuple):
@@ -35,8 +36,8 @@ def half_difference(normal: Array, light: Array, view: Array) -> Angles:
     """Angles of unit vectors (..., 3) that point AWAY from the surface, in any common frame.
 
     Exact at the poles: atan2 of cross and dot products, never acos. Where θh = 0 the azimuth of
-    the half vector is undefined; φd is then measured from an arbitrary but fixed tangent. Where
-    θd = 0, φd is 0.
+    the half vector is undefined, and φd is 90°, the value that treats light and view alike: the
+    angles of a pair of vectors do not depend on the frame they are given in. Where θd = 0, φd is 0.
     """
     half = light + view
     length = np.linalg.norm(half, axis=-1, keepdims=True)
@@ -46,12 +47,13 @@ def half_difference(normal: Array, light: Array, view: Array) -> Angles:
     sin_h = np.linalg.norm(binormal, axis=-1)
     theta_h = np.arctan2(sin_h, _dot(normal, half))
     binormal = np.where(
-        sin_h[..., None] > 1e-9, binormal / np.maximum(sin_h, 1e-9)[..., None], _perpendicular(half)
+        sin_h[..., None] > POLE, binormal / np.maximum(sin_h, 1e-9)[..., None], _perpendicular(half)
     )
     tangent = np.cross(binormal, half)
     d_x, d_y = _dot(light, tangent), _dot(light, binormal)
     theta_d = np.arctan2(np.hypot(d_x, d_y), _dot(light, half))
-    return Angles(theta_h, theta_d, fold_phi_d(np.arctan2(d_y, d_x)))
+    phi_d = np.where(sin_h > POLE, np.arctan2(d_y, d_x), np.pi / 2)
+    return Angles(theta_h, theta_d, fold_phi_d(phi_d))
 
 
 def light_view(theta_h: Array, theta_d: Array, phi_d: Array) -> tuple[Array, Array]:

@@ -26,6 +26,8 @@ HORIZON = np.radians(82.0)  # light and view farther from the normal than this d
 NODES = (44, 12, 8)
 COARSE = (44, 6, 4)  # as fine along θh, where lobes are sharp; enough to tell the starts apart
 KNEE = np.radians(0.4)
+SIMPLER = 1.15  # a pure dielectric or metal may be this much farther off than a mixture
+METALLIC, PINNED = 3, 1e-3
 COAT_GAIN = 0.9  # a coat must bring the error below this fraction of what goes without it
 COAT_FROM = 0.01  # and is not worth having where the error is smaller than this already
 
@@ -60,7 +62,8 @@ def fit_principled(
 ) -> PrincipledFit:
     """The Principled nearest to ``evaluate(angles) -> (n, 3)``, ρ in 1/sr.
 
-    coat: allow a second lobe where it lowers the error by more than a tenth.
+    coat: allow a second lobe where it lowers the error by more than a tenth. A pure dielectric or a
+    pure metal is taken where it comes nearly as near as a mixture: no surface is half a metal.
     """
     target, coarse = _Target.of(evaluate, nodes), _Target.of(evaluate, COARSE)
     mean = target.lambertian()
@@ -74,11 +77,12 @@ def fit_principled(
     }
     found = {name: _descend(coarse, np.array(x), free=6) for name, x in starts.items()}
     best = min(found, key=lambda name: target.error(_principled(found[name])))
-    found[best] = _descend(target, found[best], free=6)
+    mixed = _descend(target, found[best], free=6)
+    found[best] = _purest(target, mixed, free=6)
     if coat and target.error(_principled(found[best])) > COAT_FROM:
-        start = found[best].copy()
+        start = mixed.copy()
         start[6:] = 0.5, np.clip(0.4 * start[4], 0.05, 0.6)
-        found["coated"] = _descend(target, start, free=8)
+        found["coated"] = _purest(target, _descend(target, start, free=8), free=8)
     errors = {name: target.error(_principled(x)) for name, x in found.items()}
     if "coated" in errors and errors["coated"] < COAT_GAIN * errors[best]:
         best = "coated"
@@ -157,18 +161,36 @@ def _principled(x: Array) -> Principled:
     )
 
 
-def _descend(target: _Target, start: Array, free: int) -> Array:
-    """Least squares over the first ``free`` unknowns; the others stay as they start."""
+def _descend(target: _Target, start: Array, free: int, metallic: float | None = None) -> Array:
+    """Least squares over the first ``free`` unknowns; the others stay as they start, and so does
+    metallic where it is given."""
+    low, high = LOWER[:free].copy(), UPPER[:free].copy()
+    if metallic is not None:
+        low[METALLIC] = max(metallic - PINNED, 0.0)
+        high[METALLIC] = min(metallic + PINNED, 1.0)
 
     def residual(x: Array) -> Array:
         return target.residual(_principled(np.concatenate([x, start[free:]]))).ravel()
 
-    low, high = LOWER[:free], UPPER[:free]
-    inside = np.clip(start[:free], low + 1e-3, high - 1e-3)
+    margin = np.minimum(1e-3, 0.25 * (high - low))
+    inside = np.clip(start[:free], low + margin, high - margin)
     result = least_squares(
         residual, inside, bounds=(low, high), diff_step=1e-4, xtol=1e-5, ftol=1e-6, max_nfev=40
     )
-    return np.concatenate([_settle(result.x), start[free:]])
+    settled = _settle(result.x)
+    if metallic is not None:
+        settled[METALLIC] = metallic
+    return np.concatenate([settled, start[free:]])
+
+
+def _purest(target: _Target, mixed: Array, free: int) -> Array:
+    """The pure dielectric or metal that is nearly as near as the mixture, else the mixture."""
+    within = SIMPLER * target.error(_principled(mixed)) + 1e-4
+    for pure in (0.0, 1.0):
+        x = _descend(target, mixed, free, metallic=pure)
+        if target.error(_principled(x)) < within:
+            return x
+    return mixed
 
 
 def _settle(x: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -60,6 +61,10 @@ class Capture:
     def light(self, name: str) -> DistantLight:
         """The light of that name (the reader has checked that it is there)."""
         return next(light for light in self.lights if light.name == name)
+
+    def photo_name(self, place: int) -> str:
+        """A photo's file relative to the capture file: two folders may hold the same name."""
+        return Path(os.path.relpath(self.photos[place].file, self.file.parent)).as_posix()
 
     def named_by_masks(self, material: str) -> bool:
         """True where some photo's mask says where this material is."""

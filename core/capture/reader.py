@@ -52,6 +52,15 @@ def read_capture(path: Path) -> Capture:
     materials = tuple(_material(section) for section in top.tables("material"))
     _refuse_twins(top, "light", [light.name for light in lights])
     _refuse_twins(top, "material", [material.name for material in materials])
+    known = [light.irradiance is not None for light in lights]
+    if any(known) and not all(known):
+        place = known.index(False)
+        raise top.error(
+            "the irradiance is missing here and given for other lights: give all or none",
+            "light",
+            place,
+            "irradiance",
+        )
     photos = tuple(
         _photo(section, {light.name for light in lights}, {m.name for m in materials})
         for section in top.tables("photo")
@@ -183,6 +192,7 @@ def _fit(section: Section) -> FitOptions:
         margins=Margins(
             silhouette=section.integer("silhouette_margin", margins.silhouette, 0, 100),
             shadow=section.integer("shadow_margin", margins.shadow, 0, 100),
+            mask=section.integer("mask_margin", margins.mask, 0, 100),
             cosine=section.number("smallest_cosine", margins.cosine, 0.001, 0.99),
         ),
         paper=PaperSettings(

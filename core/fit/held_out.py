@@ -20,7 +20,7 @@ DARK = 0.05  # of the median radiance: below it relative errors are those of the
 @dataclass(frozen=True)
 class LeftOut:
     """One photo predicted from the others. missed, size: sums of squares of L̂ − L and of L;
-    relative: (m,) |L̂ − L| / L of its pixels that are not dark, channel means."""
+    relative: (m,) channels' mean |L̂ − L| over mean L, of its pixels that are not dark."""
 
     photo: int
     missed: float
@@ -32,7 +32,7 @@ class LeftOut:
 class HeldOut:
     """per_photo: photo index → relative RMS error ‖L̂ − L‖ / ‖L‖ of its lit pixels, all channels,
     predicted from the other photos. error: the same over all of them together. typical: median
-    over all pixels of |L̂ − L| / L, channel means: what most of the surface is off by."""
+    over all pixels of the channels' mean |L̂ − L| over mean L: what most of it is off by."""
 
     error: float
     typical: float
@@ -62,7 +62,7 @@ def leave_out(
         photo=photo,
         missed=float(np.sum(np.square(difference, dtype=np.float64))),
         size=float(np.sum(np.square(held.radiance, dtype=np.float64))),
-        relative=np.abs(difference.mean(axis=1))[bright] / level[bright],
+        relative=np.abs(difference).mean(axis=1)[bright] / level[bright],
     )
 
 

@@ -1,11 +1,17 @@
 """The paper's estimator: Ono et al. 2019, "Practical BRDF reconstruction using reliable geometric
 regions from multi-view stereo", section 3. Every assumption can be switched off; with all three off
 it is Nielsen et al. 2015 on random subsets of the photos' pixels.
+
+Where the paper leaves room:
+- "keep drawing until the chosen set is monotone" is met by letting only samples into the set that
+  are monotone with those already in it. Taken literally it hardly ever ends: of 150 sets chosen for
+  their condition number alone, 0 to 11 are monotone on the captures we measured.
+- the similarity of prediction and photos is taken over the pixels the margins trust, of this
+  material, as one vector of radiances.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,7 +23,6 @@ from ..predict import similarity_sums
 from ..samples import SampleTable
 from . import reliability, ridge, selection
 
-Progress = Callable[[float], None]
 REDRAWS = 20  # subsets tried before a trial gives up on the monotonicity constraint
 
 
@@ -56,7 +61,6 @@ def fit_paper(
     table: SampleTable,
     basis: Basis,
     settings: PaperSettings | None = None,
-    progress: Progress = lambda fraction: None,
 ) -> PaperFit:
     """Fit one material. Raises FitError where too few samples are reliable."""
     s = settings or PaperSettings()
@@ -73,9 +77,8 @@ def fit_paper(
     peak = reliability.highest_intensity(table) if s.highest_intensity else None
     rng = np.random.default_rng(s.seed)
     trials = []
-    for trial in range(s.trials):
+    for _ in range(s.trials):
         trials.append(_one_trial(table, reliable, peak, basis, s, rng, warnings))
-        progress(trial / s.trials)
     candidates = np.stack([coefficients for coefficients, _, _ in trials])
     similarity = similarity_sums(basis, candidates, table)
     best = int(similarity.argmax())
@@ -106,19 +109,19 @@ def _one_trial(
         if peak is not None:
             drawn = _prepend(peak[1], drawn)
         q = basis.rows(drawn.angles, s.samples)[1]
-        cos_h, brightness = np.cos(drawn.theta_h), drawn.rho.mean(axis=1)
+        theta_h, brightness = drawn.theta_h, drawn.rho.mean(axis=1)
         last = redraw == REDRAWS
         free = not s.monotonicity or last
 
         def allowed(
             chosen: NDArray[np.intp],
-            cos_h: NDArray[np.floating] = cos_h,
+            theta_h: NDArray[np.floating] = theta_h,
             brightness: NDArray[np.floating] = brightness,
             free: bool = free,
         ) -> NDArray[np.bool_]:
             if free:
-                return np.ones(len(cos_h), bool)
-            return reliability.monotone_with(cos_h, brightness, chosen)
+                return np.ones(len(theta_h), bool)
+            return reliability.monotone_with(theta_h, brightness, chosen)
 
         chosen = selection.choose(q, s.samples, allowed, fixed=None if peak is None else 0)
         if chosen is not None:

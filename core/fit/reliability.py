@@ -16,22 +16,28 @@ def calm(table: SampleTable, threshold: float) -> NDArray[np.bool_]:
 
 
 def monotone_with(
-    cos_h: NDArray[np.floating], rho: NDArray[np.floating], chosen: NDArray[np.intp]
+    theta_h: NDArray[np.floating], rho: NDArray[np.floating], chosen: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
     """(n,) samples that stand to every chosen one as n·h does: larger n·h ⇔ larger ρ.
 
-    cos_h, rho: (n,), rho the mean over the channels (Higo et al. 2010's monotonicity).
+    theta_h, rho: (n,), rho the mean over the channels (Higo et al. 2010's monotonicity). θh stands
+    for n·h, which in float32 is 1 for everything within 0.02° of the peak.
     """
-    agree = np.ones(len(cos_h), bool)
+    agree = np.ones(len(theta_h), bool)
     for i in chosen:
-        agree &= (cos_h - cos_h[i]) * (rho - rho[i]) > 0
+        agree &= (theta_h[i] - theta_h) * (rho - rho[i]) > 0
     return agree
 
 
 def highest_intensity(table: SampleTable) -> tuple[int, SampleTable]:
     """(row, table of that one sample) of the brightest pixel, its normal replaced by the half
-    vector: the paper takes it for the specular peak, so θh = 0 there."""
-    row = int(table.radiance.mean(axis=1).argmax())
+    vector: the paper takes it for the specular peak, so θh = 0 there.
+
+    Brightest for the light it was given (L / E: lamps may differ in strength), among the samples
+    that the margins trust.
+    """
+    given = table.irradiance.astype(np.float32)[table.photo]
+    row = int((table.radiance / given).mean(axis=1).argmax())
     one = table.select(np.array([row]))
     light = one.light[one.photo]
     half = light + one.view

@@ -13,8 +13,8 @@ from ..basis import Basis
 
 @dataclass(frozen=True)
 class Spread:
-    """Standard deviation of ln ρ between the trials over directions with light and view within
-    80° of the normal. Spread between random subsets, NOT a calibrated interval."""
+    """Standard deviation of ln(ρ·cosMap + ε) between the trials, over directions with light and
+    view within 80° of the normal. Spread between random subsets, NOT a calibrated interval."""
 
     median: float
     percentile_90: float

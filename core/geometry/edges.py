@@ -44,6 +44,13 @@ def shadow_edge(lit: NDArray[np.bool_], seen: NDArray[np.bool_]) -> NDArray[np.b
     return edge
 
 
+def inside(part: NDArray[np.bool_], seen: NDArray[np.bool_], margin: int) -> NDArray[np.bool_]:
+    """(h, w) pixels of ``part`` farther than ``margin`` pixels from surface that is not of it."""
+    if margin <= 0:
+        return part
+    return part & ~widen(seen & ~part, margin)
+
+
 def widen(edge: NDArray[np.bool_], pixels: int) -> NDArray[np.bool_]:
     """Everything within ``pixels`` of an edge pixel (diamonds and squares in turn: near a disc)."""
     for step in range(pixels):

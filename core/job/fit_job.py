@@ -15,9 +15,10 @@ from ..errors import FitError
 from ..fit import PaperFit, fit_paper
 from ..fit.held_out import HeldOut, leave_out, photos_to_hold_out, summarise
 from ..fit.spread import Spread, candidate_spread
-from ..geometry import RayScene, view_surface
+from ..geometry import RayScene, edges, view_surface
 from ..samples import SampleTable, sample_photo
 from ..samples.face_votes import FaceVotes
+from ..samples.level import at_typical_level
 from ..samples.take import light_surface, trusted_pixels
 from ..scan import Scan
 from . import inputs
@@ -28,7 +29,8 @@ LEAST_RHO, LARGEST_RHO = 1e-6, 1e4  # 1/sr: black velvet has 1e-3, mirrors' peak
 
 @dataclass(frozen=True)
 class MaterialResult:
-    """One fitted material. samples: number used; per_photo: samples of every photo."""
+    """One fitted material. samples: number used; per_photo: samples of every photo; scale: what
+    the photos' reflectance was multiplied by, 1 where the irradiance is known."""
 
     name: str
     fit: PaperFit
@@ -37,6 +39,7 @@ class MaterialResult:
     held_out: HeldOut | None
     spread: Spread
     principled: PrincipledFit
+    scale: float
     irradiance_known: bool
     warnings: tuple[str, ...]
 
@@ -51,7 +54,6 @@ class CaptureResult:
     basis: Basis
     materials: tuple[MaterialResult, ...]
     face_material: NDArray[np.int32]
-    warnings: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,6 @@ class FitJob(Job):
             basis=basis,
             materials=tuple(results),
             face_material=self._face_material(scan, taken.votes),
-            warnings=(),
         )
 
     def _take_samples(self, scan: Scan, rays: RayScene) -> Generator[Step, None, _Taken]:
@@ -120,8 +121,11 @@ class FitJob(Job):
                 pixels = where[material.name]
                 taken.marked[material.name] += int(pixels.sum())
                 taken.votes.add(index, view.face[pixels])
+                part = view.image(pixels, fill=0).astype(bool)
+                inner = edges.inside(part, view.seen, capture.fit.margins.mask)
+                keep = trusted & inner.ravel()[view.pixel]
                 taken.tables[material.name].append(
-                    sample_photo(view, lighting, light, radiance, trusted & pixels)
+                    sample_photo(view, lighting, light, radiance, keep)
                 )
         self._check_light(seen_by, lit_by)
         return taken
@@ -135,7 +139,11 @@ class FitJob(Job):
         start = 0.4 + share * index
         yield Step(f"fitting {name}", start)
         table = SampleTable.join(taken.tables.pop(name))
-        self._check_samples(index, table, taken.marked[name])
+        known = all(capture.light(photo.light).irradiance is not None for photo in capture.photos)
+        self._check_samples(index, table, taken.marked[name], known)
+        scale = 1.0
+        if not known:
+            table, scale = at_typical_level(table, basis)
         try:
             fit = fit_paper(table, basis, capture.fit.paper)
         except FitError as error:
@@ -149,7 +157,17 @@ class FitJob(Job):
             )
             left_out.append(leave_out(table, photo, basis, capture.fit.paper))
         yield Step(f"Principled material of {name}", start + 0.8 * share)
-        known = all(capture.light(photo.light).irradiance is not None for photo in capture.photos)
+        principled = fit_principled(fit.brdf.evaluate)
+        warnings = material_warnings(table, fit, known)
+        if None in left_out:
+            lost = [
+                capture.photo_name(photo)
+                for photo, part in zip(unseen, left_out, strict=True)
+                if part is None
+            ]
+            warnings += (f"without {', '.join(lost)} too little is left to fit",)
+        if principled.clipped:
+            warnings += ("brighter than any base colour: the Principled material is too dark",)
         return MaterialResult(
             name=name,
             fit=fit,
@@ -157,18 +175,19 @@ class FitJob(Job):
             per_photo=tuple(np.bincount(table.photo, minlength=len(capture.photos)).tolist()),
             held_out=summarise([part for part in left_out if part is not None]),
             spread=candidate_spread(basis, fit.candidates),
-            principled=fit_principled(fit.brdf.evaluate),
+            principled=principled,
+            scale=scale,
             irradiance_known=known,
-            warnings=material_warnings(table, fit, known),
+            warnings=warnings,
         )
 
     def _face_material(self, scan: Scan, votes: FaceVotes) -> NDArray[np.int32]:
-        """What the mesh says where a material is given by its faces, else what the masks say."""
-        for material in self.capture.materials:
+        """What masks say, and over it what the mesh says where a material is given by its faces."""
+        found = votes.winners(scan.mesh)
+        for index, material in enumerate(self.capture.materials):
             if material.faces is not None:
-                last = len(self.capture.materials) - 1
-                return scan.mesh.face_attributes[material.faces].clip(0, last)
-        return votes.winners(scan.mesh)
+                found[scan.mesh.face_attributes[material.faces] == index] = index
+        return found
 
     def _check_light(self, seen_by: dict[str, int], lit_by: dict[str, int]) -> None:
         if not any(seen_by.values()):
@@ -181,11 +200,11 @@ class FitJob(Job):
                     "light", place, "direction",
                 )  # fmt: skip
 
-    def _check_samples(self, index: int, table: SampleTable, marked: int) -> None:
+    def _check_samples(self, index: int, table: SampleTable, marked: int, known: bool) -> None:
         name = self.capture.materials[index].name
         if len(table):
             level = float(np.median(table.rho))
-            if not LEAST_RHO < level < LARGEST_RHO:
+            if level <= 0 or (known and not LEAST_RHO < level < LARGEST_RHO):
                 raise self.capture.error(
                     f"the typical reflectance of {name!r} is {level:.3g} / sr, which no surface "
                     "has: check that the photos are linear and not black, exposure and irradiance",

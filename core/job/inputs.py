@@ -109,13 +109,23 @@ def _one_material(
     index: int,
     masks: dict[str, NDArray[np.bool_]],
 ) -> NDArray[np.bool_]:
+    """Where its faces and masks say; a material with neither is what no other one claims."""
     pixels = np.ones(len(view.pixel), bool)
     if material.faces is not None:
         pixels = scan.mesh.face_attributes[material.faces][view.face] == index
     if material.name in masks:
         return pixels & masks[material.name]
-    if material.faces is None and capture.named_by_masks(material.name):
-        return np.zeros_like(pixels)  # painted in other photos: here it was not looked for
+    if material.faces is not None:
+        return pixels
+    if any(capture.named_by_masks(m.name) for m in capture.materials) and not masks:
+        return np.zeros_like(pixels)  # painted in other photos: here nobody looked
+    if capture.named_by_masks(material.name):
+        return np.zeros_like(pixels)
+    for other, entry in enumerate(capture.materials):
+        if other != index and entry.faces is not None:
+            pixels &= scan.mesh.face_attributes[entry.faces][view.face] != other
+    for mask in masks.values():
+        pixels &= ~mask
     return pixels
 
 

@@ -30,18 +30,19 @@ def predict_photo(
     rays: RayScene,
     view: SurfaceView,
     light: DistantLight,
-    parts: list[tuple[NDArray[np.bool_], PrincipalBRDF]],
+    parts: list[tuple[NDArray[np.bool_], PrincipalBRDF, float]],
 ) -> PredictedPhoto:
-    """parts: ((n,) pixels of the view, BRDF) of every material."""
+    """parts: ((n,) pixels of the view, BRDF, its scale) of every material; the scale is what the
+    BRDF is too large by where the irradiance is unknown."""
     lighting = light_surface(rays, view, light)
     values = np.full((len(view.pixel), 3), np.nan, np.float32)
-    for pixels, brdf in parts:
+    for pixels, brdf, scale in parts:
         values[pixels] = 0.0
         lit = pixels & ~lighting.shadowed
         angles = half_difference(view.normal[lit], light.direction[None, :], view.view[lit])
         values[lit] = (
             brdf.evaluate(angles)
-            * light.effective_irradiance.astype(np.float32)
+            * (light.effective_irradiance / scale).astype(np.float32)
             * lighting.cos_i[lit, None]
         )
     return PredictedPhoto(view.image(values))

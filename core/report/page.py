@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from html import escape
 from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
 
@@ -61,8 +62,9 @@ def _material_section(folder: Path, material: MaterialResult) -> str:
     warnings = "".join(f"<p class='warn'>{escape(w)}</p>" for w in material.warnings)
     rows = "".join(f"<tr><th>{key}</th><td>{value}</td></tr>" for key, value in _figures(material))
     return (
-        f"<h2>{escape(material.name)}</h2><div class='material'><figure><img src='{escape(name)}' "
-        f"alt='lit sphere'><figcaption>Lit sphere, key light π at the upper left</figcaption>"
+        f"<h2>{escape(material.name)}</h2><div class='material'><figure>"
+        f"<img src='{escape(quote(name))}' alt='lit sphere'>"
+        f"<figcaption>Lit sphere, key light π at the upper left</figcaption>"
         f"</figure><div>{warnings}<table>{rows}</table></div></div>"
         f"<div class='charts'>{charts}</div>"
     )
@@ -72,7 +74,7 @@ def _figures(material: MaterialResult) -> list[tuple[str, str]]:
     fit, p, spread = material.fit, material.principled.principled, material.spread
     held = material.held_out
     unseen = (
-        "only one photo: nothing to hold out"
+        "nothing could be held out: too few photos see it, or it was switched off"
         if held is None
         else f"predicts the typical pixel of an unseen photo to {100 * held.typical:.0f} %; "
         f"{100 * held.error:.0f} % relative RMS, which highlights dominate"
@@ -109,7 +111,7 @@ def _photo_row(folder: Path, result: CaptureResult, place: int) -> str:
     photo = capture.photos[place]
     view = view_surface(result.rays, inputs.camera_of(capture, result.scan, place))
     where, _ = inputs.material_pixels(capture, result.scan, view, place)
-    parts = [(where[m.name], m.fit.brdf) for m in result.materials]
+    parts = [(where[m.name], m.fit.brdf, m.scale) for m in result.materials]
     predicted = predict_photo(result.rays, view, capture.light(photo.light), parts)
     measured = inputs.radiance_of(capture, place)
     box = display.crop_box(view.seen, margin=12)
@@ -122,7 +124,7 @@ def _photo_row(folder: Path, result: CaptureResult, place: int) -> str:
     write_png(folder / names[2], display.difference_picture(b, a, 0.3 * white))
     error = _relative_error(predicted.radiance, measured)
     labels = (
-        f"{escape(photo.file.name)}: photo",
+        f"{escape(capture.photo_name(place))}: photo",
         "prediction",
         f"difference, relative RMS {100 * error:.1f} %",
     )

@@ -47,7 +47,7 @@ def describe(
         },
         "capture": str(result.capture.file),
         "materials": [_material(result, m) for m in result.materials],
-        "warnings": [*result.warnings, *notes],
+        "warnings": list(notes),
         "stages": [
             {"name": s.name, "seconds": round(s.seconds, 3), "peak_mb": _rounded(s.peak_mb, 1)}
             for s in stages
@@ -62,20 +62,22 @@ def _material(result: CaptureResult, material: MaterialResult) -> dict[str, Any]
         for i, photo in enumerate(photos)
     }
     chosen = fit.chosen
+    names = [result.capture.photo_name(place) for place in range(len(photos))]
     principled = material.principled
     return {
         "name": material.name,
         "estimator": "paper",
         "coefficients": fit.brdf.coefficients.tolist(),
         "scale_known": material.irradiance_known,
+        "scale": material.scale,
         "samples": {
             "used": material.samples,
             "on_calm_surface": fit.reliable,
-            "per_photo": dict(zip((p.file.name for p in photos), material.per_photo, strict=True)),
+            "per_photo": dict(zip(names, material.per_photo, strict=True)),
         },
         "chosen": [
             {
-                "photo": photos[int(chosen.photo[i])].file.name,
+                "photo": names[int(chosen.photo[i])],
                 "pixel": [
                     int(chosen.pixel[i] % width[int(chosen.photo[i])]),
                     int(chosen.pixel[i] // width[int(chosen.photo[i])]),
@@ -95,10 +97,10 @@ def _material(result: CaptureResult, material: MaterialResult) -> dict[str, Any]
             "measure": "relative RMS error of lit pixels, each photo predicted from the others",
             "error": held.error,
             "typical": held.typical,
-            "per_photo": {photos[i].file.name: e for i, e in held.per_photo.items()},
+            "per_photo": {names[i]: e for i, e in held.per_photo.items()},
         },
         "uncertainty": {
-            "measure": "standard deviation of ln(reflectance) between trials; not calibrated",
+            "measure": "std of ln(rho cosMap + 0.001) between trials; not calibrated",
             "median": material.spread.median,
             "percentile_90": material.spread.percentile_90,
             "at_highlight": material.spread.at_highlight,

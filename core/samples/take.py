@@ -16,12 +16,13 @@ from .table import SampleTable
 
 @dataclass(frozen=True)
 class Margins:
-    """What is too close to trust. silhouette, shadow: pixels left out around outlines and shadow
-    edges; cosine: smallest cos θi and cos θo (0.1 is 84°: beyond, a degree of normal error changes
-    the irradiance by a fifth)."""
+    """What is too close to trust. silhouette, shadow, mask: pixels left out along outlines, shadow
+    edges and the borders of painted masks; cosine: smallest cos θi and cos θo (0.1 is 84°: beyond,
+    a degree of normal error changes the irradiance by a fifth)."""
 
     silhouette: int = 2
     shadow: int = 3
+    mask: int = 1
     cosine: float = 0.1
 
 
@@ -50,7 +51,9 @@ def trusted_pixels(view: SurfaceView, lighting: Lighting, margins: Margins) -> N
     """(n,) lit pixels away from outlines, shadow edges and grazing angles."""
     cos_o = np.einsum("ij,ij->i", view.normal, view.view)
     lit = view.image(~lighting.shadowed, fill=0).astype(bool)
-    near = edges.widen(view.silhouette, margins.silhouette - 1)
+    near = np.zeros(view.shape, bool)
+    if margins.silhouette > 0:
+        near = edges.widen(view.silhouette, margins.silhouette - 1)
     if margins.shadow > 0:
         near = near | edges.widen(edges.shadow_edge(lit, view.seen), margins.shadow - 1)
     return (

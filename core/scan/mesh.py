@@ -92,7 +92,22 @@ def read_mesh(path: Path) -> Mesh:
         raise InputError("faces refer to vertices that are not there", file=path)
     if not np.isfinite(vertices).all():
         raise InputError("vertices are not finite numbers (NaN)", file=path)
-    return Mesh(vertices, faces, _integer_properties(joined, len(faces)))
+    keep = _proper(faces)
+    if not keep.any():
+        raise InputError("the mesh has no faces but degenerate ones", file=path)
+    attributes = _integer_properties(joined, len(faces))
+    return Mesh(vertices, faces[keep], {name: a[keep] for name, a in attributes.items()})
+
+
+def _proper(faces: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """(f,) faces with three different corners, the first of each that stands there twice: Blender
+    keeps no others, and face numbers must mean the same on both sides."""
+    a, b, c = faces.T
+    proper = (a != b) & (b != c) & (c != a)
+    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    once = np.zeros(len(faces), bool)
+    once[first] = True
+    return proper & once
 
 
 def _check_ply_counts(path: Path, vertices: int, faces: int) -> None:

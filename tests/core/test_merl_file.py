@@ -74,9 +74,14 @@ def test_interpolation_is_exact_at_centres_and_between_them(table: TabulatedBRDF
     assert np.allclose(table.nearest(at), table.values[(slice(None), *pick)].T)
 
 
-def test_genuine_numbers_scale_as_published(shared: Path) -> None:
-    """cherry-235's first genuine red value / 1500 is a plausible mirror-direction reflectance."""
-    rows = np.loadtxt(shared / "data" / "brdf" / "real_merl_anchor_raw_rows.txt")
-    values = np.full((3, *merl_grid.SHAPE), -1.0, np.float32)
-    values[0, 0, 0, :100] = rows[0, :100] * merl_file.SCALE[0]
-    assert np.isclose(values[0, 0, 0, 0], 102.69015502929687 / 1500, rtol=1e-6)
+def test_genuine_numbers_read_as_published(shared: Path, tmp_path: Path) -> None:
+    """Raw numbers of genuine files, written by hand at their place, read as raw / 1500."""
+    raw = np.loadtxt(shared / "data" / "brdf" / "real_merl_anchor_raw_rows.txt").reshape(3, 100)
+    path = tmp_path / "genuine.binary"
+    for row in raw:
+        numbers = np.full(3 * merl_file.CELLS, -1.0)
+        numbers[:100] = row  # θh = θd = 0, φd bins 0–99, red
+        path.write_bytes(np.array([90, 90, 180], "<i4").tobytes() + numbers.astype("<f8").tobytes())
+        table = merl_file.read(path)
+        assert np.allclose(table.values[0, 0, 0, :100], row / 1500, rtol=1e-6)
+        assert (table.values[1:, 0, 0, :100] == -1).all()

@@ -90,3 +90,40 @@ def two_halves(normal: np.ndarray, light: np.ndarray, view: np.ndarray) -> np.nd
     """On a sphere the normal says where a point lies: blue above, red below."""
     blue = made.blinn(normal, light, view)[:, ::-1]
     return np.where(normal[:, 2:] > 0, blue, made.blinn(normal, light, view))
+
+
+def test_degenerate_and_doubled_faces_are_dropped_with_their_attributes(tmp_path: Path) -> None:
+    """Blender drops them too: face numbers must mean the same on both sides."""
+    vertices, faces = made.sphere_mesh(1)
+    more = np.concatenate([[faces[0]], [[3, 3, 4]], faces, [faces[5][[1, 2, 0]]]])
+    made.write_ply(tmp_path / "m.ply", vertices, more, np.arange(len(more)))
+    mesh = read_mesh(tmp_path / "m.ply")
+    assert len(mesh.faces) == len(faces)
+    assert mesh.face_attributes["part"].tolist() == [0, *range(3, len(faces) + 2)]
+
+
+def test_an_unmasked_material_is_what_no_mask_names(tmp_path: Path) -> None:
+    path = made.make_capture(tmp_path / "ball", photos=3, extra="[fit]\nheld_out = false")
+    mask = np.zeros((made.HEIGHT, made.WIDTH))
+    mask[:, : made.WIDTH // 2] = 255
+    made.write_png(path.parent / "left.png", mask)
+    text = path.read_text()
+    for i in (1, 2):  # the third photo has no mask: nobody looked there
+        text = text.replace(
+            f'light = "lamp{i}"\n', f'light = "lamp{i}"\nmasks = {{gold = "left.png"}}\n', 1
+        )
+    counts = {}
+    for order in (("rest", "gold"), ("gold", "rest")):
+        path.write_text(text + "".join(f'\n[[material]]\nname = "{n}"' for n in order))
+        job = FitJob(read_capture(path))
+        job.drain()
+        assert job.result is not None
+        faces = np.bincount(job.result.face_material, minlength=2)
+        counts[order] = {
+            m.name: (m.per_photo, faces[i]) for i, m in enumerate(job.result.materials)
+        }
+    a, b = counts.values()
+    for name in ("rest", "gold"):
+        assert a[name][0] == b[name][0] and a[name][0][2] == 0 and min(a[name][0][:2]) > 500
+        # the vote of a face on the border may be a tie
+        assert abs(a[name][1] - b[name][1]) < 0.03 * b[name][1] and b[name][1] > 1000

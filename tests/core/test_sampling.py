@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 from patina.core.angles import half_difference
-from patina.core.geometry import RayScene, edges
+from patina.core.capture import read_capture
+from patina.core.geometry import RayScene, edges, view_surface
 from patina.core.geometry.curvature import mean_curvature
-from patina.core.samples import SampleTable
+from patina.core.job import inputs
+from patina.core.samples import Margins, SampleTable
 from patina.core.samples.face_votes import FaceVotes
+from patina.core.samples.take import light_surface, trusted_pixels
 from patina.core.scan import Mesh
 from tests import make_capture as made
 from tests.sampled import sampled
@@ -110,3 +113,32 @@ def test_faces_take_the_material_most_pixels_saw() -> None:
     votes.add(0, np.array([0, 0, 0, 1]))
     votes.add(1, np.array([0, 1, 1]))
     assert votes.winners(mesh).tolist() == [0, 1, 0]  # the last saw none: its neighbour's
+
+
+def test_margins_leave_out_what_they_say(ball: Path) -> None:
+    """With margins no sample lies at an outline, a shadow edge or a grazing angle."""
+    capture = read_capture(ball)
+    scan = inputs.open_scan(capture)
+    rays = RayScene.build(scan.mesh)
+    view = view_surface(rays, inputs.camera_of(capture, scan, 1))
+    lighting = light_surface(rays, view, capture.light(capture.photos[1].light))
+    lit = view.image(~lighting.shadowed, fill=0).astype(bool)
+    terminator = edges.shadow_edge(lit, view.seen)
+    wide = trusted_pixels(view, lighting, Margins())
+    none = trusted_pixels(view, lighting, Margins(silhouette=0, shadow=0, cosine=0.001))
+    for edge, distance in ((view.silhouette, 2), (terminator, 3)):
+        near = edges.widen(edge, distance - 1).ravel()[view.pixel]
+        assert not wide[near].any()
+        assert none[near].any()
+    assert lighting.cos_i[wide].min() > 0.1 > lighting.cos_i[none].min()
+    assert none.sum() > wide.sum() > 0.5 * none.sum()
+
+
+def test_borders_of_masks_are_left_out() -> None:
+    part = np.zeros((9, 12), bool)
+    seen = np.ones((9, 12), bool)
+    seen[:, 10:] = False
+    part[:, 5:10] = True
+    inner = edges.inside(part, seen, 1)
+    assert not inner[:, 5].any() and inner[:, 6:10].all()  # an outline is no border of a mask
+    assert np.array_equal(edges.inside(part, seen, 0), part)

@@ -154,7 +154,7 @@ def test_a_distorted_scan_takes_its_photos_along(root: Path, tmp_path: Path) -> 
     done = headless(root, "import", path, "--out", tmp_path / "elsewhere" / "scan.blend")
     assert done.returncode == 0, done.stderr
     found = sorted(p.name for p in (tmp_path / "elsewhere" / "rectified").iterdir())
-    assert found == ["lit_1_rectified.exr", "lit_2_rectified.exr"]
+    assert [name[:16] for name in found] == ["lit_1_rectified_", "lit_2_rectified_"]
 
 
 def test_unsolved_mask_error_names_the_material(root: Path, ball: Path, tmp_path: Path) -> None:

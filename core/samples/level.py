@@ -1,0 +1,27 @@
+"""Reflectance of unknown scale, brought to the level of measured materials."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..basis import Basis, mapping
+from .table import SampleTable
+
+
+def at_typical_level(table: SampleTable, basis: Basis) -> tuple[SampleTable, float]:
+    """(the table with ρ multiplied, the factor).
+
+    Nielsen's mapping has a fixed ε and a mean: it is not blind to scale. Where the irradiance is
+    unknown the samples are first scaled so that their median ρ·cosMap is that of the basis' mean
+    material at the same angles; then the fit does not depend on the photos' unit.
+    """
+    some = table.select(np.arange(0, len(table), max(1, len(table) // 20_000)))
+    centre, _ = basis.rows(some.angles, 0)
+    typical = np.median(np.exp(centre) - mapping.EPSILON)
+    measured = np.median(some.rho.mean(axis=1) * mapping.cos_map(some.angles))
+    factor = float(typical / measured)
+    return replace(
+        table, rho=table.rho * np.float32(factor), irradiance=table.irradiance / factor
+    ), factor
