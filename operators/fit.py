@@ -7,9 +7,10 @@ from pathlib import Path
 import bpy
 
 from ..core.capture import read_capture
-from ..core.errors import PatinaError
+from ..core.errors import InputError, PatinaError
 from ..core.job import FitJob
 from ..scene.apply import apply_result
+from ..scene.running import Running, running, tell
 from .report_errors import refuse
 
 TICK = 0.01
@@ -27,7 +28,7 @@ class PATINA_OT_fit(bpy.types.Operator):
         if not context.scene.patina.capture:
             cls.poll_message_set("Import a capture first: it says which photos to measure")
             return False
-        if context.scene.patina.stage:
+        if running(context.scene) is not None:
             cls.poll_message_set("A fit is running; ESC stops it")
             return False
         return True
@@ -59,7 +60,7 @@ class PATINA_OT_fit(bpy.types.Operator):
             return {"PASS_THROUGH"}
         try:
             if self._job.step():
-                self._show(context)
+                self._show()
                 return {"RUNNING_MODAL"}
             self._stop(context)
             self._finish(context)
@@ -76,21 +77,19 @@ class PATINA_OT_fit(bpy.types.Operator):
 
     def _start(self, context: bpy.types.Context) -> None:
         path = Path(bpy.path.abspath(context.scene.patina.capture))
+        if not path.is_file():
+            raise InputError("is gone; import the capture again from where it is now", file=path)
         self._job, self._timer = FitJob(read_capture(path)), None
         self._scene = context.scene.name  # by name: a reference does not survive undo
 
-    def _show(self, context: bpy.types.Context) -> None:
-        state = context.scene.patina
-        state.stage, state.progress = self._job.now.stage, self._job.now.fraction
-        for area in context.screen.areas if context.screen else ():
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+    def _show(self) -> None:
+        tell(Running(self._scene, self._job.now.stage, self._job.now.fraction))
 
     def _stop(self, context: bpy.types.Context) -> None:
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
             self._timer = None
-        context.scene.patina.stage = ""
+        tell(None)
 
     def _finish(self, context: bpy.types.Context) -> None:
         result = self._job.result
@@ -114,4 +113,5 @@ def register() -> None:
 
 
 def unregister() -> None:
+    tell(None)
     bpy.utils.unregister_class(PATINA_OT_fit)

@@ -10,7 +10,7 @@ from ..core.capture import read_capture
 from ..core.errors import PatinaError
 from ..core.job import inputs
 from ..scene.folders import rectified_folder
-from ..scene.scan_collection import create_scan_collection
+from ..scene.scan_collection import already_there, create_scan_collection
 from .report_errors import refuse
 
 DEMO = Path(__file__).parents[1] / "assets" / "demo" / "demo.capture.toml"
@@ -32,6 +32,7 @@ class PATINA_OT_import_capture(bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if self.filepath:
             return self.execute(context)
+        self.filepath = ""
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
@@ -50,6 +51,12 @@ class PATINA_OT_import_demo(bpy.types.Operator):
 def bring_in(operator: bpy.types.Operator, context: bpy.types.Context, path: Path) -> set[str]:
     """Read everything, then make everything; a mistake is reported and makes nothing."""
     try:
+        there = already_there(context.scene, path)
+        if there is not None:
+            raise PatinaError(
+                f"this capture is in the scene already: delete the collection {there.name!r} to "
+                "import it anew"
+            )
         capture = read_capture(path)
         scan = inputs.open_scan(capture)
         inputs.check_photos(capture, scan)
@@ -58,6 +65,13 @@ def bring_in(operator: bpy.types.Operator, context: bpy.types.Context, path: Pat
         return refuse(operator, error)
     context.scene.patina.capture = str(path)
     context.scene.patina.mesh = made.mesh
+    for selected in context.selected_objects:
+        selected.select_set(False)
+    made.mesh.select_set(True)
+    context.view_layer.objects.active = made.mesh
+    for area in context.screen.areas if context.screen else ():
+        if area.type == "VIEW_3D":
+            area.spaces.active.region_3d.view_perspective = "CAMERA"
     operator.report(
         {"INFO"},
         f"{len(made.cameras)} cameras, {len(capture.photos)} lit photos, "

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene import cameras
+from ..scene import cameras, lights
+from ..scene.properties import capture_path
 
 
 def lit_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """The cameras of lit photos, by name."""
+    """The cameras of the current capture's lit photos, in the capture's order."""
+    capture = capture_path(scene)
     return sorted(
-        (o for o in scene.objects if o.type == "CAMERA" and "patina_lit" in o),
-        key=lambda o: o.name,
+        (o for o in scene.objects if o.type == "CAMERA" and o.get("patina_capture") == capture),
+        key=lambda o: o.get("patina_place", 0),
     )
 
 
@@ -25,8 +27,18 @@ class PATINA_OT_next_photo(bpy.types.Operator):
     step: bpy.props.IntProperty(default=1, options={"HIDDEN", "SKIP_SAVE"})  # type: ignore[valid-type]
 
     @classmethod
+    def description(
+        cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties
+    ) -> str:
+        which = "previous" if properties.step < 0 else "next"
+        return (
+            f"Look through the camera of the {which} lit photo, the photo behind the mesh and its "
+            "lamp switched on"
+        )
+
+    @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if any("patina_lit" in o for o in context.scene.objects):
+        if lit_cameras(context.scene):
             return True
         cls.poll_message_set("No lit photos here yet: import a capture first")
         return False
@@ -36,6 +48,7 @@ class PATINA_OT_next_photo(bpy.types.Operator):
         now = context.scene.camera
         place = (found.index(now) + self.step) % len(found) if now in found else 0
         cameras.look_through(context.scene, found[place])
+        lights.shine_only(context.scene, found[place])
         for area in context.screen.areas if context.screen else ():
             if area.type == "VIEW_3D":
                 area.spaces.active.region_3d.view_perspective = "CAMERA"

@@ -10,6 +10,7 @@ from ..operators.look_through import lit_cameras
 from ..scene.apply import measured_materials
 from ..scene.materials import REASON_PROPERTY
 from ..scene.properties import capture_path, stored_result
+from ..scene.running import running
 
 
 class _Stage:
@@ -23,11 +24,12 @@ class PATINA_PT_scan(_Stage, bpy.types.Panel):
     bl_label = "Scan"
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout, state = self.layout, context.scene.patina
-        if state.mesh is not None:
-            layout.label(text=state.mesh.name, icon="MESH_DATA")
+        layout, mesh = self.layout, context.scene.patina.mesh
+        there = mesh is not None and mesh.name in context.scene.objects
+        if there:
+            layout.label(text=mesh.name, icon="MESH_DATA")
         layout.operator("patina.import_capture", icon="IMPORT")
-        if state.mesh is None:
+        if not there:
             layout.operator("patina.import_demo", icon="MONKEY")
 
 
@@ -44,9 +46,10 @@ class PATINA_PT_photos(_Stage, bpy.types.Panel):
         camera = context.scene.camera
         if camera in found:
             place = f"{found.index(camera) + 1} of {len(found)}: {camera['patina_lit']}"
+            layout.label(text=place, icon="CAMERA_DATA")
+            layout.label(text=f"Lamp: {camera['patina_light']}", icon="LIGHT_SUN")
         else:
-            place = f"{len(found)} lit photos"
-        layout.label(text=place, icon="CAMERA_DATA")
+            layout.label(text=f"{len(found)} lit photos", icon="CAMERA_DATA")
         row = layout.row(align=True)
         row.operator("patina.next_photo", text="Previous", icon="TRIA_LEFT").step = -1
         row.operator("patina.next_photo", text="Next", icon="TRIA_RIGHT").step = 1
@@ -57,9 +60,9 @@ class PATINA_PT_fit(_Stage, bpy.types.Panel):
     bl_label = "Fit"
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout, state = self.layout, context.scene.patina
-        if state.stage:
-            layout.progress(text=state.stage, factor=state.progress, type="BAR")
+        layout, now = self.layout, running(context.scene)
+        if now is not None:
+            layout.progress(text=now.stage, factor=now.fraction, type="BAR")
             layout.label(text="ESC cancels", icon="CANCEL")
             return
         layout.operator("patina.fit", icon="SHADERFX")
@@ -72,10 +75,7 @@ class PATINA_PT_fit(_Stage, bpy.types.Panel):
                 box.label(text=f"Predicts unseen photos to {100 * held['typical']:.0f} %")
             box.label(text=f"{material['samples']['used']:,} samples")
             for warning in material["warnings"]:
-                column = box.column(align=True)
-                column.scale_y = 0.8
-                for i, line in enumerate(textwrap.wrap(warning, 38)):
-                    column.label(text=line, icon="ERROR" if i == 0 else "BLANK1")
+                _wrapped(box, warning, "ERROR")
 
 
 class PATINA_PT_material(_Stage, bpy.types.Panel):
@@ -87,11 +87,22 @@ class PATINA_PT_material(_Stage, bpy.types.Panel):
         found = measured_materials()
         if not found:
             layout.label(text="Nothing measured yet", icon="INFO")
+        reasons = {m[REASON_PROPERTY] for m in found if REASON_PROPERTY in m}
         for material in found:
             row = layout.row()
             row.label(text=material.name, icon="MATERIAL")
             missing = REASON_PROPERTY in material
             row.label(text="Principled only" if missing else "OSL + Principled")
+        for reason in sorted(reasons):
+            _wrapped(layout, f"No OSL: {reason}", "INFO")
+
+
+def _wrapped(layout: bpy.types.UILayout, text: str, icon: str) -> None:
+    """A sentence over as many lines as the sidebar's usual width needs."""
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for i, line in enumerate(textwrap.wrap(text, 36)):
+        column.label(text=line, icon=icon if i == 0 else "BLANK1")
 
 
 CLASSES = (PATINA_PT_scan, PATINA_PT_photos, PATINA_PT_fit, PATINA_PT_material)

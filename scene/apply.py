@@ -25,7 +25,7 @@ def apply_result(
 ) -> list[str]:
     """Make the materials, put them on the scanned mesh where it is in the scene, and keep the
     description. Returns notes for the user. A material of an earlier fit is replaced."""
-    atlas = osl_files.ensure_components(result.basis)
+    atlas = None if materials.osl_missing() else osl_files.ensure_components(result.basis)
     capture = str(result.capture.file)
     notes: list[str] = []
     made = []

@@ -31,3 +31,15 @@ def create_sun(
     result["patina_light"] = light.name
     collection.objects.link(result)
     return result
+
+
+def shine_only(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
+    """Of the capture's lamps, let only the one shine that lit the camera's photo."""
+    for lamp in scene.objects:
+        if lamp.type != "LIGHT" or "patina_light" not in lamp:
+            continue
+        if lamp.get("patina_capture") != camera.get("patina_capture"):
+            continue
+        off = lamp["patina_light"] != camera.get("patina_light")
+        lamp.hide_render = off
+        lamp.hide_set(off)

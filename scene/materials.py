@@ -63,25 +63,32 @@ def osl_missing() -> str | None:
 
 
 def create_material(
-    name: str, brdf: PrincipalBRDF, principled: PrincipledFit, components_exr: Path
+    name: str, brdf: PrincipalBRDF, principled: PrincipledFit, components_exr: Path | None
 ) -> bpy.types.Material:
-    """A material of both kinds; without OSL only the portable one, and the material says why."""
+    """A material of both kinds; without OSL only the portable one, and the material says why.
+
+    components_exr: the atlas of the basis (osl_files.ensure_components); None without OSL.
+    """
     material = bpy.data.materials.new(name)
     if material.node_tree is None:
         material.use_nodes = True
     tree = material.node_tree
     tree.nodes.clear()
     _portable_branch(tree, principled)
+    seen = principled.principled  # in Solid mode
+    material.diffuse_color = (*(float(c) for c in np.clip(seen.base_color, 0, 1)), 1.0)
+    material.metallic, material.roughness = seen.metallic, seen.roughness
     reason = osl_missing()
-    if reason is None:
+    if components_exr is None:
+        reason = reason or "the EXR of the components was not written"
+    elif reason is None:
         try:
             text = osl_text(brdf.basis, brdf.coefficients.shape[1])
             _osl_branch(tree, text, brdf, principled.principled, components_exr)
         except OslError as error:
             reason = str(error)
-    if reason is not None:
+    if reason is not None or components_exr is None:
         material[REASON_PROPERTY] = reason
-        log.warning("%s: only the Principled fit, because %s", name, reason)
         return material
     material[FILE_PROPERTY] = components_exr.name
     pack(components_exr)

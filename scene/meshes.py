@@ -55,6 +55,9 @@ def assign_materials(
 ) -> bool:
     """Give every face the material of its number; the object's own materials are replaced. False
     where the object no longer has the scan's faces: all of it then wears the first material."""
+    if target.data.is_editmode:  # its faces belong to the edit session until that ends
+        with bpy.context.temp_override(active_object=target, object=target):
+            bpy.ops.object.mode_set(mode="OBJECT")
     target.data.materials.clear()
     for material in materials:
         target.data.materials.append(material)

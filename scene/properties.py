@@ -26,14 +26,6 @@ class PatinaScene(bpy.types.PropertyGroup):
         type=bpy.types.Object,
         poll=lambda self, candidate: candidate.type == "MESH",
     )
-    stage: bpy.props.StringProperty(options={"SKIP_SAVE", "HIDDEN"})  # type: ignore[valid-type]
-    progress: bpy.props.FloatProperty(  # type: ignore[valid-type]
-        name="Progress",
-        subtype="FACTOR",
-        min=0.0,
-        max=1.0,
-        options={"SKIP_SAVE"},
-    )
 
 
 def store_result(capture: str, description: dict[str, Any]) -> None:

@@ -15,6 +15,7 @@ from ..core.scan import Camera, Scan
 from . import cameras, lights, meshes, photos
 from .frame import frame_origin
 
+CAPTURE = "patina_capture"  # on what was made: the capture file
 PICTURES = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".exr")
 
 
@@ -43,27 +44,41 @@ def create_scan_collection(
         camera = scan.camera(photo.camera)
         if camera is not None:
             shown = photos.photo_for(camera, photo.file, rectified)
-            lit.append((camera.label, shown, photo.file.name))
+            lit.append((camera.label, shown, photo))
     top, camera_room, light_room = _rooms(scene, name, ("cameras", "lights"))
+    top[CAPTURE] = str(capture.file)
     used = scan.mesh.vertices[np.unique(scan.mesh.faces)]
     origin = frame_origin(used)
     centre = 0.5 * (used.min(axis=0) + used.max(axis=0)) - origin
     mesh = meshes.create_mesh_object(name, scan.mesh, origin, top)
     made = _cameras(scan.cameras, own, origin, centre, camera_room)
-    for label, shown, photo_name in lit:
+    for place, (label, shown, photo) in enumerate(lit):
         cameras.put_photo_behind(made[label], shown)
-        made[label]["patina_lit"] = photo_name
+        made[label]["patina_lit"] = photo.file.name
+        made[label]["patina_place"] = place
+        made[label]["patina_light"] = photo.light
+        made[label][CAPTURE] = str(capture.file)
     suns = {
         light.name: lights.create_sun(light, centre, scan.mesh.size, light_room)
         for light in capture.lights
     }
-    for other in list(suns.values())[1:]:  # one light at a time, as the photos were taken
-        other.hide_render = True
-        other.hide_set(True)
+    for sun in suns.values():
+        sun[CAPTURE] = str(capture.file)
     first = scan.camera(capture.photos[0].camera)
     if first is not None:
         cameras.look_through(scene, made[first.label])
+        lights.shine_only(scene, made[first.label])
     return ScanCollection(top, mesh, made, suns)
+
+
+def already_there(scene: bpy.types.Scene, capture: Path) -> bpy.types.Collection | None:
+    """The collection an earlier import of this capture made, where its mesh is still in it."""
+    for collection in scene.collection.children_recursive:
+        if collection.get(CAPTURE) == str(capture.resolve()) and any(
+            o.type == "MESH" for o in collection.objects
+        ):
+            return collection
+    return None
 
 
 def create_reconstruction(

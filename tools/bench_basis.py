@@ -7,6 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
+# Nielsen et al. 2015: φd, θh, θd in degrees
+NIELSEN_5 = (
+    (36.2, 1.4, 4.0),
+    (86.5, 76.7, 13.1),
+    (85.5, 7.6, 78.9),
+    (144.8, 2.5, 73.8),
+    (80.4, 12.9, 51.6),
+)
+
 
 def run(data: Path) -> None:
     """Print the tables of docs/measurements.md, section "The basis"."""
@@ -44,6 +53,10 @@ def run(data: Path) -> None:
             f"RMS {np.sqrt(np.mean(difference**2)):.4f} (median material "
             f"{np.median(per_column):.4f}, worst {per_column.max():.4f})"
         )
+
+    directions5 = np.radians(NIELSEN_5)
+    rows5 = basis.rows(Angles(directions5[:, 1], directions5[:, 2], directions5[:, 0]), 5)[1]
+    print(f"condition number of Nielsen's published five directions: {np.linalg.cond(rows5):.2f}")
 
     print("\nvalidation materials (not in MERL) projected onto k components, to 80 degrees\n")
     print("| material | log RMS k=5 | k=20 | k=40 | cube-root RMS k=5 | k=20 | k=40 |")

@@ -120,7 +120,7 @@ def _light(section: Section) -> DistantLight:
     length = float(np.linalg.norm(direction))
     if length < 1e-9:
         raise section.error("the direction has no length", "direction")
-    irradiance = section.vector("irradiance")
+    irradiance = section.vector("irradiance", "red, green, blue")
     if irradiance is not None and not (irradiance > 0).all():
         raise section.error(f"found {irradiance.tolist()}, expected positive numbers", "irradiance")
     section.close()

@@ -95,7 +95,7 @@ class Section:
             raise self.error(f"found {value!r}, expected true or false", name)
         return value
 
-    def vector(self, name: str) -> NDArray[np.float64] | None:
+    def vector(self, name: str, parts: str = "x, y, z") -> NDArray[np.float64] | None:
         """Three finite numbers, or None where the key is absent."""
         value = self.get(name)
         if value is None:
@@ -108,7 +108,7 @@ class Section:
         )
         if not good:
             found = str(value) if len(str(value)) < 100 else "something else"
-            raise self.error(f"found {found}, expected three numbers [x, y, z]", name)
+            raise self.error(f"found {found}, expected three numbers [{parts}]", name)
         return np.array(value, np.float64)
 
     def table(self, name: str) -> Section:

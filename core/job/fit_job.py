@@ -23,6 +23,7 @@ from ..samples.take import light_surface, trusted_pixels
 from ..scan import Scan
 from . import inputs
 from .job import Job, Step
+from .warnings import black_photos, material_warnings, trust_warnings
 
 LEAST_RHO, LARGEST_RHO = 1e-6, 1e4  # 1/sr: black velvet has 1e-3, mirrors' peaks 1e4
 
@@ -158,7 +159,15 @@ class FitJob(Job):
             left_out.append(leave_out(table, photo, basis, capture.fit.paper))
         yield Step(f"Principled material of {name}", start + 0.8 * share)
         principled = fit_principled(fit.brdf.evaluate)
+        held = summarise([part for part in left_out if part is not None])
+        spread = candidate_spread(basis, fit.candidates)
         warnings = material_warnings(table, fit, known)
+        warnings += trust_warnings(held, spread, capture)
+        warnings += tuple(
+            f"{capture.photo_name(photo)} is black where its light should reach: is this the "
+            "camera it was taken with, and this its light?"
+            for photo in black_photos(table)
+        )
         if None in left_out:
             lost = [
                 capture.photo_name(photo)
@@ -173,8 +182,8 @@ class FitJob(Job):
             fit=fit,
             samples=len(table),
             per_photo=tuple(np.bincount(table.photo, minlength=len(capture.photos)).tolist()),
-            held_out=summarise([part for part in left_out if part is not None]),
-            spread=candidate_spread(basis, fit.candidates),
+            held_out=held,
+            spread=spread,
             principled=principled,
             scale=scale,
             irradiance_known=known,
@@ -207,7 +216,8 @@ class FitJob(Job):
             if level <= 0 or (known and not LEAST_RHO < level < LARGEST_RHO):
                 raise self.capture.error(
                     f"the typical reflectance of {name!r} is {level:.3g} / sr, which no surface "
-                    "has: check that the photos are linear and not black, exposure and irradiance",
+                    "has: check that light directions point from the surface TO the light, that "
+                    "the photos are linear and not black, exposure and irradiance",
                     "material",
                     index,
                     "name",
@@ -220,23 +230,3 @@ class FitJob(Job):
             else f"none of the {marked} pixels of {name!r} is lit and away from shadow edges"
         )
         raise self.capture.error(found, "material", index, "name")
-
-
-def material_warnings(table: SampleTable, fit: PaperFit, irradiance_known: bool) -> tuple[str, ...]:
-    """What an artist should know about this material before trusting it."""
-    found = list(fit.warnings)
-    near_peak = int((table.theta_h < np.radians(5)).sum())
-    if near_peak < 200:
-        found.append(
-            f"only {near_peak} samples lie within 5° of the highlight: its height is a guess; "
-            "add a photo that shows the highlight"
-        )
-    far = float(np.percentile(table.theta_d, 98)) if len(table) else 0.0
-    if far < np.radians(50):
-        found.append(
-            f"no photo has the light more than {2 * np.degrees(far):.0f}° from the camera: "
-            "grazing reflection comes from the basis, not from this object"
-        )
-    if not irradiance_known:
-        found.append("irradiance unknown: the BRDF is known up to one scale")
-    return tuple(found)

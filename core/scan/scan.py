@@ -36,7 +36,9 @@ def read_cameras(path: Path) -> tuple[Camera, ...]:
     if path.is_dir():
         if is_colmap(path):
             return read_colmap(path)
-        raise InputError("the folder holds no COLMAP model (cameras and images)", file=path)
+        near = [p for p in (path / "sparse" / "0", path / "sparse", path / "0") if is_colmap(p)]
+        hint = f"; there is one in {near[0].relative_to(path)}" if near else ""
+        raise InputError(f"the folder holds no COLMAP model (cameras and images){hint}", file=path)
     raise InputError("cameras of this kind are not read; expected a COLMAP folder", file=path)
 
 

@@ -207,3 +207,96 @@ def test_georeferenced_scans_keep_their_precision() -> None:
     target.data.vertices.foreach_get("co", found)
     assert np.abs(found.reshape(-1, 3) - (vertices + far - origin)).max() < 1e-6
     assert (frame.frame_origin(vertices) == 0).all()
+
+
+def test_two_captures_keep_their_materials_apart() -> None:
+    """The same material name in two captures: fitting one must not change the other."""
+    red = made().make_capture(folder() / "red", photos=2, extra="[fit]\nheld_out = false")
+    green = made().make_capture(
+        folder() / "green",
+        photos=2,
+        extra="[fit]\nheld_out = false",
+        brdf=lambda normal, light, view: made().blinn(normal, light, view)[:, [1, 0, 2]],
+    )
+    objects = []
+    for path in (red, green):
+        bpy.ops.patina.import_capture(filepath=str(path))
+        bpy.ops.patina.fit()
+        objects.append(bpy.context.scene.patina.mesh)
+    first, second = (o.data.materials[0] for o in objects)
+    assert first != second
+    colour = [
+        next(n for n in m.node_tree.nodes if n.bl_idname == "ShaderNodeBsdfPrincipled")
+        .inputs["Base Color"].default_value[:2]
+        for m in (first, second)
+    ]  # fmt: skip
+    assert colour[0][0] > colour[0][1] and colour[1][1] > colour[1][0]
+    stored = extension("scene.properties").stored_result
+    assert stored(str(red.resolve())) and stored(str(green.resolve()))
+
+
+def test_a_capture_comes_in_once_and_again_when_deleted() -> None:
+    path = made().make_capture(folder() / "ball", photos=2)
+    bpy.ops.patina.import_capture(filepath=str(path))
+    before = counts()
+    try:
+        bpy.ops.patina.import_capture(filepath=str(path))
+    except RuntimeError as error:
+        assert "in the scene already" in str(error)
+    else:
+        raise AssertionError("the same capture came in twice")
+    assert counts() == before
+    bpy.data.objects.remove(bpy.context.scene.patina.mesh)
+    assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
+
+
+def test_the_lamp_follows_the_photo() -> None:
+    path = made().make_capture(folder() / "ball", photos=3)
+    bpy.ops.patina.import_capture(filepath=str(path))
+    scene = bpy.context.scene
+    for _ in range(4):
+        shining = [
+            o["patina_light"] for o in scene.objects if "patina_light" in o and o.type == "LIGHT"
+            and not o.hide_render
+        ]  # fmt: skip
+        assert shining == [scene.camera["patina_light"]]
+        bpy.ops.patina.next_photo()
+
+
+def test_faces_get_their_material_in_edit_mode_too() -> None:
+    path = made().make_capture(
+        folder() / "ball", photos=3,
+        extra='[[material]]\nname = "low"\nfaces = "part"\n[[material]]\nname = "high"\n'
+        'faces = "part"\n[fit]\nheld_out = false',
+    )  # fmt: skip
+    vertices, faces = made().sphere_mesh()
+    high = vertices[faces].mean(axis=1)[:, 2] > made().CENTRE[2]
+    made().write_ply(path.parent / "mesh.ply", vertices, faces, high.astype(int))
+    bpy.ops.patina.import_capture(filepath=str(path))
+    mesh = bpy.context.scene.patina.mesh
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.patina.fit()
+    assert mesh.mode == "OBJECT"
+    index = np.empty(len(mesh.data.polygons), np.int32)
+    mesh.data.polygons.foreach_get("material_index", index)
+    assert np.array_equal(index, high)
+
+
+def test_fit_without_its_mesh_says_so() -> None:
+    path = made().make_capture(folder() / "ball", photos=2, extra="[fit]\nheld_out = false")
+    bpy.ops.patina.import_capture(filepath=str(path))
+    bpy.data.objects.remove(bpy.context.scene.patina.mesh)
+    job = extension("core.job").FitJob(extension("core.capture").read_capture(path))
+    job.drain()
+    notes = extension("scene.apply").apply_result(bpy.context.scene, job.result, job.stages)
+    assert any("not in this scene" in note for note in notes)
+
+
+def test_a_running_fit_is_not_saved() -> None:
+    state, path = extension("scene.running"), folder() / "running.blend"
+    state.tell(state.Running(bpy.context.scene.name, "sampling the photos", 0.5))
+    assert state.running(bpy.context.scene) is not None
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    state.tell(None)
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    assert state.running(bpy.context.scene) is None

@@ -90,3 +90,20 @@ def test_metrics_of_known_differences() -> None:
     assert found.log_relative_rms == pytest.approx(abs(np.log(0.8)), rel=0.02)
     same = metrics.compare(a, a)
     assert same.relative_l2 == same.log_relative_rms == same.cube_root_rms == 0
+
+
+def test_a_photo_of_another_camera_is_named(tmp_path: Path) -> None:
+    """The most natural mistake: two photos swapped."""
+    path = made.make_capture(tmp_path / "ball", photos=6)
+    text = path.read_text().replace("view_02", "swap").replace("view_05", "view_02")
+    path.write_text(text.replace("swap", "view_05"))
+    job = FitJob(read_capture(path))
+    job.drain()
+    assert job.result is not None
+    said = " ".join(job.result.materials[0].warnings)
+    assert "lit_2.exr" in said or "lit_5.exr" in said, said
+
+
+def test_a_good_capture_has_no_such_warning(result: CaptureResult) -> None:
+    said = " ".join(result.materials[0].warnings)
+    assert "black" not in said and "times worse" not in said
