@@ -78,7 +78,7 @@ picture)
       >/dev/null 2>&1 & window=$!
     for _ in $(seq 120); do [ -e /tmp/window-ready ] && break; sleep 1; done
     sleep 20  # shaders
-    xdotool mousemove 1309 203 click 1  # the tab of the sidebar
+    xdotool mousemove 1309 248 click 1  # the tab of the sidebar
     sleep 4; rm -f /tmp/window-ready; import -window root /tmp/window.png; kill $window $screen' "$here"
   mv "$dir/tmp/window.png" "$png" ;;
 *) sed -n '2,9p' "$0"; exit 2 ;;
