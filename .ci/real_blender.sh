@@ -48,13 +48,16 @@ install() { # DIR
 }
 
 what=${1:-}
+# Everything is mounted in a namespace of its own and gone when this ends: a /dev that stays bound in
+# the folder is deleted with it by whoever cleans up.
+if [ "${IN_NAMESPACE:-}" != 1 ] && [ -n "$what" ]; then
+  IN_NAMESPACE=1 exec unshare --mount bash "${BASH_SOURCE[0]}" "$@"
+fi
+unset IN_NAMESPACE
 shift || true
 case $what in
 install) install "${1:-/opt/blender-trixie}" ;;
 blender)
-  # In a mount namespace of its own: what is bound here is gone when Blender ends.
-  [ "${IN_NAMESPACE:-}" = 1 ] || IN_NAMESPACE=1 exec unshare --mount bash "${BASH_SOURCE[0]}" blender "$@"
-  unset IN_NAMESPACE
   dir=$1; shift
   system "$dir"
   bind "$dir" "$here"
@@ -63,7 +66,6 @@ blender)
   bind "$dir" "$PWD"
   exec chroot "$dir" /bin/bash -c 'cd "$0" && exec blender "$@"' "$PWD" "$@" ;;
 picture)
-  [ "${IN_NAMESPACE:-}" = 1 ] || IN_NAMESPACE=1 exec unshare --mount bash "${BASH_SOURCE[0]}" picture "$@"
   dir=$1 png=$(realpath "$2")
   cache=${PATINA_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/patina}
   system "$dir"
