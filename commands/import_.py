@@ -12,8 +12,7 @@ from pathlib import Path
 from ..core.capture import read_capture
 from ..core.errors import InputError
 from ..core.job import inputs
-from ..core.scan.colmap import read_points
-from ..core.scan.scan import read_cameras
+from ..core.scan.scan import read_reconstruction
 from .staging import staged_folder
 
 HELP = "mesh, cameras with their photos and lights of a capture, as a .blend"
@@ -53,8 +52,7 @@ def run(arguments: argparse.Namespace) -> None:
 def _import_model(model: Path, out: Path, images: Path | None) -> None:
     if images is not None and not images.is_dir():
         raise InputError("no such folder", file=images, key="--images")
-    cameras = read_cameras(model)
-    points = read_points(model)
+    cameras, points = read_reconstruction(model)
     from ..scene.blend_file import write_reconstruction  # needs bpy
 
     with staged_folder(out.parent) as folder:

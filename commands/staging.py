@@ -14,8 +14,6 @@ from ..core.errors import InputError
 
 def check_out(out: Path) -> Path:
     """The folder as an absolute path; refused at once, before any work, where it cannot be one."""
-    if not str(out).strip() or str(out) == ".":
-        out = Path.cwd()
     out = Path(os.path.abspath(out))
     try:
         if out.is_symlink() and not out.exists():
@@ -25,7 +23,6 @@ def check_out(out: Path) -> Path:
         nearest = next(p for p in (out, *out.parents) if p.exists())
         if not nearest.is_dir() or not os.access(nearest, os.W_OK):
             raise InputError("cannot be written", file=out, key="--out")
-        os.stat(out.parent if out.parent.exists() else nearest)
     except OSError as error:
         raise InputError(f"cannot be written ({error.strerror})", file=out, key="--out") from error
     return out

@@ -5,14 +5,14 @@ from __future__ import annotations
 import bpy
 
 from ..scene import cameras, lights
-from ..scene.properties import capture_path
+from ..scene.properties import CAPTURE, capture_path
 
 
 def lit_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The cameras of the current capture's lit photos, in the capture's order."""
     capture = capture_path(scene)
     return sorted(
-        (o for o in scene.objects if o.type == "CAMERA" and o.get("patina_capture") == capture),
+        (o for o in scene.objects if o.type == "CAMERA" and o.get(CAPTURE) == capture),
         key=lambda o: o.get("patina_place", 0),
     )
 

@@ -9,10 +9,9 @@ import bpy
 from ..core.job import CaptureResult, Stage
 from ..core.report.result_json import describe
 from . import materials, meshes, osl_files
-from .properties import store_result
+from .properties import CAPTURE, store_result
 
 MEASURED = "patina_measured"  # on the material: the name it has in its capture
-CAPTURE = "patina_capture"  # on the material: the capture file it was measured from
 
 
 def measured_materials() -> list[bpy.types.Material]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.light import DistantLight
+from .properties import CAPTURE
 
 
 def create_sun(
@@ -38,7 +39,7 @@ def shine_only(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     for lamp in scene.objects:
         if lamp.type != "LIGHT" or "patina_light" not in lamp:
             continue
-        if lamp.get("patina_capture") != camera.get("patina_capture"):
+        if lamp.get(CAPTURE) != camera.get(CAPTURE):
             continue
         off = lamp["patina_light"] != camera.get("patina_light")
         lamp.hide_render = off

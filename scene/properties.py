@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 TEXT_NAME = "Patina result"
-CAPTURE_KEY = "patina_capture"
+CAPTURE = "patina_capture"  # on whatever was made from a capture: the file, absolute
 
 
 class PatinaScene(bpy.types.PropertyGroup):
@@ -31,7 +31,7 @@ class PatinaScene(bpy.types.PropertyGroup):
 def store_result(capture: str, description: dict[str, Any]) -> None:
     """Keep a fit's description (result.json) in the .blend, one text data-block a capture."""
     text = _text(capture) or bpy.data.texts.new(TEXT_NAME)
-    text[CAPTURE_KEY] = capture
+    text[CAPTURE] = capture
     text.clear()
     text.write(json.dumps(description, indent=1))
     text.use_fake_user = True
@@ -56,7 +56,7 @@ def capture_path(scene: bpy.types.Scene) -> str:
 
 
 def _text(capture: str) -> bpy.types.Text | None:
-    return next((t for t in bpy.data.texts if t.get(CAPTURE_KEY) == capture), None)
+    return next((t for t in bpy.data.texts if t.get(CAPTURE) == capture), None)
 
 
 def register() -> None:

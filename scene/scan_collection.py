@@ -14,8 +14,8 @@ from ..core.capture import Capture
 from ..core.scan import Camera, Scan
 from . import cameras, lights, meshes, photos
 from .frame import frame_origin
+from .properties import CAPTURE
 
-CAPTURE = "patina_capture"  # on what was made: the capture file
 PICTURES = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".exr")
 
 

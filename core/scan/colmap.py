@@ -12,6 +12,9 @@ from ..errors import InputError
 from .camera import Camera, Pose
 from .colmap_check import check_binary_model
 
+# positions (n, 3) in scan units, sRGB colours (n, 3)
+Points = tuple[NDArray[np.float64], NDArray[np.uint8]]
+
 
 def is_colmap(folder: Path) -> bool:
     """True for a folder that holds a COLMAP model."""
@@ -21,18 +24,22 @@ def is_colmap(folder: Path) -> bool:
     )
 
 
-def read_points(folder: Path) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-    """(positions (n, 3) in scan units, sRGB colours (n, 3)) of the sparse points."""
-    points = list(_open(folder).points3D.values())
+def read_colmap_with_points(folder: Path) -> tuple[tuple[Camera, ...], Points]:
+    """(cameras as read_colmap gives them, the sparse points). Raises InputError."""
+    model = _open(folder)
+    points = list(model.points3D.values())
     positions = np.array([point.xyz for point in points], np.float64).reshape(-1, 3)
     colours = np.array([point.color for point in points], np.uint8).reshape(-1, 3)
     finite = np.isfinite(positions).all(axis=1)
-    return positions[finite], colours[finite]
+    return _cameras(model, folder), (positions[finite], colours[finite])
 
 
 def read_colmap(folder: Path) -> tuple[Camera, ...]:
     """All registered cameras of a model folder, sorted by label. Raises InputError."""
-    model = _open(folder)
+    return _cameras(_open(folder), folder)
+
+
+def _cameras(model: pycolmap.Reconstruction, folder: Path) -> tuple[Camera, ...]:
     cameras: dict[str, Camera] = {}
     for image in model.images.values():
         if not image.has_pose:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from .camera import Camera
-from .colmap import is_colmap, read_colmap
+from .colmap import Points, is_colmap, read_colmap, read_colmap_with_points
 from .mesh import Mesh, read_mesh
 
 
@@ -33,13 +33,22 @@ class Scan:
 
 def read_cameras(path: Path) -> tuple[Camera, ...]:
     """The cameras of any model Patina reads. Raises InputError."""
-    if path.is_dir():
-        if is_colmap(path):
-            return read_colmap(path)
-        near = [p for p in (path / "sparse" / "0", path / "sparse", path / "0") if is_colmap(p)]
-        hint = f"; there is one in {near[0].relative_to(path)}" if near else ""
-        raise InputError(f"the folder holds no COLMAP model (cameras and images){hint}", file=path)
-    raise InputError("cameras of this kind are not read; expected a COLMAP folder", file=path)
+    return read_colmap(_colmap_folder(path))
+
+
+def read_reconstruction(path: Path) -> tuple[tuple[Camera, ...], Points]:
+    """Cameras and sparse points of a model that has no mesh yet. Raises InputError."""
+    return read_colmap_with_points(_colmap_folder(path))
+
+
+def _colmap_folder(path: Path) -> Path:
+    if not path.is_dir():
+        raise InputError("cameras of this kind are not read; expected a COLMAP folder", file=path)
+    if is_colmap(path):
+        return path
+    near = [p for p in (path / "sparse" / "0", path / "sparse", path / "0") if is_colmap(p)]
+    hint = f"; there is one in {near[0].relative_to(path)}" if near else ""
+    raise InputError(f"the folder holds no COLMAP model (cameras and images){hint}", file=path)
 
 
 def read_scan(cameras: Path, mesh: Path, images: Path | None = None) -> Scan:

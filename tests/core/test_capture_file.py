@@ -152,20 +152,8 @@ def test_broken_cameras(ball: Path, tmp_path: Path) -> None:
     refused(path, r"scan\.cameras.*no COLMAP model")
 
 
-def test_everything_masked(ball: Path, tmp_path: Path) -> None:
-    path = edited(
-        ball,
-        tmp_path,
-        lambda t: (
-            t.replace('light = "lamp1"\n', 'light = "lamp1"\nmasks = {gold = "none.png"}\n', 1)
-            + '\n[[material]]\nname = "gold"\n'
-        ),
-    )
-    made.write_png(path.parent / "none.png", np.zeros((90, 120)))
-    refused(path, r"material 1\.name.*all pixels are masked")
-
-
-def test_mask_of_another_size(ball: Path, tmp_path: Path) -> None:
+def with_gold_mask(ball: Path, tmp_path: Path, mask: np.ndarray) -> Path:
+    """A capture whose first photo has a mask of a material "gold"."""
     path = edited(
         ball,
         tmp_path,
@@ -174,7 +162,17 @@ def test_mask_of_another_size(ball: Path, tmp_path: Path) -> None:
             + '\n[[material]]\nname = "gold"\n'
         ),
     )
-    made.write_png(path.parent / "m.png", np.zeros((90, 121)))
+    made.write_png(path.parent / "m.png", mask)
+    return path
+
+
+def test_everything_masked(ball: Path, tmp_path: Path) -> None:
+    path = with_gold_mask(ball, tmp_path, np.zeros((90, 120)))
+    refused(path, r"material 1\.name.*all pixels are masked")
+
+
+def test_mask_of_another_size(ball: Path, tmp_path: Path) -> None:
+    path = with_gold_mask(ball, tmp_path, np.zeros((90, 121)))
     refused(path, r"photo 1\.masks\.gold.*121 × 90")
 
 
