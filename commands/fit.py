@@ -75,6 +75,11 @@ def _tell(out: Path, result: CaptureResult) -> None:
         print(f"{material.name}: {material.samples:,} samples{unseen}")
         for warning in material.warnings:
             print(f"  note: {warning}")
+    for note in result.notes:
+        print(f"note: {note}")
+    for name, numbers in result.lights.moved.items():
+        said = ", ".join(f"{k} {v:.3g} ± {e:.2g}" for k, (v, e) in numbers.items())
+        print(f"light {name!r} refined: {said}")
     print(f"wrote {out / 'result.json'}")
     for material in result.materials:
         print(f"      {out / (material.name + '.binary')}")

@@ -1,6 +1,6 @@
 """``import CAPTURE --out FILE.blend``: mesh, cameras with photos behind them, lights.
 
-A folder of a COLMAP model does as well: its cameras and sparse points.
+What a reconstruction tool wrote does as well, without a mesh: its cameras and sparse points.
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ from pathlib import Path
 from ..core.capture import read_capture
 from ..core.errors import InputError
 from ..core.job import inputs
-from ..core.scan.scan import read_reconstruction
+from ..core.job.lights import find_lights
+from ..core.job.photos import LitPhotos
+from ..core.scan.formats import read_reconstruction
 from .staging import staged_folder
 
 HELP = "mesh, cameras with their photos and lights of a capture, as a .blend"
@@ -20,11 +22,14 @@ HELP = "mesh, cameras with their photos and lights of a capture, as a .blend"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "capture", type=Path, help="the capture file (*.capture.toml), or a COLMAP model folder"
+        "capture", type=Path, help="the capture file (*.capture.toml), or a scan's camera file"
     )
     parser.add_argument("--out", type=Path, required=True, help="the .blend to write")
     parser.add_argument(
         "--images", type=Path, help="folder of the photos, for a model without a capture file"
+    )
+    parser.add_argument(
+        "--chunk", help="label of the chunk, for a Metashape file with several and no capture file"
     )
 
 
@@ -33,32 +38,39 @@ def run(arguments: argparse.Namespace) -> None:
     if out.suffix != ".blend":
         raise InputError("expected a file name that ends in .blend", file=out, key="--out")
     print("[  0 %] reading the scan", file=sys.stderr, flush=True)
-    if arguments.capture.is_dir():
-        _import_model(arguments.capture, out, arguments.images)
+    if arguments.capture.is_dir() or arguments.capture.suffix.lower() != ".toml":
+        _import_model(arguments.capture, out, arguments.images, arguments.chunk)
         return
-    if arguments.images is not None:
-        raise InputError("a capture file says itself where its images lie", key="--images")
+    for key in ("images", "chunk"):
+        if getattr(arguments, key) is not None:
+            raise InputError(f"a capture file says its {key} itself", key=f"--{key}")
     capture = read_capture(arguments.capture)
     scan = inputs.open_scan(capture)
     inputs.check_photos(capture, scan)
+    photos = LitPhotos.open(capture)
+    lights = find_lights(capture, scan, photos)
     from ..scene.blend_file import write_import  # needs bpy
 
     with staged_folder(out.parent) as folder:
         _building()
-        write_import(folder / out.name, out, capture, scan)
+        write_import(folder / out.name, out, capture, scan, lights)
+    for note in (*scan.notes, *photos.notes, *lights.notes, *inputs.size_notes(capture, scan)):
+        print(f"  note: {note}")
     print(f"wrote {out}: {len(scan.cameras)} cameras, {len(scan.mesh.faces):,} faces")
 
 
-def _import_model(model: Path, out: Path, images: Path | None) -> None:
+def _import_model(model: Path, out: Path, images: Path | None, chunk: str | None) -> None:
     if images is not None and not images.is_dir():
         raise InputError("no such folder", file=images, key="--images")
-    cameras, points = read_reconstruction(model)
+    found = read_reconstruction(model, images, chunk)
     from ..scene.blend_file import write_reconstruction  # needs bpy
 
     with staged_folder(out.parent) as folder:
         _building()
-        write_reconstruction(folder / out.name, out, cameras, points, images)
-    print(f"wrote {out}: {len(cameras)} cameras, {len(points[0]):,} points")
+        write_reconstruction(folder / out.name, out, found, images)
+    for note in found.notes:
+        print(f"  note: {note}")
+    print(f"wrote {out}: {len(found.cameras)} cameras, {len(found.points):,} points")
 
 
 def _building() -> None:

@@ -10,6 +10,7 @@ from ..core.capture import read_capture
 from ..core.errors import InputError, PatinaError
 from ..core.job import FitJob
 from ..scene.apply import apply_result
+from ..scene.lights import with_dragged_lamps
 from ..scene.running import Running, running, tell
 from .report_errors import refuse
 
@@ -79,7 +80,10 @@ class PATINA_OT_fit(bpy.types.Operator):
         path = Path(bpy.path.abspath(context.scene.patina.capture))
         if not path.is_file():
             raise InputError("is gone; import the capture again from where it is now", file=path)
-        self._job, self._timer = FitJob(read_capture(path)), None
+        capture, dragged = with_dragged_lamps(read_capture(path), context.scene)
+        if dragged:
+            self.report({"INFO"}, f"lights as their lamps stand now: {', '.join(dragged)}")
+        self._job, self._timer = FitJob(capture), None
         self._scene = context.scene.name  # by name: a reference does not survive undo
 
     def _show(self) -> None:

@@ -9,6 +9,8 @@ import bpy
 from ..core.capture import read_capture
 from ..core.errors import PatinaError
 from ..core.job import inputs
+from ..core.job.lights import find_lights
+from ..core.job.photos import LitPhotos
 from ..scene.folders import rectified_folder
 from ..scene.scan_collection import already_there, create_scan_collection
 from .report_errors import refuse
@@ -60,7 +62,9 @@ def bring_in(operator: bpy.types.Operator, context: bpy.types.Context, path: Pat
         capture = read_capture(path)
         scan = inputs.open_scan(capture)
         inputs.check_photos(capture, scan)
-        made = create_scan_collection(context.scene, capture, scan, rectified_folder(path))
+        photos = LitPhotos.open(capture)
+        lights = find_lights(capture, scan, photos)
+        made = create_scan_collection(context.scene, capture, scan, lights, rectified_folder(path))
     except PatinaError as error:
         return refuse(operator, error)
     context.scene.patina.capture = str(path)
@@ -72,6 +76,8 @@ def bring_in(operator: bpy.types.Operator, context: bpy.types.Context, path: Pat
     for area in context.screen.areas if context.screen else ():
         if area.type == "VIEW_3D":
             area.spaces.active.region_3d.view_perspective = "CAMERA"
+    for note in (*scan.notes, *photos.notes, *lights.notes, *inputs.size_notes(capture, scan)):
+        operator.report({"INFO"}, note)
     operator.report(
         {"INFO"},
         f"{len(made.cameras)} cameras, {len(capture.photos)} lit photos, "

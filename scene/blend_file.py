@@ -7,13 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
-import numpy as np
-from numpy.typing import NDArray
 
 from ..core.capture import Capture
 from ..core.errors import PatinaError
 from ..core.job import CaptureResult, Stage
-from ..core.scan import Camera, Scan
+from ..core.job.lights import Lights
+from ..core.scan import Reconstruction, Scan
 from . import materials, osl_files
 from .apply import apply_result, measured_materials
 from .scan_collection import ScanCollection, create_reconstruction, create_scan_collection
@@ -21,23 +20,22 @@ from .scan_collection import ScanCollection, create_reconstruction, create_scan_
 RECTIFIED = "rectified"  # folder beside the .blend for resampled photos of distorted lenses
 
 
-def write_import(path: Path, final: Path, capture: Capture, scan: Scan) -> None:
+def write_import(path: Path, final: Path, capture: Capture, scan: Scan, lights: Lights) -> None:
     """Mesh, cameras with photos, lights. final: where the file will be moved to, with all that
     lies beside it."""
-    _imported(path, capture, scan)
+    _imported(path, capture, scan, lights)
     _save(path, final)
 
 
 def write_reconstruction(
     path: Path,
     final: Path,
-    cameras: Sequence[Camera],
-    points: tuple[NDArray[np.float64], NDArray[np.uint8]],
+    found: Reconstruction,
     images: Path | None,
 ) -> None:
     """Cameras and sparse points of a reconstruction that has no mesh yet."""
     scene = _new_file()
-    create_reconstruction(scene, final.stem, cameras, points, images, path.parent / RECTIFIED)
+    create_reconstruction(scene, final.stem, found, images, path.parent / RECTIFIED)
     _save(path, final)
 
 
@@ -45,7 +43,7 @@ def write_blend(
     path: Path, final: Path, result: CaptureResult, stages: Sequence[Stage]
 ) -> list[str]:
     """A capture with the fitted materials on its mesh; returns notes for the user."""
-    _imported(path, result.capture, result.scan)
+    _imported(path, result.capture, result.scan, result.lights)
     _save(path, final)  # the components' EXR goes beside a saved file
     notes = apply_result(bpy.context.scene, result, stages)
     for material in measured_materials():
@@ -57,9 +55,9 @@ def write_blend(
     return notes
 
 
-def _imported(path: Path, capture: Capture, scan: Scan) -> ScanCollection:
+def _imported(path: Path, capture: Capture, scan: Scan, lights: Lights) -> ScanCollection:
     scene = _new_file()
-    made = create_scan_collection(scene, capture, scan, path.parent / RECTIFIED)
+    made = create_scan_collection(scene, capture, scan, lights, path.parent / RECTIFIED)
     scene.patina.capture = str(capture.file)
     scene.patina.mesh = made.mesh
     return made

@@ -40,7 +40,11 @@ def create_camera(
     data = bpy.data.cameras.new(camera.label)
     data.sensor_fit = "HORIZONTAL"
     data.sensor_width = SENSOR_WIDTH
-    data.lens = lens.focal_length_x * SENSOR_WIDTH / width
+    if seen.orthographic:
+        data.type = "ORTHO"
+        data.ortho_scale = width / lens.focal_length_x
+    else:
+        data.lens = lens.focal_length_x * SENSOR_WIDTH / width
     data.shift_x = (width / 2 - lens.principal_point_x) / width
     data.shift_y = (lens.principal_point_y - height / 2) / width
     data.clip_start, data.clip_end = 0.01 * distance, 100.0 * distance

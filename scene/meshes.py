@@ -8,11 +8,20 @@ from numpy.typing import NDArray
 
 from ..core.scan import Mesh
 
+UV_LAYER, COLOURS = "UVMap", "Col"
+# names of faces' attributes that mean something to Blender itself
+RESERVED = {"material_index", "position", "sharp_face", "sharp_edge", "id", UV_LAYER, COLOURS}
+
 
 def create_mesh_object(
     name: str, mesh: Mesh, origin: NDArray[np.float64], collection: bpy.types.Collection
 ) -> bpy.types.Object:
-    """A smooth-shaded object with the scan's triangles, shifted by −origin."""
+    """A smooth-shaded object with the scan's triangles, shifted by −origin.
+
+    What the scan has of them becomes: the UV layer "UVMap", the colour attribute "Col", an integer
+    attribute of the faces for each of its face attributes ("scan_NAME" where Blender has its own
+    meaning for a name).
+    """
     data = bpy.data.meshes.new(name)
     count = len(mesh.faces)
     data.vertices.add(len(mesh.vertices))
@@ -24,9 +33,30 @@ def create_mesh_object(
     data.polygons.foreach_set("use_smooth", np.ones(count, bool))
     data.update(calc_edges=True)
     data.validate()
+    if len(data.polygons) == count:
+        _add_attributes(data, mesh)
     result = bpy.data.objects.new(name, data)
     collection.objects.link(result)
     return result
+
+
+def _add_attributes(data: bpy.types.Mesh, mesh: Mesh) -> None:
+    if mesh.uv is not None:
+        data.uv_layers.new(name=UV_LAYER, do_init=False)
+        data.uv_layers[UV_LAYER].uv.foreach_set("vector", mesh.uv.astype(np.float32).ravel())
+    if mesh.vertex_colours is not None:
+        _add_colours(data, mesh.vertex_colours)
+    for name, values in mesh.face_attributes.items():
+        own = f"scan_{name}" if name in RESERVED or name.startswith(".") else name
+        attribute = data.attributes.new(own, "INT", "FACE")
+        attribute.data.foreach_set("value", values.astype(np.int32))
+
+
+def _add_colours(data: bpy.types.Mesh, colours: NDArray[np.uint8]) -> None:
+    """8-bit sRGB (v, 3) as the vertices' colour attribute."""
+    attribute = data.color_attributes.new(COLOURS, "BYTE_COLOR", "POINT")
+    srgb = np.concatenate([colours / 255.0, np.ones((len(colours), 1))], axis=1)
+    attribute.data.foreach_set("color_srgb", srgb.astype(np.float32).ravel())
 
 
 def create_points_object(
@@ -39,9 +69,7 @@ def create_points_object(
     data = bpy.data.meshes.new(name)
     data.vertices.add(len(positions))
     data.vertices.foreach_set("co", positions.astype(np.float32).ravel())
-    attribute = data.color_attributes.new("Col", "BYTE_COLOR", "POINT")
-    srgb = np.concatenate([colours / 255.0, np.ones((len(colours), 1))], axis=1)
-    attribute.data.foreach_set("color_srgb", srgb.astype(np.float32).ravel())
+    _add_colours(data, colours)
     data.update()
     result = bpy.data.objects.new(name, data)
     collection.objects.link(result)

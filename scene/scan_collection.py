@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,10 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.capture import Capture
-from ..core.scan import Camera, Scan
+from ..core.errors import PatinaError
+from ..core.job import inputs
+from ..core.job.lights import Lights
+from ..core.light import MountedLight
+from ..core.photo.image import image_size
+from ..core.scan import Camera, Reconstruction, Scan
 from . import cameras, lights, meshes, photos
 from .frame import frame_origin
 from .properties import CAPTURE
+
+log = logging.getLogger(__name__)
 
 PICTURES = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".exr")
 
@@ -30,7 +38,7 @@ class ScanCollection:
 
 
 def create_scan_collection(
-    scene: bpy.types.Scene, capture: Capture, scan: Scan, rectified: Path
+    scene: bpy.types.Scene, capture: Capture, scan: Scan, found: Lights, rectified: Path
 ) -> ScanCollection:
     """Everything of a capture, linked into ``scene``; call only when all of it has been parsed.
 
@@ -40,16 +48,15 @@ def create_scan_collection(
     # photos first: one that cannot be read must leave nothing behind
     own = _own_photos(scan.cameras, scan.images, rectified)
     lit = []
-    for photo in capture.photos:
-        camera = scan.camera(photo.camera)
-        if camera is not None:
-            shown = photos.photo_for(camera, photo.file, rectified)
-            lit.append((camera.label, shown, photo))
+    for place, photo in enumerate(capture.photos):
+        camera = inputs.camera_of(capture, scan, place)
+        lit.append((camera.label, photos.photo_for(camera, photo.file, rectified), photo))
     top, camera_room, light_room = _rooms(scene, name, ("cameras", "lights"))
     top[CAPTURE] = str(capture.file)
     used = scan.mesh.vertices[np.unique(scan.mesh.faces)]
     origin = frame_origin(used)
     centre = 0.5 * (used.min(axis=0) + used.max(axis=0)) - origin
+    top["patina_origin"] = origin.tolist()
     mesh = meshes.create_mesh_object(name, scan.mesh, origin, top)
     made = _cameras(scan.cameras, own, origin, centre, camera_room)
     for place, (label, shown, photo) in enumerate(lit):
@@ -58,17 +65,17 @@ def create_scan_collection(
         made[label]["patina_place"] = place
         made[label]["patina_light"] = photo.light
         made[label][CAPTURE] = str(capture.file)
-    suns = {
-        light.name: lights.create_sun(light, centre, scan.mesh.size, light_room)
-        for light in capture.lights
+    lamps = {
+        light.name: lights.create_lamp(light, origin, centre, scan.mesh.size, light_room)
+        for light in found.by_name.values()
     }
-    for sun in suns.values():
-        sun[CAPTURE] = str(capture.file)
-    first = scan.camera(capture.photos[0].camera)
-    if first is not None:
-        cameras.look_through(scene, made[first.label])
-        lights.shine_only(scene, made[first.label])
-    return ScanCollection(top, mesh, made, suns)
+    for lamp in lamps.values():
+        lamp[CAPTURE] = str(capture.file)
+        lamp["patina_mounted"] = isinstance(found.by_name[lamp[lights.LIGHT]], MountedLight)
+    first = made[lit[0][0]]
+    cameras.look_through(scene, first)
+    lights.shine_only(scene, first)
+    return ScanCollection(top, mesh, made, lamps)
 
 
 def already_there(scene: bpy.types.Scene, capture: Path) -> bpy.types.Collection | None:
@@ -84,20 +91,20 @@ def already_there(scene: bpy.types.Scene, capture: Path) -> bpy.types.Collection
 def create_reconstruction(
     scene: bpy.types.Scene,
     name: str,
-    found: Sequence[Camera],
-    points: tuple[NDArray[np.float64], NDArray[np.uint8]],
+    found: Reconstruction,
     images: Path | None,
     rectified: Path,
 ) -> None:
     """A reconstruction without a mesh: its cameras and its sparse points."""
-    own = _own_photos(found, images, rectified)
+    own = _own_photos(found.cameras, images, rectified)
     top, camera_room = _rooms(scene, name, ("cameras",))
-    positions = points[0] if len(points[0]) else np.array([c.pose.centre for c in found])
+    centres = np.array([c.pose.centre for c in found.cameras])
+    positions = found.points if len(found.points) else centres
     origin = frame_origin(positions)
     centre = np.median(positions, axis=0) - origin
-    if len(points[0]):
-        meshes.create_points_object(f"{name} points", points[0] - origin, points[1], top)
-    made = _cameras(found, own, origin, centre, camera_room)
+    if len(found.points):
+        meshes.create_points_object(f"{name} points", found.points - origin, found.colours, top)
+    made = _cameras(found.cameras, own, origin, centre, camera_room)
     cameras.look_through(scene, next(iter(made.values())))
 
 
@@ -132,11 +139,17 @@ def _cameras(
 def _own_photos(found: Sequence[Camera], images: Path | None, rectified: Path) -> dict[str, Path]:
     """The scan's own photos, where it is known where they lie: label → file to show."""
     there = ((camera, _own_photo(images, camera.label)) for camera in found)
-    return {
-        camera.label: photos.photo_for(camera, photo, rectified)
-        for camera, photo in there
-        if photo is not None
-    }
+    shown = {}
+    for camera, photo in there:
+        if photo is None:
+            continue
+        try:
+            shown[camera.label] = photos.photo_for(
+                camera.resized(*image_size(photo)), photo, rectified
+            )
+        except PatinaError as error:
+            log.warning("the photo of camera %s is not shown: %s", camera.label, error)
+    return shown
 
 
 def _own_photo(images: Path | None, label: str) -> Path | None:

@@ -7,6 +7,8 @@ from pathlib import Path
 from patina.core.capture import read_capture
 from patina.core.geometry import RayScene, SurfaceView, view_surface
 from patina.core.job import inputs
+from patina.core.job.lights import find_lights
+from patina.core.job.photos import LitPhotos
 from patina.core.samples import Margins, SampleTable, sample_photo
 from patina.core.samples.take import light_surface, trusted_pixels
 
@@ -16,13 +18,16 @@ def sampled(path: Path) -> tuple[SampleTable, list[SurfaceView]]:
     capture = read_capture(path)
     scan = inputs.open_scan(capture)
     rays = RayScene.build(scan.mesh)
+    photos = LitPhotos.open(capture)
+    lights = find_lights(capture, scan, photos)
     tables, views = [], []
-    for place, photo in enumerate(capture.photos):
-        light = capture.light(photo.light)
-        view = view_surface(rays, inputs.camera_of(capture, scan, place))
-        lighting = light_surface(rays, view, light)
+    for place in range(len(capture.photos)):
+        light = lights.of(capture, place)
+        camera = inputs.camera_of(capture, scan, place)
+        view = view_surface(rays, camera)
+        lighting = light_surface(rays, view, light, camera)
         keep = trusted_pixels(view, lighting, Margins())
-        radiance = inputs.radiance_of(capture, place)
-        tables.append(sample_photo(view, lighting, light, radiance, keep))
+        radiance = photos.read(place).radiance
+        tables.append(sample_photo(view, lighting, radiance, keep))
         views.append(view)
     return SampleTable.join(tables), views

@@ -13,7 +13,9 @@ def run(data: Path) -> None:
     from patina.core.brdf import nbrdf
     from patina.core.capture import read_capture
     from patina.core.geometry import RayScene, view_surface
-    from patina.core.job.inputs import camera_of, open_scan, radiance_of
+    from patina.core.job.inputs import camera_of, open_scan
+    from patina.core.job.lights import find_lights
+    from patina.core.job.photos import LitPhotos
     from patina.core.samples import Margins, SampleTable, sample_photo
     from patina.core.samples.take import light_surface, trusted_pixels
     from patina.core.scan.mesh import read_mesh
@@ -29,16 +31,19 @@ def run(data: Path) -> None:
         capture = read_capture(scans / name / "scan.capture.toml")
         weights = truth_weights(scans / name / "truth.json")
         scan = open_scan(capture)
+        photos = LitPhotos.open(capture)
+        lights = find_lights(capture, scan, photos)
         for label, mesh in (("scanned", scan.mesh), ("exact", exact)):
             rays = RayScene.build(mesh)
             tables = []
-            for place, photo in enumerate(capture.photos):
-                light = capture.light(photo.light)
-                view = view_surface(rays, camera_of(capture, scan, place))
-                lighting = light_surface(rays, view, light)
+            for place in range(len(capture.photos)):
+                light = lights.of(capture, place)
+                camera = camera_of(capture, scan, place)
+                view = view_surface(rays, camera)
+                lighting = light_surface(rays, view, light, camera)
                 keep = trusted_pixels(view, lighting, Margins())
-                radiance = radiance_of(capture, place)
-                tables.append(sample_photo(view, lighting, light, radiance, keep))
+                radiance = photos.read(place).radiance
+                tables.append(sample_photo(view, lighting, radiance, keep))
             table = SampleTable.join(tables)
             truth = nbrdf.evaluate(weights, table.angles)
             peak = table.theta_h < np.radians(3)

@@ -27,6 +27,8 @@ PINS = {
     "OpenImageIO": "3.0.19.1",
     "scipy": "1.15.3",
     "trimesh": "5.2.0",
+    "defusedxml": "0.7.1",
+    "sunposition": "1.2.1",
 }
 
 TAGS = {
@@ -39,11 +41,15 @@ TAGS = {
     ),
     "scipy": ("manylinux_2_17_x86_64.manylinux2014_x86_64", "win_amd64", "macosx_12_0_arm64"),
     "trimesh": None,
+    "defusedxml": None,
+    "sunposition": None,
 }
 """Per library the platform part of its wheels' names, in the order of PLATFORMS; None: pure Python.
 
 scipy has a wheel for macOS 14 too; the one for macOS 12 is taken because it runs on both.
 """
+
+PURE = {"defusedxml": "py2.py3"}  # the Python part of a pure wheel's name, where it is not py3
 
 FOLDER = ROOT / "wheels"
 SUMS = Path(__file__).with_name("wheels.sha256")
@@ -58,7 +64,7 @@ def wheel_name(library: str, platform: str, python: str) -> str:
     """Return the file name of one wheel."""
     tags = TAGS[library]
     if tags is None:
-        return f"{library.lower()}-{PINS[library]}-py3-none-any.whl"
+        return f"{library.lower()}-{PINS[library]}-{PURE.get(library, 'py3')}-none-any.whl"
     tag = tags[PLATFORMS.index(platform)]
     return f"{library.lower()}-{PINS[library]}-{python}-{python}-{tag}.whl"
 

@@ -1,6 +1,30 @@
 """The capture file: everything a fit needs, by name."""
 
-from .model import Capture, FitOptions, MaterialEntry, PhotoEntry
+from .entries import (
+    ChartEntry,
+    FitOptions,
+    LightEntry,
+    MaterialEntry,
+    PhotoEntry,
+    SphereEntry,
+    SunEntry,
+    ToneEntry,
+    WhiteEntry,
+)
+from .model import Capture, ScanEntry
 from .reader import read_capture
 
-__all__ = ["Capture", "FitOptions", "MaterialEntry", "PhotoEntry", "read_capture"]
+__all__ = [
+    "Capture",
+    "ChartEntry",
+    "FitOptions",
+    "LightEntry",
+    "MaterialEntry",
+    "PhotoEntry",
+    "ScanEntry",
+    "SphereEntry",
+    "SunEntry",
+    "ToneEntry",
+    "WhiteEntry",
+    "read_capture",
+]

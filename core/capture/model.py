@@ -7,41 +7,23 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..errors import InputError
-from ..fit import PaperSettings
-from ..light import DistantLight
-from ..samples import Margins
+from .entries import FitOptions, LightEntry, MaterialEntry, PhotoEntry, ToneEntry
 
 SHADOW_MASK = "shadow"
 
 
 @dataclass(frozen=True)
-class PhotoEntry:
-    """One lit photo. camera: label of the scan camera that shares its viewpoint; light: name of a
-    light; exposure: divides the pixels; masks: material (or "shadow") → mask file, white = in."""
+class ScanEntry:
+    """[scan]. chunk: of a project with several; frame: the mesh's, where the scan knows several;
+    extra: cameras of more photos (what ``localise`` writes); texture: over the mesh's own."""
 
-    file: Path
-    camera: str
-    light: str
-    exposure: float = 1.0
-    masks: dict[str, Path] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class MaterialEntry:
-    """One material to fit. faces: name of the mesh's integer face attribute that says which faces
-    are of it (their value is the material's place in the list, from 0); None: masks, or all."""
-
-    name: str
-    faces: str | None = None
-
-
-@dataclass(frozen=True)
-class FitOptions:
-    """[fit]: what is too close to trust, and the estimator's settings."""
-
-    margins: Margins = field(default_factory=Margins)
-    paper: PaperSettings = field(default_factory=PaperSettings)
-    held_out: bool = True
+    cameras: Path
+    mesh: Path
+    images: Path | None = None
+    chunk: str | None = None
+    frame: str | None = None
+    extra: Path | None = None
+    texture: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -49,18 +31,13 @@ class Capture:
     """A whole capture. lines: key path → line in the file, for messages."""
 
     file: Path
-    cameras: Path
-    mesh: Path
-    images: Path | None
-    lights: tuple[DistantLight, ...]
+    scan: ScanEntry
+    tone: ToneEntry
+    lights: tuple[LightEntry, ...]
     photos: tuple[PhotoEntry, ...]
     materials: tuple[MaterialEntry, ...]
     fit: FitOptions
     lines: dict[tuple[str | int, ...], int] = field(default_factory=dict)
-
-    def light(self, name: str) -> DistantLight:
-        """The light of that name (the reader has checked that it is there)."""
-        return next(light for light in self.lights if light.name == name)
 
     def photo_name(self, place: int) -> str:
         """A photo's file relative to the capture file: two folders may hold the same name."""

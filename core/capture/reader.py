@@ -5,19 +5,15 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
-import numpy as np
-
 from ..errors import InputError
 from ..fit import PaperSettings
-from ..light import DistantLight
 from ..samples import Margins
+from .entries import FitOptions, MaterialEntry
+from .light_section import read_light
 from .lines import key_lines
-from .model import SHADOW_MASK, Capture, FitOptions, MaterialEntry, PhotoEntry
+from .model import SHADOW_MASK, Capture, ScanEntry
+from .photo_section import read_photo_entry, read_tone
 from .section import Section
-
-# Of the contract, but not read by this version: refused by name instead of as unknown
-LIGHTS_TO_COME = ("sphere", "sun", "position", "mounted", "white", "intensity")
-
 
 WINDOWS_DEVICES = {
     "CON",
@@ -42,27 +38,24 @@ def read_capture(path: Path) -> Capture:
     lines = key_lines(text)
     top = Section(data, path.resolve(), lines)
 
-    scan = top.table("scan")
-    cameras, mesh = scan.file_path("cameras"), scan.file_path("mesh")
-    images = scan.optional_file_path("images")
-    if images is not None and not images.is_dir():
-        raise scan.error(f"expected a folder, found a file: {images}", "images")
-    scan.close()
-    lights = tuple(_light(section) for section in top.tables("light"))
+    scan = _scan(top.table("scan"))
+    tone = read_tone(top.table("tone"))
+    lights = tuple(read_light(section) for section in top.tables("light"))
     materials = tuple(_material(section) for section in top.tables("material"))
     _refuse_twins(top, "light", [light.name for light in lights])
     _refuse_twins(top, "material", [material.name for material in materials])
-    known = [light.irradiance is not None for light in lights]
+    known = [light.strength_given for light in lights]
     if any(known) and not all(known):
         place = known.index(False)
         raise top.error(
-            "the irradiance is missing here and given for other lights: give all or none",
+            "the irradiance (or intensity) is missing here and given for other lights: give all "
+            "or none",
             "light",
             place,
-            "irradiance",
+            "irradiance" if lights[place].distant else "intensity",
         )
     photos = tuple(
-        _photo(section, {light.name for light in lights}, {m.name for m in materials})
+        read_photo_entry(section, {light.name for light in lights}, {m.name for m in materials})
         for section in top.tables("photo")
     )
     _refuse_doubles(top, materials, {name for photo in photos for name in photo.masks})
@@ -73,15 +66,30 @@ def read_capture(path: Path) -> Capture:
         raise top.error("no [[photo]]: at least one lit photo is needed", "photo")
     return Capture(
         file=path.resolve(),
-        cameras=cameras,
-        mesh=mesh,
-        images=images,
+        scan=scan,
+        tone=tone,
         lights=lights,
         photos=photos,
         materials=materials or (MaterialEntry("surface"),),
         fit=fit,
         lines=lines,
     )
+
+
+def _scan(section: Section) -> ScanEntry:
+    entry = ScanEntry(
+        cameras=section.file_path("cameras"),
+        mesh=section.file_path("mesh"),
+        images=section.optional_file_path("images"),
+        chunk=section.optional_text("chunk"),
+        frame=section.optional_text("frame"),
+        extra=section.optional_file_path("extra"),
+        texture=section.optional_file_path("texture"),
+    )
+    if entry.images is not None and not entry.images.is_dir():
+        raise section.error(f"expected a folder, found a file: {entry.images}", "images")
+    section.close()
+    return entry
 
 
 def _text(path: Path) -> str:
@@ -106,36 +114,28 @@ def _refuse_twins(top: Section, kind: str, names: list[str]) -> None:
             raise top.error(f"the name {name!r} is used twice", kind, place, "name")
 
 
-def _light(section: Section) -> DistantLight:
-    name = section.text("name")
-    for key in LIGHTS_TO_COME:
-        if section.get(key) is not None:
-            raise section.error(
-                f"a light by {key!r} is not read by this version; give direction and irradiance",
-                key,
-            )
-    direction = section.vector("direction")
-    if direction is None:
-        raise section.error("the key 'direction' is missing", "direction")
-    length = float(np.linalg.norm(direction))
-    if length < 1e-9:
-        raise section.error("the direction has no length", "direction")
-    irradiance = section.vector("irradiance", "red, green, blue")
-    if irradiance is not None and not (irradiance > 0).all():
-        raise section.error(f"found {irradiance.tolist()}, expected positive numbers", "irradiance")
-    section.close()
-    return DistantLight(name, direction / length, irradiance)
-
-
 def _material(section: Section) -> MaterialEntry:
     name = section.text("name")
     faces = section.optional_text("faces")
+    vertex, texture = _colour(section, "vertex_colour"), _colour(section, "texture_colour")
     section.close()
+    if sum(way is not None for way in (faces, vertex, texture)) > 1:
+        raise section.error("expected one of faces, vertex_colour and texture_colour", "faces")
     if name == SHADOW_MASK:
         raise section.error(f"{SHADOW_MASK!r} is the name of the shadow masks", "name")
     if not _is_file_name(name):
         raise section.error(f"{name[:60]!r} cannot be part of a file name everywhere", "name")
-    return MaterialEntry(name, faces)
+    return MaterialEntry(name, faces, vertex, texture)
+
+
+def _colour(section: Section, key: str) -> tuple[int, int, int] | None:
+    value = section.numbers(key, 3)
+    if value is None:
+        return None
+    if ((value < 0) | (value > 255) | (value % 1 != 0)).any():
+        raise section.error("expected three whole numbers from 0 to 255 (sRGB)", key)
+    red, green, blue = (int(x) for x in value)
+    return red, green, blue
 
 
 def _is_file_name(name: str) -> bool:
@@ -151,7 +151,7 @@ def _is_file_name(name: str) -> bool:
 
 def _refuse_doubles(top: Section, materials: tuple[MaterialEntry, ...], masked: set[str]) -> None:
     """Two materials that are both all of the object: the artist forgot the masks."""
-    whole = [i for i, m in enumerate(materials) if m.faces is None and m.name not in masked]
+    whole = [i for i, m in enumerate(materials) if not m.by_mesh and m.name not in masked]
     if len(whole) > 1:
         raise top.error(
             f"{materials[whole[0]].name!r} and {materials[whole[1]].name!r} would both be all of "
@@ -160,25 +160,6 @@ def _refuse_doubles(top: Section, materials: tuple[MaterialEntry, ...], masked: 
             whole[1],
             "name",
         )
-
-
-def _photo(section: Section, lights: set[str], materials: set[str]) -> PhotoEntry:
-    file, camera, light = (
-        section.file_path("file"), section.text("camera"), section.text("light"),
-    )  # fmt: skip
-    exposure = section.number("exposure", 1.0, low=1e-12, high=1e12)
-    entries = section.table("masks")
-    masks = {}
-    for name in entries.data:
-        if name != SHADOW_MASK and name not in materials:
-            raise entries.error(f"no [[material]] is named {name!r}", name)
-        path = entries.file_path(name)
-        masks[name] = path
-    section.close()
-    if light not in lights:
-        known = ", ".join(sorted(lights)) or "none"
-        raise section.error(f"no [[light]] is named {light!r}; there are: {known}", "light")
-    return PhotoEntry(file, camera, light, exposure, masks)
 
 
 def _fit(section: Section) -> FitOptions:

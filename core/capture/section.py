@@ -38,6 +38,9 @@ class Section:
             raise self.error(f"the key {name!r} is missing", name)
         return self.data.get(name)
 
+    def __contains__(self, name: str) -> bool:
+        return name in self.data
+
     def text(self, name: str) -> str:
         """A text that must be there."""
         value = self.get(name, required=True)
@@ -51,7 +54,13 @@ class Section:
 
     def file_path(self, name: str) -> Path:
         """A file or folder that must exist, relative to the capture file."""
-        path = Path(self.text(name))
+        return self.path_of(self.text(name), name)
+
+    def path_of(self, value: Any, name: str) -> Path:
+        """The same, of one value of the key ``name``."""
+        if not isinstance(value, str) or not value:
+            raise self.error(f"found {value!r}, expected a text", name)
+        path = Path(value)
         path = path if path.is_absolute() else self.file.parent / path
         try:
             there = path.exists()
@@ -111,6 +120,33 @@ class Section:
             raise self.error(f"found {found}, expected three numbers [{parts}]", name)
         return np.array(value, np.float64)
 
+    def numbers(self, name: str, count: int) -> NDArray[np.float64] | None:
+        """(count,) finite numbers, or None where the key is absent."""
+        found = self.number_list(name, count, count)
+        return None if found is None else np.array(found)
+
+    def number_list(self, name: str, least: int, most: int) -> tuple[float, ...] | None:
+        """From ``least`` to ``most`` finite numbers, or None where the key is absent."""
+        value = self.get(name)
+        if value is None:
+            return None
+        if not (isinstance(value, list) and least <= len(value) <= most and _finite(value)):
+            many = str(least) if least == most else f"{least} to {most}"
+            raise self.error(f"expected {many} numbers", name)
+        return tuple(float(x) for x in value)
+
+    def points(self, name: str, count: int) -> NDArray[np.float64]:
+        """(count, 2) pixels; must be there."""
+        value = self.get(name, required=True)
+        good = (
+            isinstance(value, list)
+            and len(value) == count
+            and all(isinstance(p, list) and len(p) == 2 and _finite(p) for p in value)
+        )
+        if not good:
+            raise self.error(f"expected {count} points [[x, y], …] in pixels", name)
+        return np.array(value, np.float64)
+
     def table(self, name: str) -> Section:
         value = self.get(name)
         if value is None:
@@ -134,6 +170,12 @@ class Section:
             if name not in self.known:
                 known = ", ".join(sorted(self.known))
                 raise self.error(f"unknown key {name!r}; known here: {known}", name)
+
+
+def _finite(values: list[Any]) -> bool:
+    return all(
+        isinstance(x, int | float) and not isinstance(x, bool) and abs(x) <= LARGEST for x in values
+    )
 
 
 def shortened(path: Path) -> str:

@@ -107,7 +107,7 @@ def _one_trial(
         rows = rng.choice(reliable, min(s.subset, len(reliable)), replace=False)
         drawn = table.select(rows if peak is None else rows[rows != peak[0]])
         if peak is not None:
-            drawn = _prepend(peak[1], drawn)
+            drawn = SampleTable.prepend(peak[1], drawn)
         q = basis.rows(drawn.angles, s.samples)[1]
         theta_h, brightness = drawn.theta_h, drawn.rho.mean(axis=1)
         last = redraw == REDRAWS
@@ -134,18 +134,3 @@ def _one_trial(
     q = q[chosen]
     mapped = basis.mapped(picked.rho, picked.angles)
     return ridge.solve(q, mapped, s.eta), picked, float(np.linalg.cond(q))
-
-
-def _prepend(one: SampleTable, rest: SampleTable) -> SampleTable:
-    """The peak first; both tables speak of the same photos."""
-    joined = SampleTable.join([one, rest])
-    return SampleTable(
-        **{
-            name: getattr(joined, name)
-            for name in joined.__dataclass_fields__
-            if name not in ("photo", "light", "irradiance")
-        },
-        photo=np.concatenate([one.photo, rest.photo]),
-        light=rest.light,
-        irradiance=rest.irradiance,
-    )

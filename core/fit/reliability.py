@@ -36,15 +36,14 @@ def highest_intensity(table: SampleTable) -> tuple[int, SampleTable]:
     Brightest for the light it was given (L / E: lamps may differ in strength), among the samples
     that the margins trust.
     """
-    given = table.irradiance.astype(np.float32)[table.photo]
-    row = int((table.radiance / given).mean(axis=1).argmax())
+    row = int((table.radiance / table.irradiance).mean(axis=1).argmax())
     one = table.select(np.array([row]))
-    light = one.light[one.photo]
+    light = one.light.astype(np.float64)
     half = light + one.view
     half = half / np.linalg.norm(half, axis=1, keepdims=True)
     angles = half_difference(half, light, one.view.astype(np.float64))
     cos_i = np.einsum("ij,ij->i", half, light)
-    rho = one.radiance / (one.irradiance[one.photo] * cos_i[:, None])
+    rho = one.radiance / (one.irradiance * cos_i[:, None])
     return row, SampleTable(
         photo=one.photo, pixel=one.pixel,
         theta_h=np.zeros(1, np.float32), theta_d=angles.theta_d.astype(np.float32),

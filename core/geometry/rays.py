@@ -42,7 +42,8 @@ class RayScene:
         return cls(mesh, origin, scene)
 
     def first_hits(self, start: NDArray[np.float64], directions: NDArray[np.float64]) -> Hits:
-        """First hits of rays from one point ``start`` (3,) along ``directions`` (n, 3)."""
+        """First hits of rays along ``directions`` (n, 3) from one point ``start`` (3,), or from a
+        point each (n, 3)."""
         n = len(directions)
         face = np.empty(n, np.int32)
         u, v = np.empty(n, np.float32), np.empty(n, np.float32)
@@ -50,21 +51,33 @@ class RayScene:
         for begin in range(0, n, CHUNK):
             part = slice(begin, min(begin + CHUNK, n))
             along = np.ascontiguousarray(directions[part], np.float32)
-            found = self.scene.run(np.tile(local, (len(along), 1)), along, output=True)
+            begins = np.broadcast_to(local if local.ndim == 1 else local[part], along.shape)
+            found = self.scene.run(np.ascontiguousarray(begins), along, output=True)
             face[part], u[part], v[part] = found["primID"], found["u"], found["v"]
         return Hits(face, u, v)
 
     def occluded(
-        self, points: NDArray[np.float64], direction: NDArray[np.float64]
+        self,
+        points: NDArray[np.float64],
+        directions: NDArray[np.float64],
+        limits: NDArray[np.float64] | None = None,
     ) -> NDArray[np.bool_]:
-        """(n,) whether anything lies from ``points`` (n, 3) along one ``direction`` (3,)."""
+        """(n,) whether anything lies from ``points`` (n, 3) along unit ``directions``, (3,) or
+        (n, 3), nearer than ``limits`` (n,) where given."""
         blocked = np.empty(len(points), bool)
-        towards = np.asarray(direction, np.float32)
         for begin in range(0, len(points), CHUNK):
-            start = np.ascontiguousarray(points[begin : begin + CHUNK] - self.origin, np.float32)
-            found = self.scene.run(start, np.tile(towards, (len(start), 1)), query="OCCLUDED")
-            blocked[begin : begin + CHUNK] = np.asarray(found) >= 0
+            part = slice(begin, begin + CHUNK)
+            start = np.ascontiguousarray(points[part] - self.origin, np.float32)
+            one = directions if directions.ndim == 1 else directions[part]
+            along = np.ascontiguousarray(np.broadcast_to(one, start.shape), np.float32)
+            far = None if limits is None else np.ascontiguousarray(limits[part], np.float32)
+            found = self.scene.run(start, along, far, query="OCCLUDED")
+            blocked[part] = np.asarray(found) >= 0
         return blocked
+
+    def reach(self, start: NDArray[np.float64]) -> float:
+        """How far the mesh's centre is from the middle of ``start`` (n, 3)."""
+        return float(np.linalg.norm(start.mean(axis=0) - self.origin))
 
     def points(self, hits: Hits) -> NDArray[np.float64]:
         """(n, 3) surface points of hits (all must hit)."""

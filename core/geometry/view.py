@@ -50,36 +50,45 @@ def view_surface(rays: RayScene, camera: Camera) -> SurfaceView:
     rows, columns = np.indices(shape, np.float64)
     pixels = np.stack([columns.ravel() + 0.5, rows.ravel() + 0.5], axis=1)
     directions = camera.rays(pixels)
-    centre = camera.pose.centre
-    hits = rays.first_hits(centre, directions)
-    pixel = np.flatnonzero(hits.face >= 0).astype(np.int32)
+    start = camera.ray_starts(pixels)
+    if camera.orthographic:  # its rays come from behind all of the object
+        start = start - directions * (rays.reach(start) + rays.mesh.size)
+    blind = ~np.isfinite(directions).all(axis=1)  # corners that the lens does not reach
+    directions[blind] = -directions[~blind][0] if (~blind).any() else 1.0
+    hits = rays.first_hits(start, directions)
+    pixel = np.flatnonzero((hits.face >= 0) & ~blind).astype(np.int32)
     found = Hits(hits.face[pixel], hits.u[pixel], hits.v[pixel])
     point, normal = rays.points(found), rays.normals(found)
     view = -directions[pixel]
 
     depth = np.full(shape[0] * shape[1], np.nan, np.float32)
-    depth[pixel] = np.einsum("ij,ij->i", centre - point, view)
+    from_start = (start if start.ndim == 1 else start[pixel]) - point
+    depth[pixel] = np.einsum("ij,ij->i", from_start, view)
     depth = depth.reshape(shape)
-    focal = 0.5 * (camera.lens.focal_length_x + camera.lens.focal_length_y)
     in_camera = np.full((shape[0] * shape[1], 3), np.nan, np.float32)
     in_camera[pixel] = (normal @ camera.pose.rotation.T) * (1.0, 1.0, -1.0)
     curvature = mean_curvature(in_camera.reshape(*shape, 3)).ravel()[pixel]
     return SurfaceView(
         shape=shape,
-        seen=(hits.face >= 0).reshape(shape),
+        seen=np.isfinite(depth),
         pixel=pixel,
         face=found.face,
         point=point,
         normal=normal,
         view=view,
         curvature=curvature,
-        silhouette=edges.silhouette(depth, depth / focal),
+        silhouette=edges.silhouette(depth, camera.footprint(depth)),
     )
 
 
 def cast_shadow(
-    rays: RayScene, view: SurfaceView, direction: NDArray[np.float64]
+    rays: RayScene,
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    towards: NDArray[np.float64],
+    distance: NDArray[np.float64] | None,
 ) -> NDArray[np.bool_]:
-    """(n,) whether the mesh blocks the light along ``direction`` (3,) at each pixel's point."""
+    """(n,) whether the mesh blocks the light along ``towards`` (n, 3) at ``points`` (n, 3) with
+    ``normals`` (n, 3), up to ``distance`` (n,) where the light is near."""
     lift = SHADOW_LIFT * rays.mesh.size
-    return rays.occluded(view.point + lift * view.normal, direction)
+    return rays.occluded(points + lift * normals, towards, distance)

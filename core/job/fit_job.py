@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..appearance.principled_fit import PrincipledFit, fit_principled
 from ..basis import Basis
-from ..capture import Capture
+from ..capture import Capture, LightEntry
 from ..errors import FitError
 from ..fit import PaperFit, fit_paper
 from ..fit.held_out import HeldOut, leave_out, photos_to_hold_out, summarise
@@ -23,6 +23,8 @@ from ..samples.take import light_surface, trusted_pixels
 from ..scan import Scan
 from . import inputs
 from .job import Job, Step
+from .lights import Lights, find_lights, refined
+from .photos import LitPhotos
 from .warnings import black_photos, material_warnings, trust_warnings
 
 LEAST_RHO, LARGEST_RHO = 1e-6, 1e4  # 1/sr: black velvet has 1e-3, mirrors' peaks 1e4
@@ -47,10 +49,14 @@ class MaterialResult:
 
 @dataclass(frozen=True)
 class CaptureResult:
-    """Everything a fit found. face_material: (f,) int, place of each face's material."""
+    """Everything a fit found. face_material: (f,) int, place of each face's material; notes: what
+    was read, assumed and left out, a sentence each."""
 
     capture: Capture
     scan: Scan
+    photos: LitPhotos
+    lights: Lights
+    notes: tuple[str, ...]
     rays: RayScene
     basis: Basis
     materials: tuple[MaterialResult, ...]
@@ -64,6 +70,12 @@ class _Taken:
     tables: dict[str, list[SampleTable]]
     marked: dict[str, int]
     votes: FaceVotes
+
+
+def _way(entry: LightEntry) -> str:
+    """The key that says where a light is."""
+    ways = ("sphere", "sun", "position", "mounted")
+    return next((way for way in ways if getattr(entry, way) is not None), "direction")
 
 
 class FitJob(Job):
@@ -85,21 +97,36 @@ class FitJob(Job):
         inputs.check_photos(capture, scan)
         yield Step("reading the scan", 0.03)
         rays = RayScene.build(scan.mesh)
-        taken = yield from self._take_samples(scan, rays)
+        photos = LitPhotos.open(capture)
+        lights = find_lights(capture, scan, photos)
+        if any(entry.refine for entry in capture.lights):
+            yield Step("refining the lights", 0.04)
+            lights = refined(lights, capture, scan, photos, rays, basis)
+        taken = yield from self._take_samples(scan, rays, photos, lights)
         results = []
         for index in range(len(capture.materials)):
-            results.append((yield from self._fit_material(index, taken, basis)))
+            results.append((yield from self._fit_material(index, taken, basis, lights.known)))
         yield Step("materials on the mesh", 0.97)
         self.result = CaptureResult(
             capture=capture,
             scan=scan,
+            photos=photos,
+            lights=lights,
+            notes=(
+                *scan.notes,
+                *photos.notes,
+                *lights.notes,
+                *inputs.size_notes(capture, scan),
+            ),
             rays=rays,
             basis=basis,
             materials=tuple(results),
             face_material=self._face_material(scan, taken.votes),
         )
 
-    def _take_samples(self, scan: Scan, rays: RayScene) -> Generator[Step, None, _Taken]:
+    def _take_samples(
+        self, scan: Scan, rays: RayScene, photos: LitPhotos, lights: Lights
+    ) -> Generator[Step, None, _Taken]:
         capture = self.capture
         taken = _Taken(
             tables={m.name: [] for m in capture.materials},
@@ -110,14 +137,15 @@ class FitJob(Job):
         seen_by = {light.name: 0 for light in capture.lights}
         for place, photo in enumerate(capture.photos):
             yield Step("sampling the photos", 0.05 + 0.35 * place / len(capture.photos))
-            view = view_surface(rays, inputs.camera_of(capture, scan, place))
-            light = capture.light(photo.light)
-            lighting = light_surface(rays, view, light)
+            camera = inputs.camera_of(capture, scan, place)
+            view = view_surface(rays, camera)
+            lighting = light_surface(rays, view, lights.of(capture, place), camera)
             seen_by[photo.light] += len(view.pixel)
             lit_by[photo.light] += int((~lighting.shadowed).sum())
             where, in_shadow = inputs.material_pixels(capture, scan, view, place)
             trusted = trusted_pixels(view, lighting, capture.fit.margins) & ~in_shadow
-            radiance = inputs.radiance_of(capture, place)
+            lit = photos.read(place)
+            trusted &= lit.usable.ravel()[view.pixel]
             for index, material in enumerate(capture.materials):
                 pixels = where[material.name]
                 taken.marked[material.name] += int(pixels.sum())
@@ -125,14 +153,12 @@ class FitJob(Job):
                 part = view.image(pixels, fill=0).astype(bool)
                 inner = edges.inside(part, view.seen, capture.fit.margins.mask)
                 keep = trusted & inner.ravel()[view.pixel]
-                taken.tables[material.name].append(
-                    sample_photo(view, lighting, light, radiance, keep)
-                )
+                taken.tables[material.name].append(sample_photo(view, lighting, lit.radiance, keep))
         self._check_light(seen_by, lit_by)
         return taken
 
     def _fit_material(
-        self, index: int, taken: _Taken, basis: Basis
+        self, index: int, taken: _Taken, basis: Basis, known: bool
     ) -> Generator[Step, None, MaterialResult]:
         capture = self.capture
         name = capture.materials[index].name
@@ -140,7 +166,6 @@ class FitJob(Job):
         start = 0.4 + share * index
         yield Step(f"fitting {name}", start)
         table = SampleTable.join(taken.tables.pop(name))
-        known = all(capture.light(photo.light).irradiance is not None for photo in capture.photos)
         self._check_samples(index, table, taken.marked[name], known)
         scale = 1.0
         if not known:
@@ -194,8 +219,9 @@ class FitJob(Job):
         """What masks say, and over it what the mesh says where a material is given by its faces."""
         found = votes.winners(scan.mesh)
         for index, material in enumerate(self.capture.materials):
-            if material.faces is not None:
-                found[scan.mesh.face_attributes[material.faces] == index] = index
+            attribute = inputs.face_attribute(material)
+            if attribute is not None:
+                found[scan.mesh.face_attributes[attribute] == index] = index
         return found
 
     def _check_light(self, seen_by: dict[str, int], lit_by: dict[str, int]) -> None:
@@ -206,7 +232,7 @@ class FitJob(Job):
                 raise self.capture.error(
                     f"the light {light.name!r} stands behind everything its photos see: no pixel "
                     "is lit; direction points from the surface TO the light, in the scan's frame",
-                    "light", place, "direction",
+                    "light", place, _way(light),
                 )  # fmt: skip
 
     def _check_samples(self, index: int, table: SampleTable, marked: int, known: bool) -> None:

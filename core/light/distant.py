@@ -7,17 +7,37 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..scan import Camera
+from .incidence import Incidence
+
+Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class DistantLight:
     """direction: (3,) unit, surface → light, scan frame. irradiance: (3,) at normal incidence, in
-    radiance units of the photos × sr; None where unknown (the BRDF is then known up to a scale)."""
+    radiance units of the photos × sr; None where unknown (the BRDF is then known up to a scale).
+    angular_radius: radians, of the source as the object sees it (the sun's is 0.00465)."""
 
     name: str
-    direction: NDArray[np.float64]
-    irradiance: NDArray[np.float64] | None = None
+    direction: Array
+    irradiance: Array | None = None
+    angular_radius: float = 0.0
 
     @property
-    def effective_irradiance(self) -> NDArray[np.float64]:
+    def known(self) -> bool:
+        """True where the irradiance is."""
+        return self.irradiance is not None
+
+    @property
+    def effective_irradiance(self) -> Array:
         """(3,) the irradiance, or 1 where unknown."""
         return np.ones(3) if self.irradiance is None else self.irradiance
+
+    def incidence(self, points: Array, camera: Camera) -> Incidence:
+        """The same at all points (n, 3)."""
+        n = len(points)
+        return Incidence(
+            np.broadcast_to(self.direction, (n, 3)),
+            np.broadcast_to(self.effective_irradiance, (n, 3)),
+        )

@@ -1,6 +1,32 @@
-"""Image files → linear radiance, and masks."""
+"""Image files → linear radiance, exposure, noise; and masks."""
 
-from .image import read_encoded, read_mask, read_radiance, write_exr, write_png
+from .bracket import Merged, merge_bracket
+from .clipping import black, clipped
+from .exif import Exif, read_exif
+from .image import image_size, read_encoded, read_mask, write_exr, write_png
+from .noise import Noise, estimate_noise
+from .photo import Photo, PhotoInfo, read_photo, read_radiance
 from .rectify import rectify
+from .transfer import Transfer
 
-__all__ = ["read_encoded", "read_mask", "read_radiance", "rectify", "write_exr", "write_png"]
+__all__ = [
+    "Exif",
+    "Merged",
+    "Noise",
+    "Photo",
+    "PhotoInfo",
+    "Transfer",
+    "black",
+    "clipped",
+    "estimate_noise",
+    "image_size",
+    "merge_bracket",
+    "read_encoded",
+    "read_exif",
+    "read_mask",
+    "read_photo",
+    "read_radiance",
+    "rectify",
+    "write_exr",
+    "write_png",
+]

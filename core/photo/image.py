@@ -8,57 +8,161 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from ..errors import InputError, PatinaError
-from .png_check import check_png
+from . import raw
+from .container import RAW, Container, check_container, check_size
 
-LINEAR = {".exr"}
 FIXED_DATE = "2000:01:01 00:00:00"  # else the clock is written: same pixels, other bytes
+ROWS = 256  # read at a time: whole chunks of every EXR compression
+MOST_CHANNELS = 256
+
+# its other EXR reader prints what it finds wrong with a file on standard error
+oiio.attribute("openexr:core", 1)
 
 
-def read_radiance(path: Path) -> NDArray[np.float32]:
-    """(h, w, 3) linear radiance of an EXR, in the photo's own units. Raises InputError.
+@dataclass(frozen=True)
+class OpenImage:
+    """An image whose header has been read and found sane."""
+
+    path: Path
+    container: Container
+    file: oiio.ImageInput
+
+    def colour(self) -> tuple[int, list[int]]:
+        """(part, channels) that hold R, G, B, or a grey image three times. Raises InputError."""
+        try:
+            return self._colour()
+        except UnicodeDecodeError as error:
+            raise InputError("names its channels in no known encoding", file=self.path) from error
+
+    def _colour(self) -> tuple[int, list[int]]:
+        listed: list[str] = []
+        part = 0
+        while (spec := self.file.spec(part)).nchannels > 0:
+            names = [name.upper() for name in spec.channelnames]
+            if {"R", "G", "B"} <= set(names):
+                return part, [names.index(c) for c in "RGB"]
+            if len(names) <= 2 and names[0] in ("Y", "R", "L", "V", "I"):
+                return part, [0, 0, 0]
+            listed += spec.channelnames
+            part += 1
+        raise InputError(
+            f"has no channels R, G and B (nor a grey Y); it has {', '.join(listed[:20])}",
+            file=self.path,
+        )
+
+    def blocks(self, part: int, channels: list[int]) -> Iterator[tuple[int, NDArray]]:
+        """(first row, (rows, w, 1 or 3) pixels as stored), from top to bottom.
+
+        One channel for a grey image. Raises InputError where the file ends or is damaged.
+        """
+        spec = self.file.spec(part)
+        check_size(self.path, spec.width, spec.height)
+        tile = spec.tile_height if spec.tile_width else 1
+        if spec.nchannels > MOST_CHANNELS or spec.tile_width * spec.tile_height > 1 << 26:
+            raise InputError("has absurd tiles or too many channels", file=self.path)
+        first, last = min(channels), max(channels) + 1
+        wanted = [0] if last - first == 1 else [c - first for c in channels]
+        step = -(-ROWS // tile) * tile
+        for top in range(0, spec.height, step):
+            end = min(top + step, spec.height)
+            y0, y1 = spec.y + top, spec.y + end
+            span = (first, last, oiio.UNKNOWN)
+            if spec.tile_width:
+                x0, x1 = spec.x, spec.x + spec.width
+                block = self.file.read_tiles(part, 0, x0, x1, y0, y1, 0, 1, *span)
+            else:
+                block = self.file.read_scanlines(part, 0, y0, y1, 0, *span)
+            if block is None:
+                raise InputError(f"not a whole image ({_reason(self.file)})", file=self.path)
+            block = block.reshape(end - top, spec.width, last - first)
+            yield top, block[:, :, wanted]
+
+
+@contextmanager
+def open_image(path: Path) -> Iterator[OpenImage]:
+    """Open an image that OpenImageIO reads. Raises InputError."""
+    container = check_container(path)
+    hints = oiio.ImageSpec()
+    hints.attribute("oiio:UnassociatedAlpha", 1)  # else colours come multiplied by their alpha
+    file = oiio.ImageInput.open(str(path), hints)
+    if file is None:
+        raise InputError(f"not a readable image ({_reason(oiio)})", file=path)
+    try:
+        spec = file.spec()
+        whole = (spec.x, spec.y, spec.width, spec.height)
+        if whole != (spec.full_x, spec.full_y, spec.full_width, spec.full_height):
+            raise InputError("holds a cropped image (data and display window differ)", file=path)
+        check_size(path, spec.width, spec.height)
+        if spec.depth > 1 or spec.deep:
+            raise InputError("holds a volume or deep pixels; expected a flat image", file=path)
+        yield OpenImage(path, container, file)
+    finally:
+        _reason(file)  # what is left unread would be printed at the program's end
+        file.close()
+
+
+def read_encoded(path: Path) -> NDArray[np.float32]:
+    """(h, w, 3) pixels as the file encodes them (0..1 for integer formats). Raises InputError.
 
     The channels R, G, B are read by their names, in whichever part of the file holds them; a grey
     image (Y) is repeated into three channels; others (alpha, depth …) are left out.
     """
-    if path.suffix.lower() not in LINEAR:
-        raise InputError(
-            f"photo format {path.suffix!r} is not read; expected a linear .exr", file=path
-        )
-    return read_encoded(path)
-
-
-def read_encoded(path: Path) -> NDArray[np.float32]:
-    """(h, w, 3) pixels as the file encodes them (0..1 for integer formats)."""
-    with _open(path) as image:
-        part, channels = _colour(image, path)
-        pixels = _read(image, path, part)
-    return np.ascontiguousarray(pixels[:, :, channels])
+    with open_image(path) as image:
+        part, channels = image.colour()
+        spec = image.file.spec(part)
+        out = np.empty((spec.height, spec.width, 3), np.float32)
+        for top, block in image.blocks(part, channels):
+            rows = out[top : top + len(block)]
+            if block.dtype.kind == "u":
+                np.multiply(block, np.float32(1 / np.iinfo(block.dtype).max), out=rows)
+            else:
+                rows[:] = block
+        return out
 
 
 def read_mask(path: Path) -> NDArray[np.bool_]:
     """(h, w) where the mask is white (above one half) and not transparent. Raises InputError."""
-    with _open(path) as image:
-        spec = image.spec()
+    with open_image(path) as image:
+        spec = image.file.spec()
+        if spec.nchannels > MOST_CHANNELS:
+            raise InputError("has too many channels for a mask", file=path)
         alpha = spec.alpha_channel
-        pixels = _read(image, path, 0)
+        pixels = image.file.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
+        if pixels is None:
+            raise InputError(f"not a whole image ({_reason(image.file)})", file=path)
+        pixels = np.atleast_3d(np.asarray(pixels, np.float32))
     colours = [c for c in range(pixels.shape[2]) if c != alpha][:3]
     white = pixels[:, :, colours].max(axis=2) if colours else np.ones(pixels.shape[:2])
     return (white > 0.5) & (alpha < 0 or pixels[:, :, alpha] > 0.5)
 
 
 def image_size(path: Path) -> tuple[int, int]:
-    """(width, height) of an image, read from its header only. Raises InputError."""
-    with _open(path) as image:
-        spec = image.spec()
+    """(width, height) of an image, camera RAW included, as stored. Raises InputError."""
+    if path.suffix.lower() in RAW:
+        return raw.raw_size(path)
+    with open_image(path) as image:
+        spec = image.file.spec()
         return spec.width, spec.height
+
+
+def attributes(path: Path) -> dict[str, object]:
+    """{name: value} of an image's header. Raises InputError."""
+    with open_image(path) as image:
+        found: dict[str, object] = {}
+        for entry in image.file.spec().extra_attribs:
+            with suppress(UnicodeDecodeError):
+                found[entry.name] = entry.value
+        return found
 
 
 def write_exr(path: Path, pixels: NDArray[np.floating], half: bool = False) -> None:
@@ -73,50 +177,13 @@ def write_png(path: Path, pixels: NDArray[np.uint8]) -> None:
     _write(path, pixels, "uint8")
 
 
-@contextmanager
-def _open(path: Path) -> Iterator[oiio.ImageInput]:
-    if not path.is_file():
-        raise InputError("is not a file" if path.exists() else "no such file", file=path)
-    if path.suffix.lower() == ".png":
-        check_png(path)  # its reader would print on its own
-    image = oiio.ImageInput.open(str(path))
-    if image is None:
-        raise InputError(f"not a readable image ({oiio.geterror()})", file=path)
+def _reason(source: Any) -> str:
+    """Why OpenImageIO or one of its files failed, in one line."""
     try:
-        kind = image.format_name()
-        if path.suffix.lower() == ".exr" and kind != "openexr":
-            raise InputError(f"is named .exr, but holds a {kind} image", file=path)
-        spec = image.spec()
-        whole = (spec.x, spec.y, spec.width, spec.height)
-        if whole != (spec.full_x, spec.full_y, spec.full_width, spec.full_height):
-            raise InputError("holds a cropped image (data and display window differ)", file=path)
-        yield image
-    finally:
-        image.close()
-
-
-def _read(image: oiio.ImageInput, path: Path, part: int) -> NDArray[np.float32]:
-    pixels = image.read_image(part, 0, 0, image.spec(part).nchannels, oiio.FLOAT)
-    if pixels is None:
-        raise InputError(f"not a whole image ({image.geterror()})", file=path)
-    return np.atleast_3d(np.asarray(pixels, np.float32))
-
-
-def _colour(image: oiio.ImageInput, path: Path) -> tuple[int, list[int]]:
-    """(part, channels) that hold R, G, B, or a grey image three times."""
-    listed: list[str] = []
-    part = 0
-    while (spec := image.spec(part)).nchannels > 0:
-        names = [name.upper() for name in spec.channelnames]
-        if {"R", "G", "B"} <= set(names):
-            return part, [names.index(c) for c in "RGB"]
-        if len(names) <= 2 and names[0] in ("Y", "R", "L", "V"):
-            return part, [0, 0, 0]
-        listed += spec.channelnames
-        part += 1
-    raise InputError(
-        f"has no channels R, G and B (nor a grey Y); it has {', '.join(listed)}", file=path
-    )
+        found = " ".join(str(source.geterror()).split())
+    except UnicodeDecodeError:  # the message quotes the damaged bytes
+        found = "its header is damaged"
+    return found[:200] or "no reason given"
 
 
 def _write(path: Path, pixels: NDArray, kind: str) -> None:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from ..angles import half_difference
 from ..basis import PrincipalBRDF
 from ..geometry import RayScene, SurfaceView
-from ..light import DistantLight
+from ..light import Light
 from ..samples.take import light_surface
+from ..scan import Camera
 
 
 @dataclass(frozen=True)
@@ -29,20 +30,22 @@ class PredictedPhoto:
 def predict_photo(
     rays: RayScene,
     view: SurfaceView,
-    light: DistantLight,
+    light: Light,
+    camera: Camera,
     parts: list[tuple[NDArray[np.bool_], PrincipalBRDF, float]],
 ) -> PredictedPhoto:
     """parts: ((n,) pixels of the view, BRDF, its scale) of every material; the scale is what the
     BRDF is too large by where the irradiance is unknown."""
-    lighting = light_surface(rays, view, light)
+    lighting = light_surface(rays, view, light, camera)
     values = np.full((len(view.pixel), 3), np.nan, np.float32)
     for pixels, brdf, scale in parts:
         values[pixels] = 0.0
         lit = pixels & ~lighting.shadowed
-        angles = half_difference(view.normal[lit], light.direction[None, :], view.view[lit])
+        incidence = lighting.incidence.select(lit)
+        angles = half_difference(view.normal[lit], incidence.towards, view.view[lit])
         values[lit] = (
             brdf.evaluate(angles)
-            * (light.effective_irradiance / scale).astype(np.float32)
+            * (incidence.irradiance / scale).astype(np.float32)
             * lighting.cos_i[lit, None]
         )
     return PredictedPhoto(view.image(values))

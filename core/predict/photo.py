@@ -17,7 +17,7 @@ def predict_radiance(
 ) -> NDArray[np.float32]:
     """(n, 3) radiance of every sample's pixel for one BRDF, coefficients (3, k)."""
     rho = basis.evaluate(coefficients, table.angles)
-    return rho * table.irradiance[table.photo].astype(np.float32) * table.cos_i[:, None]
+    return rho * table.irradiance * table.cos_i[:, None]
 
 
 def similarity_sums(
@@ -32,7 +32,7 @@ def similarity_sums(
         part = slice(start, start + CHUNK)
         angles = Angles(*(a[part] for a in table.angles))
         rho = basis.evaluate(flat, angles).reshape(-1, t, 3)
-        scale = table.irradiance[table.photo[part]] * table.cos_i[part, None]
+        scale = table.irradiance[part].astype(np.float64) * table.cos_i[part, None]
         predicted = rho * scale[:, None, :]
         measured = table.radiance[part].astype(np.float64)
         dot += np.einsum("ntc,nc->t", predicted, measured)

@@ -108,12 +108,13 @@ def _figures(material: MaterialResult) -> list[tuple[str, str]]:
 
 def _photo_row(folder: Path, result: CaptureResult, place: int) -> str:
     capture = result.capture
-    photo = capture.photos[place]
-    view = view_surface(result.rays, inputs.camera_of(capture, result.scan, place))
+    camera = inputs.camera_of(capture, result.scan, place)
+    view = view_surface(result.rays, camera)
     where, _ = inputs.material_pixels(capture, result.scan, view, place)
     parts = [(where[m.name], m.fit.brdf, m.scale) for m in result.materials]
-    predicted = predict_photo(result.rays, view, capture.light(photo.light), parts)
-    measured = inputs.radiance_of(capture, place)
+    light = result.lights.of(capture, place)
+    predicted = predict_photo(result.rays, view, light, camera, parts)
+    measured = result.photos.read(place).radiance
     box = display.crop_box(view.seen, margin=12)
     a = display.shrink(measured[box], LONGEST)
     b = display.shrink(predicted.radiance[box], LONGEST)

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..job import CaptureResult, MaterialResult, Stage
+from ..job import CaptureResult, MaterialResult, Stage, inputs
+from ..light import Light
 
 MANIFEST = Path(__file__).parents[2] / "blender_manifest.toml"
 FORMAT = 1
@@ -46,6 +47,8 @@ def describe(
             "provenance": basis.provenance,
         },
         "capture": str(result.capture.file),
+        "notes": list(result.notes),
+        "lights": [_light(result, light) for light in result.lights.by_name.values()],
         "materials": [_material(result, m) for m in result.materials],
         "warnings": list(notes),
         "stages": [
@@ -55,12 +58,28 @@ def describe(
     }
 
 
+def _light(result: CaptureResult, light: Light) -> dict[str, Any]:
+    """Kind, place and strength of a light; of a refined one what moved, with its standard error."""
+    numbers = {
+        key: None if value is None else np.asarray(value, float).tolist()
+        for key, value in vars(light).items()
+        if key != "name"
+    }
+    moved = result.lights.moved.get(light.name, {})
+    return {
+        "name": light.name,
+        "kind": type(light).__name__.removesuffix("Light").lower(),
+        **numbers,
+        "refined": {
+            key: {"value": value, "standard_error": error if np.isfinite(error) else None}
+            for key, (value, error) in moved.items()
+        },
+    }
+
+
 def _material(result: CaptureResult, material: MaterialResult) -> dict[str, Any]:
     fit, held, photos = material.fit, material.held_out, result.capture.photos
-    width = {
-        i: (result.scan.camera(photo.camera) or result.scan.cameras[0]).width
-        for i, photo in enumerate(photos)
-    }
+    width = {i: inputs.camera_of(result.capture, result.scan, i).width for i in range(len(photos))}
     chosen = fit.chosen
     names = [result.capture.photo_name(place) for place in range(len(photos))]
     principled = material.principled

@@ -23,5 +23,5 @@ def at_typical_level(table: SampleTable, basis: Basis) -> tuple[SampleTable, flo
     measured = np.median(some.rho.mean(axis=1) * mapping.cos_map(some.angles))
     factor = float(typical / measured)
     return replace(
-        table, rho=table.rho * np.float32(factor), irradiance=table.irradiance / factor
+        table, rho=table.rho * np.float32(factor), irradiance=table.irradiance / np.float32(factor)
     ), factor

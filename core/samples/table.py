@@ -18,8 +18,8 @@ class SampleTable:
     photo: (n,) int16 index of the photo; pixel: (n,) int32 flat index in it.
     theta_h, theta_d, phi_d: (n,) float32, radians, of the scanned normal.
     cos_i, cos_o: (n,) float32. rho: (n, 3) float32, L / (E · cos θi), 1/sr.
-    radiance: (n, 3) float32, the photo's units. irradiance: (photos, 3) of each photo's light.
-    light: (photos, 3) unit direction surface → light, scan frame.
+    radiance: (n, 3) float32, the photo's units. irradiance: (n, 3) float32 at normal incidence.
+    light: (n, 3) float32 unit direction surface → light, scan frame.
     normal, view: (n, 3) float32 unit, scan frame. curvature: (n,) float32, 1/pixel, NaN unknown.
     """
 
@@ -35,8 +35,8 @@ class SampleTable:
     normal: NDArray[np.float32]
     view: NDArray[np.float32]
     curvature: NDArray[np.float32]
-    light: NDArray[np.float64]
-    irradiance: NDArray[np.float64]
+    light: NDArray[np.float32]
+    irradiance: NDArray[np.float32]
 
     def __len__(self) -> int:
         return len(self.photo)
@@ -47,20 +47,29 @@ class SampleTable:
 
     def select(self, which: NDArray) -> SampleTable:
         """The rows of a boolean mask or an index array."""
-        rows = {
-            f.name: getattr(self, f.name)[which]
-            for f in fields(self)
-            if f.name not in ("light", "irradiance")
-        }
-        return SampleTable(**rows, light=self.light, irradiance=self.irradiance)
+        return SampleTable(**{f.name: getattr(self, f.name)[which] for f in fields(self)})
 
     @staticmethod
-    def join(tables: Sequence[SampleTable]) -> SampleTable:
-        """Tables of several photos, one after the other. Photo i of the result is table i."""
+    def join(tables: Sequence[SampleTable], photos: Sequence[int] | None = None) -> SampleTable:
+        """Tables of several photos, one after the other. Photo i of the result is table i, or
+        photos[i]."""
         rows = {
             f.name: np.concatenate([getattr(t, f.name) for t in tables])
             for f in fields(SampleTable)
             if f.name != "photo"
         }
-        photo = np.concatenate([np.full(len(t), i, np.int16) for i, t in enumerate(tables)])
+        numbers = range(len(tables)) if photos is None else photos
+        photo = np.concatenate(
+            [np.full(len(t), i, np.int16) for i, t in zip(numbers, tables, strict=True)]
+        )
         return SampleTable(photo=photo, **rows)
+
+    @staticmethod
+    def prepend(one: SampleTable, rest: SampleTable) -> SampleTable:
+        """Both tables speak of the same photos."""
+        return SampleTable(
+            **{
+                f.name: np.concatenate([getattr(one, f.name), getattr(rest, f.name)])
+                for f in fields(SampleTable)
+            }
+        )

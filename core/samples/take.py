@@ -1,4 +1,4 @@
-"""Reflectance samples of one photo under one distant light (the paper, section 3.1)."""
+"""Reflectance samples of one photo under one light (the paper, section 3.1)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from ..angles import half_difference
 from ..geometry import RayScene, SurfaceView, edges
 from ..geometry.view import cast_shadow
-from ..light import DistantLight
+from ..light import Incidence, Light
+from ..scan import Camera
 from .table import SampleTable
 
 
@@ -28,23 +29,25 @@ class Margins:
 
 @dataclass(frozen=True)
 class Lighting:
-    """How light falls on a SurfaceView: cos_i (n,) signed; shadowed (n,) attached or cast."""
+    """How light falls on a SurfaceView: incidence at every pixel's point; cos_i (n,) signed;
+    shadowed (n,) attached or cast."""
 
+    incidence: Incidence
     cos_i: NDArray[np.float64]
     shadowed: NDArray[np.bool_]
 
 
-def light_surface(rays: RayScene, view: SurfaceView, light: DistantLight) -> Lighting:
-    """Irradiance cosine and shadow at every pixel's point."""
-    cos_i = view.normal @ light.direction
+def light_surface(rays: RayScene, view: SurfaceView, light: Light, camera: Camera) -> Lighting:
+    """Light, irradiance cosine and shadow at every pixel's point, in the camera's photo."""
+    incidence = light.incidence(view.point, camera)
+    cos_i = np.einsum("ij,ij->i", view.normal, incidence.towards)
     shadowed = cos_i <= 0
-    facing = ~shadowed
-    part = SurfaceView(
-        view.shape, view.seen, view.pixel[facing], view.face[facing], view.point[facing],
-        view.normal[facing], view.view[facing], view.curvature[facing], view.silhouette,
-    )  # fmt: skip
-    shadowed[facing] = cast_shadow(rays, part, light.direction)
-    return Lighting(cos_i, shadowed)
+    facing = np.flatnonzero(~shadowed)
+    some = incidence.select(facing)
+    shadowed[facing] = cast_shadow(
+        rays, view.point[facing], view.normal[facing], some.towards, some.distance
+    )
+    return Lighting(incidence, cos_i, shadowed)
 
 
 def trusted_pixels(view: SurfaceView, lighting: Lighting, margins: Margins) -> NDArray[np.bool_]:
@@ -67,7 +70,6 @@ def trusted_pixels(view: SurfaceView, lighting: Lighting, margins: Margins) -> N
 def sample_photo(
     view: SurfaceView,
     lighting: Lighting,
-    light: DistantLight,
     radiance: NDArray[np.float32],
     keep: NDArray[np.bool_],
 ) -> SampleTable:
@@ -76,10 +78,10 @@ def sample_photo(
     radiance: (h, w, 3) linear, in the units of the light's irradiance / sr.
     """
     normal, towards = view.normal[keep], view.view[keep]
-    angles = half_difference(normal, light.direction[None, :], towards)
+    incidence = lighting.incidence.select(keep)
+    angles = half_difference(normal, incidence.towards, towards)
     seen = radiance.reshape(-1, 3)[view.pixel[keep]]
     cos_i = lighting.cos_i[keep]
-    irradiance = light.effective_irradiance
     return SampleTable(
         photo=np.zeros(len(seen), np.int16),
         pixel=view.pixel[keep],
@@ -88,11 +90,11 @@ def sample_photo(
         phi_d=angles.phi_d.astype(np.float32),
         cos_i=cos_i.astype(np.float32),
         cos_o=np.einsum("ij,ij->i", normal, towards).astype(np.float32),
-        rho=(seen / (irradiance * cos_i[:, None])).astype(np.float32),
+        rho=(seen / (incidence.irradiance * cos_i[:, None])).astype(np.float32),
         radiance=seen.astype(np.float32),
         normal=normal.astype(np.float32),
         view=towards.astype(np.float32),
         curvature=view.curvature[keep],
-        light=light.direction[None, :],
-        irradiance=irradiance[None, :],
+        light=incidence.towards.astype(np.float32),
+        irradiance=incidence.irradiance.astype(np.float32),
     )

@@ -2,6 +2,7 @@
 
 from .camera import Camera, Pose
 from .mesh import Mesh
+from .reconstruction import Georeference, Reconstruction, Similarity
 from .scan import Scan
 
-__all__ = ["Camera", "Mesh", "Pose", "Scan"]
+__all__ = ["Camera", "Georeference", "Mesh", "Pose", "Reconstruction", "Scan", "Similarity"]

@@ -6,14 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pycolmap
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from .camera import Camera, Pose
 from .colmap_check import check_binary_model
-
-# positions (n, 3) in scan units, sRGB colours (n, 3)
-Points = tuple[NDArray[np.float64], NDArray[np.uint8]]
+from .reconstruction import Reconstruction, reconstruction_of
 
 
 def is_colmap(folder: Path) -> bool:
@@ -24,65 +21,45 @@ def is_colmap(folder: Path) -> bool:
     )
 
 
-def read_colmap_with_points(folder: Path) -> tuple[tuple[Camera, ...], Points]:
-    """(cameras as read_colmap gives them, the sparse points). Raises InputError."""
+def read_colmap(folder: Path) -> Reconstruction:
+    """All registered cameras of a model folder, and its points. Raises InputError."""
     model = _open(folder)
     points = list(model.points3D.values())
     positions = np.array([point.xyz for point in points], np.float64).reshape(-1, 3)
     colours = np.array([point.color for point in points], np.uint8).reshape(-1, 3)
     finite = np.isfinite(positions).all(axis=1)
-    return _cameras(model, folder), (positions[finite], colours[finite])
+    cameras, unplaced = _cameras(model, folder)
+    return reconstruction_of(
+        cameras, folder, points=positions[finite], colours=colours[finite],
+        notes=(f"{unplaced} images have no pose and are left out",) if unplaced else (),
+    )  # fmt: skip
 
 
-def read_colmap(folder: Path) -> tuple[Camera, ...]:
-    """All registered cameras of a model folder, sorted by label. Raises InputError."""
-    return _cameras(_open(folder), folder)
-
-
-def _cameras(model: pycolmap.Reconstruction, folder: Path) -> tuple[Camera, ...]:
-    cameras: dict[str, Camera] = {}
+def _cameras(model: pycolmap.Reconstruction, folder: Path) -> tuple[list[Camera], int]:
+    """(the cameras with a pose, how many have none)."""
+    cameras: list[Camera] = []
+    unplaced = 0
     for image in model.images.values():
         if not image.has_pose:
+            unplaced += 1
             continue
         try:
             label = image.name
         except UnicodeDecodeError as error:
             raise InputError("an image's name is not UTF-8", file=folder) from error
-        if label in cameras:
-            raise InputError(f"two images are named {label!r}", file=folder)
         lens = model.cameras[image.camera_id]
         pose = image.cam_from_world()
-        cameras[label] = Camera(
+        camera = Camera(
             label=label,
             width=int(lens.width),
             height=int(lens.height),
             model=lens.model.name,
             parameters=tuple(float(p) for p in lens.params),
             pose=Pose(np.array(pose.rotation.matrix()), np.array(pose.translation)),
+            photo=label,
         )
-    if not cameras:
-        raise InputError("the COLMAP model has no image with a pose", file=folder)
-    for camera in cameras.values():
-        _check(camera, folder)
-    return tuple(sorted(cameras.values(), key=lambda camera: camera.label))
-
-
-def _check(camera: Camera, folder: Path) -> None:
-    """Refuse what no camera is; text models reach this unchecked."""
-    found = None
-    rotation = camera.pose.rotation
-    if camera.width <= 0 or camera.height <= 0:
-        found = f"is {camera.width} × {camera.height} pixels"
-    elif not np.isfinite(camera.parameters).all():
-        found = "has parameters that are not finite numbers"
-    elif not (np.isfinite(rotation).all() and np.isfinite(camera.pose.translation).all()):
-        found = "has a pose that is not made of finite numbers"
-    elif not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4):
-        found = "has a rotation that is none"
-    elif min(camera.lens.focal_length_x, camera.lens.focal_length_y) <= 1e-6:
-        found = f"has a focal length of {camera.lens.focal_length_x:g} pixels"
-    if found is not None:
-        raise InputError(f"the camera of {camera.label!r} {found}", file=folder)
+        cameras.append(camera)
+    return cameras, unplaced
 
 
 def _open(folder: Path) -> pycolmap.Reconstruction:

@@ -1,76 +1,139 @@
-"""Mesh and cameras together, in the frame the reconstruction tool gave them."""
+"""Mesh and cameras together, in one frame."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from .camera import Camera
-from .colmap import Points, is_colmap, read_colmap, read_colmap_with_points
+from .formats import read_reconstruction
 from .mesh import Mesh, read_mesh
+from .reconstruction import Georeference, Reconstruction
+
+SOME = 2000  # vertices asked whether cameras see them
+MUCH_BETTER = 1.2  # times as much of the mesh seen, for another frame to be believed
 
 
 @dataclass(frozen=True)
 class Scan:
-    """A scanned object: its mesh, the cameras that saw it, where its own photos lie (if known)."""
+    """A scanned object: its mesh, the cameras that saw it, where its own photos lie (if known),
+    where on Earth it is (if known), and what its readers left out or assumed."""
 
     mesh: Mesh
     cameras: tuple[Camera, ...]
     images: Path | None = None
+    georeference: Georeference | None = None
+    notes: tuple[str, ...] = ()
 
     def camera(self, label: str) -> Camera | None:
         """The camera of that label; a label is also found without its folder and extension
         (COLMAP says "IMG_0041.jpg", Metashape "IMG_0041") where that is unambiguous."""
-        for camera in self.cameras:
-            if camera.label == label:
-                return camera
-        same = [c for c in self.cameras if Path(c.label).stem == Path(label).stem]
-        return same[0] if len(same) == 1 else None
+        return find_camera(self.cameras, label)
 
 
-def read_cameras(path: Path) -> tuple[Camera, ...]:
-    """The cameras of any model Patina reads. Raises InputError."""
-    return read_colmap(_colmap_folder(path))
+def find_camera(cameras: Sequence[Camera], label: str) -> Camera | None:
+    """The camera of that label, or the only one whose label is the same without folder and
+    extension."""
+    for camera in cameras:
+        if camera.label == label:
+            return camera
+    same = [c for c in cameras if _stem(c.label) == _stem(label)]
+    return same[0] if len(same) == 1 else None
 
 
-def read_reconstruction(path: Path) -> tuple[tuple[Camera, ...], Points]:
-    """Cameras and sparse points of a model that has no mesh yet. Raises InputError."""
-    return read_colmap_with_points(_colmap_folder(path))
+def _stem(label: str) -> str:
+    name = PurePosixPath(label.replace("\\", "/")).name
+    head, dot, tail = name.rpartition(".")
+    # "IMG.0041" has no extension
+    return head if dot and tail.isalnum() and not tail.isdigit() and len(tail) <= 4 else name
 
 
-def _colmap_folder(path: Path) -> Path:
-    if not path.is_dir():
-        raise InputError("cameras of this kind are not read; expected a COLMAP folder", file=path)
-    if is_colmap(path):
-        return path
-    near = [p for p in (path / "sparse" / "0", path / "sparse", path / "0") if is_colmap(p)]
-    hint = f"; there is one in {near[0].relative_to(path)}" if near else ""
-    raise InputError(f"the folder holds no COLMAP model (cameras and images){hint}", file=path)
+def read_scan(
+    cameras: Path,
+    mesh: Path,
+    images: Path | None = None,
+    chunk: str | None = None,
+    frame: str | None = None,
+) -> Scan:
+    """Mesh and cameras from files, brought into one frame: the mesh's. Raises InputError.
+
+    frame: name of the frame the mesh was exported in, where the reconstruction knows several;
+    without it the one whose cameras see the mesh is taken.
+    """
+    reconstruction = read_reconstruction(cameras, images, chunk)
+    surface = read_mesh(mesh)
+    found, note = _in_common_frame(reconstruction, surface, mesh, frame)
+    notes = (*reconstruction.notes, *surface.notes, *((note,) if note else ()))
+    return Scan(surface, found.cameras, images, found.georeference, notes)
 
 
-def read_scan(cameras: Path, mesh: Path, images: Path | None = None) -> Scan:
-    """Mesh and cameras from files, checked to be in one frame. Raises InputError."""
-    scan = Scan(read_mesh(mesh), read_cameras(cameras), images)
-    check_common_frame(scan, mesh)
-    return scan
+def with_extra_cameras(scan: Scan, file: Path) -> Scan:
+    """The scan with the cameras of another file in its frame: photos that were localised later.
+    Raises InputError where a label is there already."""
+    more = read_reconstruction(file)
+    there = {camera.label for camera in scan.cameras}
+    for camera in more.cameras:
+        if camera.label in there:
+            raise InputError(f"the scan has a camera {camera.label!r} already", file=file)
+    cameras = sorted((*scan.cameras, *more.cameras), key=lambda camera: camera.label)
+    return replace(scan, cameras=tuple(cameras), notes=(*scan.notes, *more.notes))
 
 
-def check_common_frame(scan: Scan, mesh_file: Path) -> None:
+def _in_common_frame(
+    reconstruction: Reconstruction, mesh: Mesh, mesh_file: Path, frame: str | None
+) -> tuple[Reconstruction, str | None]:
+    """(the reconstruction in the mesh's frame, a sentence where that was not its own)."""
+    if frame is not None and frame != "cameras":
+        if frame not in reconstruction.frames:
+            known = ", ".join(["cameras", *reconstruction.frames])
+            raise InputError(
+                f"the scan has no frame {frame!r}; it knows: {known}", key="scan.frame"
+            )
+        moved = reconstruction.moved(frame)
+        check_common_frame(moved.cameras, mesh, mesh_file)
+        return moved, None
+    own = seen_fraction(reconstruction.cameras, mesh)
+    if frame is None:
+        others = {name: reconstruction.moved(name) for name in reconstruction.frames}
+        shares = {name: seen_fraction(other.cameras, mesh) for name, other in others.items()}
+        best = max(shares, key=lambda name: shares[name], default=None)
+        if best is not None and shares[best] > MUCH_BETTER * own:
+            return others[best], f"the mesh lies in the frame {best!r} of the scan"
+    check_common_frame(reconstruction.cameras, mesh, mesh_file)
+    return reconstruction, None
+
+
+def seen_fraction(cameras: Sequence[Camera], mesh: Mesh) -> float:
+    """Mean fraction of the mesh's vertices that project into a camera's photo."""
+    some = _some_vertices(mesh)
+    few = cameras[:: max(1, len(cameras) // 50)]
+    return float(np.mean([_inside(camera, some).mean() for camera in few]))
+
+
+def check_common_frame(cameras: Sequence[Camera], mesh: Mesh, mesh_file: Path) -> None:
     """Refuse a mesh that no camera sees: it was exported in another frame than the cameras."""
-    vertices = scan.mesh.vertices
-    some = vertices[:: max(1, len(vertices) // 2000)]
-    for camera in scan.cameras:
-        pixels = camera.project(some)
-        with np.errstate(invalid="ignore"):
-            inside = (pixels >= 0) & (pixels < (camera.width, camera.height))
-        if inside.all(axis=1).any():
-            return
+    some = _some_vertices(mesh)
+    if any(_inside(camera, some).any() for camera in cameras):
+        return
     raise InputError(
         "the mesh lies in another frame than the cameras: no vertex projects into any photo; "
         "export mesh and cameras from the same project, without a transform of its own",
         file=mesh_file,
         key="scan.mesh",
     )
+
+
+def _some_vertices(mesh: Mesh) -> NDArray[np.float64]:
+    return mesh.vertices[:: max(1, len(mesh.vertices) // SOME)]
+
+
+def _inside(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    pixels = camera.project(points)
+    with np.errstate(invalid="ignore"):
+        inside: NDArray[np.bool_] = (pixels >= 0) & (pixels < (camera.width, camera.height))
+    return np.asarray(inside.all(axis=1))

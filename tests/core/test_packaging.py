@@ -19,7 +19,11 @@ SETUP = (
     "inside", "package", "staging", "wheels",
 )  # fmt: skip
 ROOMS = ("core", "scene", "operators", "panels", "commands")
-LIBRARIES = {"numpy", "scipy", "pycolmap", "OpenImageIO", "embreex", "trimesh"}
+LIBRARIES = {"numpy", "scipy", "pycolmap", "OpenImageIO", "embreex", "trimesh"} | {
+    "defusedxml",
+    "sunposition",
+    "rawpy",  # where it is there
+}
 BLENDER = {
     "bpy",
     "_cycles",

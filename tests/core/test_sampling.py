@@ -12,6 +12,8 @@ from patina.core.capture import read_capture
 from patina.core.geometry import RayScene, edges, view_surface
 from patina.core.geometry.curvature import mean_curvature
 from patina.core.job import inputs
+from patina.core.job.lights import find_lights
+from patina.core.job.photos import LitPhotos
 from patina.core.samples import Margins, SampleTable
 from patina.core.samples.face_votes import FaceVotes
 from patina.core.samples.take import light_surface, trusted_pixels
@@ -32,7 +34,7 @@ def tables(ball: Path) -> tuple[SampleTable, list]:
 
 def test_samples_read_the_true_reflectance(tables: tuple[SampleTable, list]) -> None:
     table, _ = tables
-    light = table.light[table.photo]
+    light = table.light.astype(float)
     truth = made.blinn(table.normal, light, table.view)
     ratio = table.rho / truth
     assert len(table) > 5000
@@ -52,7 +54,7 @@ def test_points_and_normals_are_those_of_the_sphere(tables: tuple[SampleTable, l
 def test_angles_in_the_table_belong_to_its_vectors(tables: tuple[SampleTable, list]) -> None:
     table, _ = tables
     again = half_difference(
-        table.normal.astype(float), table.light[table.photo], table.view.astype(float)
+        table.normal.astype(float), table.light.astype(float), table.view.astype(float)
     )
     assert np.allclose(again.theta_h, table.theta_h, atol=1e-5)
     assert np.allclose(again.theta_d, table.theta_d, atol=1e-5)
@@ -120,8 +122,10 @@ def test_margins_leave_out_what_they_say(ball: Path) -> None:
     capture = read_capture(ball)
     scan = inputs.open_scan(capture)
     rays = RayScene.build(scan.mesh)
-    view = view_surface(rays, inputs.camera_of(capture, scan, 1))
-    lighting = light_surface(rays, view, capture.light(capture.photos[1].light))
+    camera = inputs.camera_of(capture, scan, 1)
+    view = view_surface(rays, camera)
+    light = find_lights(capture, scan, LitPhotos.open(capture)).of(capture, 1)
+    lighting = light_surface(rays, view, light, camera)
     lit = view.image(~lighting.shadowed, fill=0).astype(bool)
     terminator = edges.shadow_edge(lit, view.seen)
     wide = trusted_pixels(view, lighting, Margins())

@@ -1,0 +1,117 @@
+"""Pixels drawn from the lit photos for calibration: calm surface, its light averaged a little."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry import RayScene
+from ..geometry.rays import Hits
+from ..scan import Camera
+
+Array = NDArray[np.float64]
+
+REACH = 3  # pixels to the neighbours that must see the same surface
+CALM = np.cos(np.radians(12.0))  # with nearly the same normal
+BOX = 2  # radiance is the mean of (2 BOX + 1)² pixels: texture and noise average out
+DARK = 0.003  # of the bright end: below it a photo shows noise and stray light
+
+
+@dataclass(frozen=True)
+class Seen:
+    """n pixels of one photo. point, normal, view: (n, 3) float64, scan frame, view surface →
+    camera; radiance: (n,) mean of the channels."""
+
+    camera: Camera
+    point: Array
+    normal: Array
+    view: Array
+    radiance: Array
+
+    def select(self, which: NDArray) -> Seen:
+        """The rows of a boolean mask or an index array."""
+        return Seen(
+            self.camera, self.point[which], self.normal[which], self.view[which],
+            self.radiance[which],
+        )  # fmt: skip
+
+
+def draw_pixels(
+    rays: RayScene,
+    camera: Camera,
+    radiance: NDArray[np.float32],
+    usable: NDArray[np.bool_],
+    count: int,
+    rng: np.random.Generator,
+) -> Seen:
+    """Up to ``count`` pixels of a photo: radiance (h, w, 3), usable (h, w)."""
+    edge = REACH + BOX
+    rows, columns = np.indices((camera.height - 2 * edge, camera.width - 2 * edge))
+    where = rng.permutation(rows.size)[: 40 * count]  # most of a photo may be background
+    row, column = rows.ravel()[where] + edge, columns.ravel()[where] + edge
+    found: list[Seen] = []
+    drawn = 0
+    for begin in range(0, len(where), 8 * count):
+        part = slice(begin, begin + 8 * count)
+        found.append(_calm(rays, camera, radiance, usable, row[part], column[part]))
+        drawn += len(found[-1].radiance)
+        if drawn >= count:
+            break
+    joined = Seen(
+        camera,
+        *(np.concatenate([getattr(s, k) for s in found]) for k in ("point", "normal", "view")),
+        np.concatenate([s.radiance for s in found]),
+    )
+    return joined.select(slice(0, count))  # type: ignore[arg-type]
+
+
+def _calm(
+    rays: RayScene,
+    camera: Camera,
+    radiance: NDArray[np.float32],
+    usable: NDArray[np.bool_],
+    row: NDArray[np.intp],
+    column: NDArray[np.intp],
+) -> Seen:
+    """Of these pixels the ones whose neighbours see the same, gently curved surface."""
+    keep = np.ones(len(row), bool)
+    face, u, v = np.full(len(row), -1, np.int32), np.zeros(len(row)), np.zeros(len(row))
+    centre = np.zeros((len(row), 3))
+    along = np.zeros((len(row), 3))
+    for k, (down, right) in enumerate(((0, 0), (REACH, 0), (-REACH, 0), (0, REACH), (0, -REACH))):
+        some = np.flatnonzero(keep)
+        pixels = np.stack([column[some] + right + 0.5, row[some] + down + 0.5], axis=1)
+        directions = camera.rays(pixels)
+        start = camera.ray_starts(pixels)
+        if camera.orthographic:
+            start = start - directions * (rays.reach(start) + rays.mesh.size)
+        hits = rays.first_hits(start, np.nan_to_num(directions, nan=1.0))
+        hit = (hits.face >= 0) & np.isfinite(directions).all(axis=1)
+        keep[some[~hit]] = False
+        met = Hits(hits.face[hit], hits.u[hit], hits.v[hit])
+        normal = rays.normals(met)
+        if k == 0:
+            centre[some[hit]], along[some[hit]] = normal, directions[hit]
+            face[some[hit]], u[some[hit]], v[some[hit]] = met.face, met.u, met.v
+        else:
+            same = np.einsum("ij,ij->i", normal, centre[some[hit]]) > CALM
+            keep[some[hit][~same]] = False
+    window = range(-BOX, BOX + 1)
+    light, whole = np.zeros(len(row)), np.ones(len(row), bool)
+    for down in window:
+        for right in window:
+            light += radiance[row + down, column + right].mean(axis=1)
+            whole &= usable[row + down, column + right]
+    keep &= whole & (light > 0)
+    hits = Hits(face[keep], u[keep].astype(np.float32), v[keep].astype(np.float32))
+    return Seen(
+        camera, rays.points(hits), centre[keep], -along[keep], light[keep] / len(window) ** 2
+    )
+
+
+def not_dark(seen: list[Seen]) -> list[Seen]:
+    """Without what is nearly black in all photos together."""
+    bright = float(np.percentile(np.concatenate([s.radiance for s in seen]), 95))
+    return [s.select(s.radiance > DARK * bright) for s in seen]

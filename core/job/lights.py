@@ -1,0 +1,195 @@
+"""From what a capture says of its lights to where they are: spheres, sun, white targets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..basis import Basis
+from ..calibrate.refine import refine_lights
+from ..calibrate.seen import Seen, draw_pixels
+from ..capture import Capture, LightEntry, SphereEntry, SunEntry, WhiteEntry
+from ..errors import InputError, PatinaError
+from ..geometry import RayScene
+from ..light import DistantLight, Light, MountedLight, NearLight
+from ..light.sphere import light_from_sphere
+from ..light.sphere_outline import Circle
+from ..light.sun import sun_direction, sun_in_scan
+from ..light.sun_time import photo_place, photo_time
+from ..light.white import irradiance_from_white
+from ..photo import read_mask
+from ..photo.image import attributes
+from ..scan import Scan
+from ..scan.scan import find_camera
+from . import inputs
+from .photos import LitPhotos
+
+Array = NDArray[np.float64]
+
+SUN_RADIUS = np.radians(0.2666)  # mean angular radius
+PIXELS = 1000  # of each photo, for refining
+
+
+@dataclass(frozen=True)
+class Lights:
+    """by_name: every light of the capture. moved: of the refined ones, number → (value, standard
+    error). unexplained: median |log residual| (before, after) refining. notes: sentences."""
+
+    by_name: dict[str, Light]
+    notes: tuple[str, ...] = ()
+    moved: dict[str, dict[str, tuple[float, float]]] = field(default_factory=dict)
+    unexplained: tuple[float, float] | None = None
+
+    def of(self, capture: Capture, place: int) -> Light:
+        """The light of a photo."""
+        return self.by_name[capture.photos[place].light]
+
+    @property
+    def known(self) -> bool:
+        """True where reflectance has a scale."""
+        return all(light.known for light in self.by_name.values())
+
+
+def find_lights(capture: Capture, scan: Scan, photos: LitPhotos) -> Lights:
+    """Every light where its entry says it is; those to be refined are where the search will start.
+    Raises InputError naming the capture's key."""
+    found: dict[str, Light] = {}
+    notes: list[str] = []
+    for place, entry in enumerate(capture.lights):
+        found[entry.name] = _light(capture, scan, photos, place, entry, notes)
+    return Lights(found, tuple(notes))
+
+
+def refined(
+    lights: Lights, capture: Capture, scan: Scan, photos: LitPhotos, rays: RayScene, basis: Basis
+) -> Lights:
+    """The lights marked ``refine`` moved to where one material explains all photos best."""
+    free = [entry.name for entry in capture.lights if entry.refine]
+    rng = np.random.default_rng(0)
+    seen: list[tuple[str, Seen]] = []
+    for place, photo in enumerate(capture.photos):
+        lit = photos.read(place)
+        camera = inputs.camera_of(capture, scan, place)
+        seen.append((photo.light, draw_pixels(rays, camera, lit.radiance, lit.usable, PIXELS, rng)))
+    found = refine_lights(lights.by_name, free, seen, rays, basis)
+    return replace(
+        lights, by_name=found.lights, moved=found.moved, unexplained=(found.before, found.after)
+    )
+
+
+def _light(
+    capture: Capture,
+    scan: Scan,
+    photos: LitPhotos,
+    place: int,
+    entry: LightEntry,
+    notes: list[str],
+) -> Light:
+    if entry.position is not None:
+        return NearLight(entry.name, entry.position, entry.strength, entry.radius)
+    if entry.mounted is not None:
+        return MountedLight(entry.name, entry.mounted, entry.strength, entry.radius, entry.beam)
+    radius = 0.0 if entry.angle is None else 0.5 * entry.angle
+    key = "direction"
+    try:
+        if entry.sphere is not None:
+            key = "sphere"
+            direction, said = _from_sphere(scan, photos, entry.sphere)
+        elif entry.sun is not None:
+            key = "sun"
+            direction, said = _from_sun(capture, scan, entry)
+            radius = SUN_RADIUS if entry.angle is None else radius
+        else:
+            assert entry.direction is not None  # the reader has made sure of one
+            direction, said = entry.direction, []
+        strength = entry.strength
+        if entry.white is not None:
+            key = "white"
+            strength, more = _from_white(photos, entry.white, direction)
+            said = [*said, *more]
+    except PatinaError as error:
+        raise capture.error(str(error), "light", place, key) from error
+    notes += [f"light {entry.name!r}: {sentence}" for sentence in said]
+    return DistantLight(entry.name, direction, strength, radius)
+
+
+def _from_sphere(scan: Scan, photos: LitPhotos, entry: SphereEntry) -> tuple[Array, Sequence[str]]:
+    camera = find_camera(scan.cameras, entry.camera)
+    if camera is None:
+        raise InputError(
+            f"the scan has no camera {entry.camera!r}: the photo of the sphere needs the viewpoint "
+            "of a scan photo, or must be localised"
+        )
+    lit = photos.read_other(entry.photo)
+    camera = camera.resized(lit.radiance.shape[1], lit.radiance.shape[0])
+    outline: Circle | NDArray[np.bool_] | None = None
+    if entry.mask is not None:
+        outline = read_mask(entry.mask)
+    elif entry.centre is not None and entry.radius is not None:
+        outline = Circle((float(entry.centre[0]), float(entry.centre[1])), entry.radius)
+    surface = "glossy" if entry.surface == "glossy" else "chrome"
+    found = light_from_sphere(lit.radiance, camera, outline, surface=surface)
+    said = [
+        f"direction from the sphere, ± {np.degrees(found.uncertainty):.2f}°",
+        *found.notes,
+    ]
+    return found.direction, said
+
+
+def _from_sun(capture: Capture, scan: Scan, light: LightEntry) -> tuple[Array, Sequence[str]]:
+    entry = light.sun or SunEntry()
+    first = next((p for p in capture.photos if p.light == light.name), None)
+    tags = attributes(first.file) if first is not None else {}
+    said: list[str] = []
+    time = entry.time
+    if time is None:
+        told = photo_time(tags)
+        time = told.time
+        said += [f"time {time.isoformat()} from the photo's {told.source}", *told.notes]
+    geo = scan.georeference
+    latitude, longitude, altitude = entry.latitude, entry.longitude, entry.altitude
+    if latitude is None or longitude is None:
+        if geo is not None:
+            latitude, longitude = geo.latitude, geo.longitude
+            altitude = geo.altitude if altitude is None else altitude
+            said.append("place from the scan's georeference")
+        else:
+            here = photo_place(tags)
+            latitude, longitude = here.latitude, here.longitude
+            altitude = here.altitude if altitude is None else altitude
+            said.append("place from the photo's GPS")
+    north, up = entry.north, entry.up
+    if north is None or up is None:
+        if geo is None:
+            raise InputError(
+                "the scan does not know where north is: give north and up, in its frame",
+                key="north",
+            )
+        north, up = geo.north, geo.up
+    altitude = float(np.clip(altitude or 0.0, -500.0, 20_000.0))
+    sun = sun_direction(latitude, longitude, time, altitude)
+    said.append(
+        f"the sun stood at azimuth {np.degrees(sun.azimuth) % 360:.2f}°, elevation "
+        f"{np.degrees(sun.elevation):.2f}°"
+    )
+    return sun_in_scan(sun.enu, north, up), said
+
+
+def _from_white(
+    photos: LitPhotos, entry: WhiteEntry, direction: Array
+) -> tuple[Array, Sequence[str]]:
+    lit = photos.read_other(entry.photo, entry.exposure)
+    mask = read_mask(entry.mask)
+    if mask.shape != lit.usable.shape:
+        raise InputError(
+            f"its mask is {mask.shape[1]} × {mask.shape[0]} pixels, its photo "
+            f"{lit.usable.shape[1]} × {lit.usable.shape[0]}"
+        )
+    normal = direction if entry.normal is None else entry.normal
+    found = irradiance_from_white(
+        lit.radiance, mask & lit.usable, entry.reflectance, normal, direction
+    )
+    return found.irradiance, found.notes

@@ -1,0 +1,198 @@
+"""The sphere behind its outline: a right circular cone of rays, whatever the lens.
+
+The image of a sphere is an ellipse (a conic) under perspective, and anything under distortion. The
+rays through it are simple in every case: they all touch the sphere, so that they make one angle
+with the ray through its centre. That cone is what is fitted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..scan.camera import Camera
+
+Array = NDArray[np.float64]
+
+FEWEST_POINTS = 8  # of an outline
+WIDEST = np.radians(80.0)  # half-angle of the cone: a wider one is no photo of a sphere
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A sphere's outline as a person draws it: the circle nearest to it.
+
+    centre: (x, y) pixels, the top left pixel's centre at (0.5, 0.5). radius: pixels.
+    """
+
+    centre: tuple[float, float]
+    radius: float
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A sphere as far as one photo tells, scan frame.
+
+    With perspective its size is unknown: origin is the camera's centre, radius 1 and centre (3,) is
+    as many radii from it as the outline's angle says. Without, radius and centre are in scan units,
+    and the depth of the centre is arbitrary (it stands in front of the camera).
+    """
+
+    centre: Array
+    radius: float
+    origin: Array | None  # None: all rays are parallel
+
+    @property
+    def half_angle(self) -> float:
+        """Radians between the rays to the centre and to the outline; 0 without perspective."""
+        if self.origin is None:
+            return 0.0
+        return float(np.arcsin(self.radius / np.linalg.norm(self.centre - self.origin)))
+
+    def rays(self, camera: Camera, pixels: Array) -> tuple[Array, Array]:
+        """(start, unit direction) (n, 3) of the pixels (n, 2), in the sphere's units."""
+        directions = camera.rays(pixels)
+        if self.origin is None:
+            return camera.ray_starts(pixels), directions
+        return np.broadcast_to(self.origin, directions.shape), directions
+
+    def relative_radius(self, camera: Camera, pixels: Array) -> Array:
+        """(n,) 0 at the centre, 1 on the outline, larger outside."""
+        starts, directions = self.rays(camera, pixels)
+        if self.origin is None:
+            return np.linalg.norm(np.cross(starts - self.centre, directions), axis=1) / self.radius
+        axis = (self.centre - self.origin) / np.linalg.norm(self.centre - self.origin)
+        return _angle(directions, axis) / self.half_angle
+
+    def outline(self, camera: Camera, azimuths: Array, scale: float | Array = 1.0) -> Array:
+        """(n, 2) pixels of the outline, or of one ``scale`` times as wide; NaN out of sight."""
+        around = np.cos(azimuths)[:, None], np.sin(azimuths)[:, None]
+        scale = np.broadcast_to(np.asarray(scale, float), azimuths.shape)[:, None]
+        if self.origin is None:
+            _, across, down = _frame(camera.rays(_middle(camera))[0])
+            points = self.centre + self.radius * scale * (around[0] * across + around[1] * down)
+            return camera.project(points)
+        axis, across, down = _frame(self.centre - self.origin)
+        wide = self.half_angle * scale
+        turn = around[0] * across + around[1] * down
+        return camera.project(camera.pose.centre + np.cos(wide) * axis + np.sin(wide) * turn)
+
+    def moved(self, camera: Camera, shift: tuple[float, float, float]) -> Sphere:
+        """Its outline shifted across, down and widened, by as many radii of the outline."""
+        across_by, down_by, wider_by = shift
+        if self.origin is None:
+            _, across, down = _frame(camera.rays(_middle(camera))[0])
+            centre = self.centre + self.radius * (across_by * across + down_by * down)
+            return Sphere(centre, self.radius * (1 + wider_by), None)
+        axis, across, down = _frame(self.centre - self.origin)
+        turned = axis + np.tan(self.half_angle) * (across_by * across + down_by * down)
+        return _from_cone(self.origin, turned, self.half_angle * (1 + wider_by))
+
+
+def fit_sphere(camera: Camera, pixels: Array, weights: Array | None = None) -> Sphere:
+    """The sphere whose outline goes through the pixels (n, 2), n ≥ 3, by weighted least squares.
+
+    With perspective: a · d = 1 for the unit rays d, where a/|a| is the cone's axis and 1/|a| the
+    cosine of its half-angle; its residual is the angle to the cone times tan(half-angle), the same
+    factor for all, so that the linear fit is the geometric one. Without: a circle, likewise.
+    Raises InputError where no sphere fits.
+    """
+    if len(pixels) < 3 or not np.isfinite(pixels).all():
+        raise InputError(f"the sphere's outline has {len(pixels)} points; expected at least 3")
+    root = np.sqrt(np.ones(len(pixels)) if weights is None else weights)
+    directions = camera.rays(pixels)
+    if camera.orthographic:
+        axis, across, down = _frame(camera.rays(_middle(camera))[0])
+        starts = camera.ray_starts(pixels)
+        middle = starts.mean(axis=0)
+        x, y = (starts - middle) @ across, (starts - middle) @ down
+        rows = np.stack([x, y, np.ones_like(x)], axis=1)
+        (a, b, c), *_ = np.linalg.lstsq(rows * root[:, None], (x * x + y * y) * root, rcond=None)
+        squared = c + (a * a + b * b) / 4
+        if not squared > 0:
+            raise InputError("the points of the sphere's outline lie on no circle")
+        radius = float(np.sqrt(squared))
+        centre = middle + a / 2 * across + b / 2 * down
+        ahead = 2 * radius - (camera.pose.rotation @ centre + camera.pose.translation)[2]
+        return Sphere(centre + ahead * axis, radius, None)
+    a, *_ = np.linalg.lstsq(directions * root[:, None], root, rcond=None)
+    length = float(np.linalg.norm(a))
+    if not length > 1.0:
+        raise InputError("the points of the sphere's outline lie on no cone of rays")
+    return _from_cone(camera.pose.centre, a, float(np.arccos(1.0 / length)))
+
+
+def circle_pixels(circle: Circle, count: int = 90) -> Array:
+    """(count, 2) pixels of the circle. Raises InputError where it is none."""
+    x, y = circle.centre
+    if not (np.isfinite([x, y, circle.radius]).all() and circle.radius > 0):
+        raise InputError(
+            f"centre {circle.centre} and radius {circle.radius} are no circle in pixels",
+            key="sphere",
+        )
+    turn = np.arange(count) / count * 2 * np.pi
+    return np.stack([x + circle.radius * np.cos(turn), y + circle.radius * np.sin(turn)], axis=1)
+
+
+def mask_pixels(mask: NDArray, longest: int = 4000) -> Array:
+    """(n, 2) points of a mask's edge: where a row or column crosses one half, sub-pixel.
+
+    mask: (h, w), white = sphere, hard (bool) or soft (0..1). The image's border is no edge. Raises
+    InputError where there is too little of one.
+    """
+    value = np.asarray(mask, float)
+    if not np.isfinite(value).all():
+        raise InputError("the sphere's mask holds NaN or infinite values", key="sphere")
+    points = []
+    for axis in (0, 1):
+        first, second = (value[:-1], value[1:]) if axis == 0 else (value[:, :-1], value[:, 1:])
+        row, column = np.nonzero((first > 0.5) != (second > 0.5))
+        before, after = first[row, column], second[row, column]
+        part = (0.5 - before) / (after - before)
+        y = row + 0.5 + (part if axis == 0 else 0.0)
+        x = column + 0.5 + (part if axis == 1 else 0.0)
+        points.append(np.stack([x, y], axis=1))
+    found = np.concatenate(points)
+    if len(found) < FEWEST_POINTS:
+        raise InputError(
+            f"the sphere's mask has an edge of {len(found)} pixels; expected a white disc on black",
+            key="sphere",
+        )
+    return found[:: max(1, len(found) // longest)]
+
+
+def pixel_radius(sphere: Sphere, camera: Camera) -> float:
+    """Mean radius of the outline, pixels; NaN where none of it is in front of the camera."""
+    ring = sphere.outline(camera, np.arange(16) / 16 * 2 * np.pi)
+    ring = ring[np.isfinite(ring).all(axis=1)]
+    if len(ring) < 8:
+        return float("nan")
+    return float(np.linalg.norm(ring - ring.mean(axis=0), axis=1).mean())
+
+
+def _from_cone(origin: Array | None, axis: Array, half_angle: float) -> Sphere:
+    if not 0 < half_angle < WIDEST:
+        raise InputError("the sphere's outline is no outline of a sphere (its cone is too wide)")
+    towards = axis / np.linalg.norm(axis)
+    return Sphere(origin + towards / np.sin(half_angle), 1.0, origin)
+
+
+def _frame(direction: Array) -> tuple[Array, Array, Array]:
+    """(direction, and two units perpendicular to it and each other)."""
+    axis = direction / np.linalg.norm(direction)
+    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    across = np.cross(axis, helper)
+    across /= np.linalg.norm(across)
+    return axis, across, np.cross(axis, across)
+
+
+def _angle(directions: Array, axis: Array) -> Array:
+    """Radians; by the sine too, as the cosine of a small angle has lost it."""
+    return np.arctan2(np.linalg.norm(np.cross(directions, axis), axis=1), directions @ axis)
+
+
+def _middle(camera: Camera) -> Array:
+    return np.array([[camera.width / 2, camera.height / 2]])

@@ -1,0 +1,19 @@
+"""Pixels that the file could not say more about: saturated, or at its lowest value."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+NEAR = 0.99  # of the top: demosaicing, sharpening and lossy compression blur the edge of clipping
+
+
+def clipped(encoded: NDArray, top: float) -> NDArray[np.bool_]:
+    """(h, w) where any channel of (h, w, c) is within 1 % of ``top``, the encoding's largest
+    number (255, 65535, 1.0, or the saturation in linear units)."""
+    return np.asarray(encoded.max(axis=2) >= NEAR * top)
+
+
+def black(encoded: NDArray) -> NDArray[np.bool_]:
+    """(h, w) where any channel of (h, w, c) is at or below 0: what it was is not known."""
+    return np.asarray(encoded.min(axis=2) <= 0)

@@ -1,0 +1,85 @@
+"""Where each kind of file keeps its Exif block."""
+
+from __future__ import annotations
+
+import io
+import struct
+from pathlib import Path
+from typing import BinaryIO
+
+from .jpeg_check import APP1, EXIF, segments
+from .tiff_tags import HEADS, TiffTags, read_tiff_tags
+
+FUJI = b"FUJIFILMCCD-RAW"
+CANON_CR3 = bytes.fromhex("85c0b687820f11e08111f4ce462b6a48")  # the box that holds CMT1 … CMT4
+MOST = 1 << 22
+NOTHING = TiffTags({}, {}, {}, {})
+
+
+def find_tags(path: Path) -> TiffTags:
+    """The tags of a JPEG, PNG, TIFF or camera RAW file; empty where there are none.
+
+    MakerNote blocks are not looked into. Only the start of a file is read.
+    """
+    with path.open("rb") as file:
+        head = file.read(16)
+        if head[:4] in HEADS:
+            return read_tiff_tags(file) or NOTHING
+        if head.startswith(b"\xff\xd8"):
+            return _in_jpeg(file, 0)
+        if head.startswith(b"\x89PNG"):
+            return _in_png(file)
+        if head.startswith(FUJI):
+            file.seek(84)  # offset of the embedded JPEG, which carries the Exif block
+            place = file.read(4)
+            return _in_jpeg(file, int.from_bytes(place, "big")) if len(place) == 4 else NOTHING
+        if head[4:8] == b"ftyp":
+            return _in_cr3(file)
+    return NOTHING
+
+
+def _block(data: bytes) -> TiffTags:
+    return read_tiff_tags(io.BytesIO(data)) or NOTHING
+
+
+def _in_jpeg(file: BinaryIO, start: int) -> TiffTags:
+    file.seek(start)
+    for marker, body in segments(file.read(MOST)):
+        if marker == APP1 and body.startswith(EXIF):
+            return _block(body[len(EXIF) :])
+    return NOTHING
+
+
+def _in_png(file: BinaryIO) -> TiffTags:
+    file.seek(8)
+    while len(head := file.read(8)) == 8:
+        length, kind = struct.unpack(">I4s", head)
+        if kind == b"eXIf" and length <= MOST:
+            return _block(file.read(length))
+        file.seek(length + 4, io.SEEK_CUR)
+    return NOTHING
+
+
+def _in_cr3(file: BinaryIO) -> TiffTags:
+    """Canon keeps main, Exif and GPS directories as three TIFF structures of their own (boxes
+    CMT1, CMT2, CMT4 in moov)."""
+    file.seek(0)
+    moov = dict(_boxes(file.read(MOST))).get(b"moov", b"")
+    holder = next((b[16:] for k, b in _boxes(moov) if k == b"uuid" and b[:16] == CANON_CR3), b"")
+    parts = {kind: _block(body).main for kind, body in _boxes(holder)}
+    return TiffTags(parts.get(b"CMT1", {}), parts.get(b"CMT2", {}), parts.get(b"CMT4", {}), {})
+
+
+def _boxes(data: bytes) -> list[tuple[bytes, bytes]]:
+    """(kind, body) of the boxes of ISO/IEC 14496-12."""
+    found, place = [], 0
+    while place + 8 <= len(data):
+        length, kind = struct.unpack_from(">I4s", data, place)
+        head = 8
+        if length == 1 and place + 16 <= len(data):
+            length, head = struct.unpack_from(">Q", data, place + 8)[0], 16
+        if length < head:
+            break
+        found.append((kind, data[place + head : place + length]))
+        place += length
+    return found

@@ -1,0 +1,206 @@
+"""The noise of a photo, estimated from the photo itself.
+
+Model (EMVA 1288; Foi et al. 2008, "Practical Poissonian-Gaussian noise modeling and fitting for
+single-image raw-data"): var = read² + shot · L. Small blocks are high-pass filtered with the mask
+of Immerkær 1996 ("Fast noise variance estimation"), which plane shading passes through; what
+texture is left makes blocks look noisier, never less noisy, so the line is fitted to the quiet
+edge of the blocks: those that agree with chi-squared noise about it.
+
+Demosaicing, sharpening and lossy compression tie the noise of neighbours together, and a filter of
+neighbours then sees too little of it. The mask is therefore also taken with steps of 2 and 4
+pixels: the smallest step is used from which the estimate stops growing. Where texture grows with
+the step too, the estimate errs upwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+from scipy.stats import chi2
+
+from .photo import Photo
+
+BLOCKS = (16, 8)  # pixels; the smaller where too few of the larger hold no black or clipped pixel
+STEPS = (1, 2, 4)
+CORRELATED = 4.2  # residuals per degree of freedom: sum of the mask's squared autocorrelation
+QUIET = 0.2  # quantile of a brightness bin that starts the fit
+KEEP = 0.95  # of chi-squared
+GROWS = 1.3  # variance at twice the step that counts as correlation
+ENOUGH, FEWEST, MOST_BLOCKS = 300, 30, 20_000
+BINS, LEAST, AGREE = 24, (6, 12), 0.3  # brightness bins; blocks in each; how well bins agree (log)
+
+
+@dataclass(frozen=True)
+class Noise:
+    """var(L) = read² + shot · L, per channel, in the photo's linear units (not divided by its
+    exposure). shot (3,), read (3,); step: distance in pixels from which noise is independent;
+    blocks: how many quiet blocks support it (0: nothing could be estimated, the numbers are those
+    of the encoding's own steps)."""
+
+    shot: NDArray[np.float64]
+    read: NDArray[np.float64]
+    step: int = 1
+    blocks: int = 0
+
+    def variance(self, light: NDArray) -> NDArray[np.float32]:
+        """(…, 3) variance of pixels whose true value is ``light`` (…, 3)."""
+        shot, read = self.shot.astype(np.float32), self.read.astype(np.float32)
+        return np.asarray(np.maximum(light, 0) * shot + read**2, np.float32)
+
+
+@dataclass(frozen=True)
+class _Line:
+    shot: float
+    read2: float
+    blocks: int
+
+    def at(self, light: NDArray) -> NDArray:
+        return self.read2 + self.shot * np.maximum(light, 0.0)
+
+
+def estimate_noise(photo: Photo) -> Noise:
+    """Noise of one photo, from its own quiet blocks. Clipped and black pixels are left out.
+
+    Never below what the encoding's steps alone make (step²/12).
+    """
+    floor = _floor(photo)
+    size = next((b for b in BLOCKS if len(_blocks(photo, 1, b)[0]) >= ENOUGH), BLOCKS[-1])
+    found = [_blocks(photo, step, size) for step in STEPS]
+    freedom = size**2 / CORRELATED
+    shot, read2 = np.zeros(3), np.zeros(3)
+    used, support = 1, np.zeros(3, int)
+    for channel in range(3):
+        line, step = _channel(found, channel, freedom)
+        shot[channel] = max(line.shot, floor.shot)
+        read2[channel] = max(line.read2, floor.read2)
+        used, support[channel] = max(used, step), line.blocks
+    known = support > 0
+    if known.any():  # a channel that could not be measured is like the worst of the others
+        shot[~known], read2[~known] = shot[known].max(), read2[known].max()
+    return Noise(shot, np.sqrt(read2), used, int(support[known].min()) if known.any() else 0)
+
+
+def _channel(
+    found: list[tuple[NDArray, NDArray]], channel: int, freedom: float
+) -> tuple[_Line, int]:
+    """The line at the smallest step from which the variance stops growing."""
+    lines = [_fit(light[:, channel], spread[:, channel], freedom) for light, spread in found]
+    best, step = lines[0], STEPS[0]
+    for line, after in zip(lines[1:], STEPS[1:], strict=True):
+        light = found[0][0][:, channel]
+        if not (best.blocks and line.blocks):
+            break
+        middle = np.median(line.at(light)) / max(np.median(best.at(light)), 1e-30)
+        if middle < GROWS:
+            break
+        best, step = line, after
+    return best, step
+
+
+def _blocks(photo: Photo, step: int, size: int) -> tuple[NDArray, NDArray]:
+    """((n, 3) mean light, (n, 3) variance of the high-pass residual) of the usable blocks."""
+    height, width = photo.clipped.shape
+    reach = size + 2 * step
+    columns = (width - 2 * step) // size
+    tops = np.arange(0, height - reach + 1, size)
+    if columns < 1 or len(tops) < 1:
+        return np.zeros((0, 3)), np.zeros((0, 3))
+    every = max(1, columns * len(tops) // MOST_BLOCKS)
+    light, spread = [], []
+    for top in tops[::every]:
+        rows = slice(top, top + reach)
+        strip = photo.radiance[rows, : columns * size + 2 * step]
+        lost = photo.clipped[rows, : strip.shape[1]] | (strip == 0).any(axis=2)
+        down = strip[: -2 * step] - 2 * strip[step:-step] + strip[2 * step :]
+        rest = (down[:, : -2 * step] - 2 * down[:, step:-step] + down[:, 2 * step :]) / 6
+        lost = lost[: -2 * step] | lost[step:-step] | lost[2 * step :]
+        lost = lost[:, : -2 * step] | lost[:, step:-step] | lost[:, 2 * step :]
+        bad = _blocked(lost, size, np.any)
+        inner = strip[step : step + size, step : step + columns * size]
+        light.append(_blocked(inner, size, np.mean)[~bad])
+        spread.append(_blocked(rest**2, size, np.mean)[~bad])
+    return np.concatenate(light).astype(float), np.concatenate(spread).astype(float)
+
+
+def _blocked(strip: NDArray, size: int, how: Callable[..., NDArray]) -> NDArray:
+    """One value of each block of a strip of blocks."""
+    parts = strip[:size].reshape(size, -1, size, *strip.shape[2:])
+    return np.asarray(how(parts, axis=(0, 2)))
+
+
+def _fit(light: NDArray, spread: NDArray, freedom: float) -> _Line:
+    """The line through the quiet blocks: started from low quantiles of brightness bins, then kept
+    blocks and line in turn until they agree."""
+    usable = (spread > 0) & (light > 0)
+    light, spread = light[usable], spread[usable]
+    if len(light) < FEWEST:
+        return _Line(0.0, 0.0, 0)
+    limit = chi2.ppf(KEEP, freedom) / freedom
+    kept_mean = chi2.cdf(limit * freedom, freedom + 2) / KEEP  # of chi-squared below its limit
+    line = _start(light, spread, freedom)
+    for _ in range(50):
+        keep = spread < limit * line.at(light)
+        if keep.sum() < FEWEST:
+            break
+        after = _weighted(light[keep], spread[keep] / kept_mean, line.at(light[keep]))
+        done = np.allclose(after.at(light), line.at(light), rtol=1e-4)
+        line = _Line(after.shot, after.read2, int(keep.sum()))
+        if done:
+            break
+    return line if line.blocks >= FEWEST else _Line(0.0, 0.0, 0)
+
+
+def _start(light: NDArray, spread: NDArray, freedom: float) -> _Line:
+    """The line that the quiet blocks of most brightnesses agree on.
+
+    Bins of texture only lie above it; none can lie below. Each brightness has one vote: a large
+    dark background must not outvote the object.
+    """
+    # brightnesses that noise makes one of another are one
+    shifted = np.log(light + 10 * np.sqrt(np.quantile(spread, QUIET) / (CORRELATED * freedom)))
+    low, high = np.quantile(shifted, (0.01, 0.99))
+    place = np.digitize(shifted, np.linspace(low, max(high, low + 1e-3), BINS))
+    least = int(np.clip(len(light) // 30, *LEAST))
+    bins = [part for k in range(BINS + 1) if len(part := np.flatnonzero(place == k)) >= least]
+    if not bins:
+        bins = [np.arange(len(light))]
+    middle = np.array([light[part].mean() for part in bins])
+    quiet = np.array([np.quantile(spread[part], QUIET) for part in bins])
+    quiet /= chi2.ppf(QUIET, freedom) / freedom
+    first, second = np.triu_indices(len(bins))
+    rise = middle[second] - middle[first]
+    shot = np.where(rise > 0, (quiet[second] - quiet[first]) / np.where(rise > 0, rise, 1.0), 0.0)
+    shot = np.concatenate([shot, quiet / middle])  # and those of no read noise
+    read2 = np.concatenate([quiet[first] - shot[: len(first)] * middle[first], 0 * quiet])
+    possible = (shot >= 0) & (read2 >= 0)
+    shot, read2 = shot[possible], read2[possible]
+    ratio = quiet / np.maximum(read2[:, None] + shot[:, None] * middle, 1e-30)
+    votes = (np.abs(np.log(ratio)) < AGREE).sum(axis=1)
+    votes -= (ratio < 1 / (1 + 2 * AGREE)).sum(axis=1)
+    line = _Line(*max(zip(votes, -read2 - shot * middle.mean(), shot, read2, strict=True))[2:], 0)
+    agrees = np.abs(np.log(quiet / np.maximum(line.at(middle), 1e-30))) < AGREE
+    return _weighted(middle[agrees], quiet[agrees], quiet[agrees]) if agrees.sum() > 2 else line
+
+
+def _weighted(light: NDArray, spread: NDArray, expected: NDArray) -> _Line:
+    """Least squares of (spread − read² − shot · light) / expected, neither below zero."""
+    matrix = np.stack([np.ones_like(light), light], axis=1) / expected[:, None]
+    scale = np.abs(matrix).max(axis=0)
+    (read2, shot), _ = nnls(matrix / scale, spread / expected)
+    return _Line(float(shot / scale[1]), float(read2 / scale[0]), len(light))
+
+
+def _floor(photo: Photo) -> _Line:
+    """Variance of rounding to the encoding's codes: step²/12, as a line through dark and bright."""
+    levels = photo.info.levels
+    if levels is None or not photo.info.transfer.curves:
+        return _Line(0.0, 0.0, 0)
+    table = photo.info.transfer.table(levels)
+    step2 = (np.diff(table, axis=0) ** 2).mean(axis=1) / 12
+    dark, half = float(step2[0]), levels // 2
+    at_half = float(table[half].mean())
+    return _Line(max(float(step2[half]) - dark, 0.0) / max(at_half, 1e-9), dark, 0)

@@ -1,0 +1,83 @@
+"""The node tree of a glTF scene: which mesh stands where.
+
+Khronos Group, glTF 2.0 specification (2021), section 3.5 (scenes, nodes, transformations).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .gltf_buffers import Gltf
+
+
+def placed_meshes(document: Gltf) -> Iterator[tuple[Any, NDArray[np.float64]]]:
+    """(index of a mesh, its 4 × 4 matrix to the scene's frame) of every node with a mesh.
+
+    The scene is the default one, else the first; a file without scenes shows every node that is no
+    other's child. A node below two others, or below itself, is refused, as the format does.
+    """
+    seen: set[int] = set()
+    waiting = [(root, np.eye(4)) for root in _roots(document)]
+    while waiting:
+        index, above = waiting.pop()
+        node = document.entry("nodes", index)
+        if index in seen:
+            raise document.error(f"glTF: nodes[{index}] stands in the tree twice")
+        seen.add(index)
+        with np.errstate(over="ignore", invalid="ignore"):
+            matrix = above @ _matrix(document, node)
+        children = document.member(node, "children", list, [])
+        waiting += [(child, matrix) for child in reversed(children)]
+        if "mesh" in node:
+            yield node["mesh"], matrix
+
+
+def _roots(document: Gltf) -> list:
+    scenes = document.member(document.json, "scenes", list, [])
+    if scenes:
+        scene = document.entry("scenes", document.json.get("scene", 0))
+        roots: list = document.member(scene, "nodes", list, [])
+    else:
+        nodes = document.member(document.json, "nodes", list, [])
+        children: set = set()
+        for index in range(len(nodes)):
+            below = document.member(document.entry("nodes", index), "children", list, [])
+            children.update(child for child in below if isinstance(child, int))
+        roots = [index for index in range(len(nodes)) if index not in children]
+    return roots[::-1]
+
+
+def _matrix(document: Gltf, node: dict) -> NDArray[np.float64]:
+    """A node's own transform: a matrix (column by column), or translation, rotation, scale."""
+    if "matrix" in node:
+        matrix = _numbers(document, node, "matrix", [0.0] * 16).reshape(4, 4).T
+        return matrix
+    x, y, z, w = _numbers(document, node, "rotation", [0.0, 0.0, 0.0, 1.0])
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    if not 1e-6 < length < 1e6:
+        raise document.error("glTF: a rotation is no quaternion")
+    x, y, z, w = x / length, y / length, z / length, w / length
+    matrix = np.eye(4)
+    matrix[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    matrix[:3, :3] *= _numbers(document, node, "scale", [1.0, 1.0, 1.0])
+    matrix[:3, 3] = _numbers(document, node, "translation", [0.0, 0.0, 0.0])
+    return matrix
+
+
+def _numbers(document: Gltf, node: dict, key: str, default: list[float]) -> NDArray[np.float64]:
+    values = document.member(node, key, list, default)
+    fine = len(values) == len(default) and all(
+        isinstance(v, (int, float)) and not isinstance(v, bool) and abs(v) < 1e30 for v in values
+    )
+    if not fine:
+        raise document.error(f"glTF: {key!r} is not {len(default)} numbers")
+    return np.array(values, np.float64)

@@ -1,0 +1,25 @@
+"""Sparse points as arrays, without what is no point."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .reconstruction import LARGEST_PLACE
+
+Array = NDArray[np.float64]
+
+
+def sparse_points(
+    points: Array, colours: Array | None = None
+) -> tuple[Array, NDArray[np.uint8], tuple[str, ...]]:
+    """(points (n, 3), colours (n, 3), notes) without the points that are not finite or absurdly far
+    away. colours: 0..255, of any type; none, or one that is not finite: grey."""
+    with np.errstate(invalid="ignore"):
+        good = (np.abs(points) <= LARGEST_PLACE).all(axis=1)
+    if colours is None or len(colours) != len(points):
+        colours = np.full(points.shape, 128.0)
+    bytes_ = np.nan_to_num(np.clip(colours, 0, 255), nan=128.0)[good].round().astype(np.uint8)
+    left_out = int((~good).sum())
+    notes = (f"{left_out:,} sparse points without a finite place were left out",) * bool(left_out)
+    return np.ascontiguousarray(points[good], np.float64), bytes_, notes

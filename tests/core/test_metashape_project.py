@@ -1,0 +1,272 @@
+"""Projects of Metashape: .psx with its folder, .psz; good, moved about, and hostile."""
+
+from __future__ import annotations
+
+import io
+import shutil
+import struct
+import time
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from patina.core.errors import InputError, PatinaError
+from patina.core.scan import metashape_zip
+from patina.core.scan.formats import read_reconstruction
+from tests import make_metashape as made
+
+SECONDS = 5.0
+
+
+@pytest.fixture()
+def scene():
+    return made.scene("2.0.0")
+
+
+def refused(path, match, **more):
+    started = time.process_time()
+    with pytest.raises(InputError, match=match) as caught:
+        read_reconstruction(path, **more)
+    assert time.process_time() - started < SECONDS
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("kind", ["psx", "psz"])
+def test_round_trip(tmp_path, scene, kind):
+    chunk = made.chunk_xml(scene)
+    photos = {0: "../../../photos/IMG_0000.JPG", 1: "C:/shoot/IMG_0001.JPG", 2: "/net/2.JPG"}
+    if kind == "psx":
+        path = made.write_psx(tmp_path, "my scan", [chunk], photos)
+        beside = "../../../photos/IMG_0000.JPG"
+        assert (tmp_path / "my scan.files" / "0" / "0" / beside).resolve().parent == (
+            tmp_path / "photos"
+        )
+    else:
+        photos[0] = "photos/IMG_0000.JPG"
+        path = made.write_psz(tmp_path / "my scan.psz", [chunk], photos)
+    found = read_reconstruction(path)
+    made.agree(found, scene)
+    written = {c.label: c.photo for c in found.cameras}
+    assert Path(written["IMG_0000"]) == tmp_path / "photos" / "IMG_0000.JPG"
+    assert written["IMG_0001"] == "C:/shoot/IMG_0001.JPG"
+    assert written["IMG_0002"] == "/net/2.JPG"
+    assert written["IMG_0003"] is None
+    assert any("Export Model" in note for note in found.notes)
+
+
+def test_a_psz_may_hold_a_tree_of_documents(tmp_path, scene):
+    chunk = made.chunk_xml(scene).replace(
+        "</chunk>", '<frames><frame id="0" path="0/doc.xml"/></frames></chunk>'
+    )
+    inner = io.BytesIO()
+    with zipfile.ZipFile(inner, "w") as archive:
+        archive.writestr("doc.xml", chunk)
+    listed = '<document><chunks><chunk id="0" path="0/chunk.zip"/></chunks></document>'
+    path = made.write_zip(
+        tmp_path / "a.psz",
+        {
+            "doc.xml": listed,
+            "0/chunk.zip": inner.getvalue(),
+            "0/0/doc.xml": made.frame_xml({0: "a.jpg"}),
+        },
+    )
+    found = read_reconstruction(path)
+    made.agree(found, scene)
+    assert found.cameras[0].photo == str(tmp_path / "0" / "0" / "a.jpg")
+
+
+def test_chunks_of_a_project(tmp_path):
+    chunks = []
+    for label in ("a", "b"):
+        scene = made.simple()
+        scene.label = label
+        for camera in scene.cameras:
+            camera.label = label + camera.label
+        chunks.append(made.chunk_xml(scene))
+    path = made.write_psx(tmp_path, "p", chunks, active=1)
+    assert read_reconstruction(path).cameras[0].label == "bIMG_0000"
+    assert read_reconstruction(path, chunk="a").cameras[0].label == "aIMG_0000"
+    refused(path, "no chunk 'c'; its chunks: 'a', 'b'", chunk="c")
+
+
+def test_the_folder_must_be_there(tmp_path, scene):
+    path = made.write_psx(tmp_path, "p", [made.chunk_xml(scene)])
+    lonely = tmp_path / "other.psx"
+    shutil.copy(path, lonely)
+    refused(lonely, "its folder 'other.files' with 'project.zip' is not beside it")
+    shutil.rmtree(tmp_path / "p.files" / "0")
+    refused(path, r"its chunk '0' is missing: there is no 'p.files/0/chunk.zip'")
+
+
+def test_without_its_frame_the_photos_are_not_known(tmp_path, scene):
+    path = made.write_psx(tmp_path, "p", [made.chunk_xml(scene)], {0: "a.jpg"})
+    shutil.rmtree(tmp_path / "p.files" / "0" / "0")
+    found = read_reconstruction(path)
+    assert all(c.photo is None for c in found.cameras)
+    assert any("photos' paths are not known" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        "../secret.zip",
+        "/etc/passwd",
+        "C:/x.zip",
+        "..\\..\\x.zip",
+        "\\\\host\\share\\x.zip",
+        "a/../../x.zip",
+        ".",
+        "a\0b",
+    ],
+)
+def test_paths_stay_in_the_project(tmp_path, scene, place):
+    made.write_zip(tmp_path / "secret.zip", {"doc.xml": made.chunk_xml(scene)})
+    path = tmp_path / "in" / "p.psx"
+    path.parent.mkdir()
+    listed = f'<document><chunks><chunk id="0" path="{place}"/></chunks></document>'
+    if "\0" not in place:
+        path.write_text(f'<document path="{place}"/>')
+        refused(path, "leads out of the project's folder")
+        path.write_text('<document path="{projectname}.files/project.zip"/>')
+        made.write_zip(path.parent / "p.files" / "project.zip", {"doc.xml": listed})
+        refused(path, "leads out of the project's folder")
+        psz = made.write_zip(path.parent / "p.psz", {"doc.xml": listed})
+        refused(psz, "leads out of the project's folder")
+    else:
+        path.write_text(f'<document path="{place}"/>')
+        refused(path, "is not valid XML")
+
+
+def test_a_name_no_file_can_have(tmp_path):
+    path = tmp_path / "p.psx"
+    path.write_text(f'<document path="{"x" * 5000}/project.zip"/>')
+    refused(path, "is not beside it")
+
+
+def bomb(size, method=zipfile.ZIP_DEFLATED):
+    """A zip whose doc.xml unpacks to ``size`` bytes of nothing."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", method) as archive, archive.open("doc.xml", "w") as entry:
+        for _ in range(size >> 20):
+            entry.write(b" " * (1 << 20))
+    return packed.getvalue()
+
+
+def test_zip_bombs(tmp_path):
+    path = tmp_path / "p.psz"
+    path.write_bytes(bomb(64 << 20))
+    refused(path, "unpacks to 64 MB")
+    path.write_bytes(bomb(3 << 20, zipfile.ZIP_LZMA))
+    refused(path, "unpacks to 3 MB|packed in method")
+    inner = bomb(64 << 20)
+    listed = '<document><chunks><chunk id="0" path="0.zip"/></chunks></document>'
+    made.write_zip(path, {"doc.xml": listed, "0.zip": inner})
+    refused(path, "unpacks to 64 MB")
+
+
+def test_a_zip_that_lies_about_its_size(tmp_path):
+    data = bytearray(bomb(64 << 20))
+    start = data.rindex(b"PK\x01\x02")
+    struct.pack_into("<I", data, start + 24, 100)  # uncompressed size in the list of files
+    path = tmp_path / "p.psz"
+    path.write_bytes(data)
+    refused(path, "p.psz")
+
+
+def test_a_project_of_many_large_documents(tmp_path, monkeypatch):
+    from patina.core.scan import metashape_project
+
+    chunk = made.chunk_xml(made.simple(), extra="<x>" + "y" * 5000 + "</x>")
+    listed = "".join(f'<chunk id="{i}" path="0.xml"/>' for i in range(100))
+    path = made.write_zip(
+        tmp_path / "p.psz",
+        {"doc.xml": f"<document><chunks>{listed}</chunks></document>", "0.xml": chunk},
+    )
+    monkeypatch.setattr(metashape_project, "LARGEST_TOGETHER", 20 * len(chunk))
+    refused(path, "too large for a project")
+
+
+def test_a_list_of_files_that_is_too_long(tmp_path, scene, monkeypatch):
+    path = made.write_psz(tmp_path / "p.psz", [made.chunk_xml(scene)])
+    monkeypatch.setattr(metashape_zip, "DIRECTORY", 10)
+    refused(path, "lists too many files")
+
+
+def test_a_large_zips_list_of_files(tmp_path, scene):
+    """Zips beyond 4 GB say the list's size elsewhere: the same project with that end."""
+    path = made.write_psz(tmp_path / "p.psz", [made.chunk_xml(scene)])
+    data = path.read_bytes()
+    at = data.rindex(b"PK\x05\x06")
+    (entries, size, start) = struct.unpack_from("<HII", data, at + 10)
+    end64 = struct.pack(
+        "<4sQHHIIQQQQ", b"PK\x06\x06", 44, 45, 45, 0, 0, entries, entries, size, start
+    )
+    locator = struct.pack("<4sIQI", b"PK\x06\x07", 0, at, 1)
+    end = struct.pack("<4sHHHHIIH", b"PK\x05\x06", 0, 0, 0xFFFF, 0xFFFF, 0xFFFFFFFF, 0xFFFFFFFF, 0)
+    path.write_bytes(data[:at] + end64 + locator + end)
+    made.agree(read_reconstruction(path), scene)
+
+
+@pytest.mark.parametrize("name", ["empty.psz", "text.psz", "empty.psx"])
+def test_no_project_at_all(tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(b"" if "empty" in name else b"hello, world" * 100)
+    refused(path, name)
+
+
+def test_zips_without_a_document(tmp_path):
+    refused(made.write_zip(tmp_path / "p.psz", {"other.xml": "<a/>"}), "holds no doc.xml")
+    refused(made.write_zip(tmp_path / "q.psz", {"doc.xml": "<a/>"}), "no <document> of Metashape's")
+    psx = tmp_path / "r.psx"
+    psx.write_text("<document version='1.2.0'/>")
+    refused(psx, "is no project of Metashape's")
+
+
+def survives(path):
+    """Read, or refused in one line, in time."""
+    started = time.process_time()
+    try:
+        found = read_reconstruction(path)
+    except PatinaError as error:
+        assert "\n" not in str(error) and path.stem in str(error)
+    else:
+        assert len(found.cameras) > 0
+        assert all(np.isfinite(c.pose.translation).all() for c in found.cameras)
+    assert time.process_time() - started < SECONDS
+
+
+@pytest.fixture(scope="module")
+def packed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("fuzz")
+    return made.write_psz(folder / "p.psz", [made.chunk_xml(made.simple())], {0: "a.jpg"})
+
+
+def test_truncated_anywhere(packed, tmp_path):
+    data = packed.read_bytes()
+    for at in np.random.default_rng(0).integers(0, len(data), 50):
+        path = tmp_path / "cut.psz"
+        path.write_bytes(data[:at])
+        survives(path)
+
+
+@given(
+    changes=st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), max_size=8)
+)
+@example(changes=[(0.999, 0xFF)])
+@example(changes=[(0.99, 0xFF), (0.985, 0xFF)])
+@example(changes=[(0.0, 0)])
+@settings(
+    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+def test_fuzz_bytes_of_a_project(packed, tmp_path, changes):
+    data = bytearray(packed.read_bytes())
+    for where, value in changes:
+        data[int(where * len(data))] = value
+    path = tmp_path / "fuzz.psz"
+    path.write_bytes(data)
+    survives(path)
