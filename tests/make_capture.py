@@ -52,8 +52,9 @@ def light_directions(count=6):
         yield rotation.T @ towards
 
 
-def photo(rotation, translation, light, radius=1.0, brdf=blinn):
-    """(h, w, 3) radiance of the sphere; 0 elsewhere."""
+def photo(rotation, translation, light, radius=1.0, brdf=blinn, lamp=None):
+    """(h, w, 3) radiance of the sphere; 0 elsewhere. lamp: (position, intensity) of a near lamp,
+    instead of the distant ``light``."""
     rows, columns = np.indices((HEIGHT, WIDTH)) + 0.5
     rays = np.stack(
         [(columns - PRINCIPAL[0]) / FOCAL, (rows - PRINCIPAL[1]) / FOCAL, np.ones((HEIGHT, WIDTH))],
@@ -66,10 +67,16 @@ def photo(rotation, translation, light, radius=1.0, brdf=blinn):
     hit = under > 0
     distance = -b[hit] - np.sqrt(under[hit])
     normal = (eye + distance[:, None] * rays[hit]) / radius
-    cos_i = np.maximum(normal @ light, 0.0)
+    irradiance = IRRADIANCE
+    if lamp is None:
+        towards = np.broadcast_to(light, normal.shape)
+    else:
+        towards = lamp[0] - (CENTRE + radius * normal)
+        away = np.sqrt(np.sum(towards**2, axis=1))
+        towards, irradiance = towards / away[:, None], lamp[1] / away**2
+    cos_i = np.maximum(np.sum(normal * towards, axis=1), 0.0)
     image = np.zeros((HEIGHT * WIDTH, 3))
-    towards = np.broadcast_to(light, normal.shape)
-    image[hit] = brdf(normal, towards, -rays[hit]) * (IRRADIANCE * cos_i)[:, None]
+    image[hit] = brdf(normal, towards, -rays[hit]) * (irradiance * cos_i)[:, None]
     return image.reshape(HEIGHT, WIDTH, 3)
 
 

@@ -8,13 +8,13 @@ inside (variable projection, Golub & Pereyra 1973), the lights' numbers outside.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from ..angles import half_difference
+from ..angles import Angles, half_difference
 from ..basis import Basis, mapping
 from ..geometry import RayScene
 from ..geometry.view import cast_shadow
@@ -24,10 +24,12 @@ from .seen import Seen, not_dark
 
 Array = NDArray[np.float64]
 
-COMPONENTS = 5
-RIDGE = 4.0
+COMPONENTS = 20  # with 5 what the components cannot make moves the light instead
+RIDGE = 1.0
 SOFT = 0.3  # log residuals beyond this are stains and wrong normals: they count less
-GRAZING = (0.1, 0.3)  # cos θi: below the first a pixel does not count, above the second fully
+GRAZING = (0.1, 0.3)  # cos θi: below the first a pixel counts least, above the second fully
+LEAST = 0.2  # never not at all: what is bright is lit, a light that does not reach it is wrong
+UNLIT = 0.03  # cos θi of what a light does not reach
 ROUNDS = 3  # the shadows move with the light
 GROUPS = 8  # of photos, left out in turn for the uncertainty
 
@@ -131,12 +133,12 @@ class _Problem:
             incidence = lights[name].incidence(seen.point, seen.camera)
             cos_i = np.einsum("ij,ij->i", seen.normal, incidence.towards)
             angles.append(half_difference(seen.normal, incidence.towards, seen.view))
-            strength = incidence.irradiance.mean(axis=1) * np.maximum(cos_i, GRAZING[0])
+            strength = incidence.irradiance.mean(axis=1) * np.maximum(cos_i, UNLIT)
             rho.append(seen.radiance / strength)
-            weight.append(np.clip((cos_i - GRAZING[0]) / (GRAZING[1] - GRAZING[0]), 0, 1))
+            weight.append(seen.weight)
         w = np.concatenate(weight)
         r = np.concatenate(rho)
-        joined = type(angles[0])(*(np.concatenate(part) for part in zip(*angles, strict=True)))
+        joined = Angles(*(np.concatenate(part) for part in zip(*angles, strict=True)))
         mean, q = self.basis.rows(joined, COMPONENTS)
         if not all(light.known for light in lights.values()):
             r = r * _level(r, mean, joined, w)
@@ -166,24 +168,30 @@ class _Problem:
 def _lit(
     lights: Mapping[str, Light], names: Sequence[str], pixels: Sequence[Seen], rays: RayScene
 ) -> list[Seen]:
-    """The pixels no part of the mesh shadows; those that face away stay: the light may move."""
+    """The pixels no other part of the mesh shadows, weighted by how well their irradiance is known.
+
+    The weights hold for a round: were they to follow the light, lights that light little would win.
+    """
     found = []
     for name, seen in zip(names, pixels, strict=True):
         incidence = lights[name].incidence(seen.point, seen.camera)
+        cos_i = np.einsum("ij,ij->i", seen.normal, incidence.towards)
         dark = cast_shadow(rays, seen.point, seen.normal, incidence.towards, incidence.distance)
-        found.append(seen.select(~dark))
+        weight = np.clip((cos_i - GRAZING[0]) / (GRAZING[1] - GRAZING[0]), LEAST, 1)
+        found.append(replace(seen, weight=weight).select(~(dark & (cos_i > 0))))
     return found
 
 
-def _level(rho: Array, mean: Array, angles: object, weight: Array) -> float:
+def _level(
+    rho: Array, mean: NDArray[np.floating], angles: Angles, weight: Array
+) -> float:
     """What brings the typical reflectance to the basis' mean material's (samples/level.py)."""
     full = weight > 0.99
     if not full.any():
         return 1.0
     typical = np.median(np.exp(mean[full]) - mapping.EPSILON)
-    return float(typical / np.median((rho * mapping.cos_map(angles))[full]))  # type: ignore[arg-type]
+    return float(typical / np.median((rho * mapping.cos_map(angles))[full]))
 
 
 def _typical(residuals: Array) -> float:
-    counted = residuals[residuals != 0]
-    return float(np.median(np.abs(counted))) if counted.size else 0.0
+    return float(np.median(np.abs(residuals))) if residuals.size else 0.0

@@ -22,19 +22,20 @@ DARK = 0.003  # of the bright end: below it a photo shows noise and stray light
 @dataclass(frozen=True)
 class Seen:
     """n pixels of one photo. point, normal, view: (n, 3) float64, scan frame, view surface →
-    camera; radiance: (n,) mean of the channels."""
+    camera; radiance: (n,) mean of the channels; weight: (n,) how much each counts."""
 
     camera: Camera
     point: Array
     normal: Array
     view: Array
     radiance: Array
+    weight: Array
 
     def select(self, which: NDArray) -> Seen:
         """The rows of a boolean mask or an index array."""
         return Seen(
             self.camera, self.point[which], self.normal[which], self.view[which],
-            self.radiance[which],
+            self.radiance[which], self.weight[which],
         )  # fmt: skip
 
 
@@ -59,12 +60,14 @@ def draw_pixels(
         drawn += len(found[-1].radiance)
         if drawn >= count:
             break
-    joined = Seen(
-        camera,
-        *(np.concatenate([getattr(s, k) for s in found]) for k in ("point", "normal", "view")),
-        np.concatenate([s.radiance for s in found]),
+    return Seen(
+        camera=camera,
+        point=np.concatenate([s.point for s in found])[:count],
+        normal=np.concatenate([s.normal for s in found])[:count],
+        view=np.concatenate([s.view for s in found])[:count],
+        radiance=np.concatenate([s.radiance for s in found])[:count],
+        weight=np.concatenate([s.weight for s in found])[:count],
     )
-    return joined.select(slice(0, count))  # type: ignore[arg-type]
 
 
 def _calm(
@@ -106,8 +109,9 @@ def _calm(
             whole &= usable[row + down, column + right]
     keep &= whole & (light > 0)
     hits = Hits(face[keep], u[keep].astype(np.float32), v[keep].astype(np.float32))
+    mean = light[keep] / len(window) ** 2
     return Seen(
-        camera, rays.points(hits), centre[keep], -along[keep], light[keep] / len(window) ** 2
+        camera, rays.points(hits), centre[keep], -along[keep], mean, np.ones(len(mean))
     )
 
 

@@ -146,8 +146,10 @@ class MaterialEntry:
 
 @dataclass(frozen=True)
 class FitOptions:
-    """[fit]: what is too close to trust, and the estimator's settings."""
+    """[fit]: what is too close to trust, and the estimator's settings. absolute: False where the
+    lights' irradiance is known only relative to each other."""
 
+    absolute: bool = True
     margins: Margins = field(default_factory=Margins)
     paper: PaperSettings = field(default_factory=PaperSettings)
     held_out: bool = True

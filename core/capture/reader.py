@@ -170,6 +170,7 @@ def _fit(section: Section) -> FitOptions:
     if subset < 2 * samples:
         raise section.error(f"found {subset}, expected at least twice the samples", "subset")
     options = FitOptions(
+        absolute=section.flag("absolute", True),
         margins=Margins(
             silhouette=section.integer("silhouette_margin", margins.silhouette, 0, 100),
             shadow=section.integer("shadow_margin", margins.shadow, 0, 100),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 
@@ -65,11 +66,13 @@ class CaptureResult:
 
 @dataclass(frozen=True)
 class _Taken:
-    """Samples of every material, photo by photo; surface pixels its masks mark; faces' votes."""
+    """Samples of every material, photo by photo; surface pixels its masks mark; faces' votes;
+    what was noted while reading, and of how many photos."""
 
     tables: dict[str, list[SampleTable]]
     marked: dict[str, int]
     votes: FaceVotes
+    notes: Counter[str]
 
 
 def _way(entry: LightEntry) -> str:
@@ -104,8 +107,9 @@ class FitJob(Job):
             lights = refined(lights, capture, scan, photos, rays, basis)
         taken = yield from self._take_samples(scan, rays, photos, lights)
         results = []
+        known = lights.known and capture.fit.absolute
         for index in range(len(capture.materials)):
-            results.append((yield from self._fit_material(index, taken, basis, lights.known)))
+            results.append((yield from self._fit_material(index, taken, basis, known)))
         yield Step("materials on the mesh", 0.97)
         self.result = CaptureResult(
             capture=capture,
@@ -114,6 +118,7 @@ class FitJob(Job):
             lights=lights,
             notes=(
                 *scan.notes,
+                *(f"{n} photos: {said}" for said, n in taken.notes.items()),
                 *photos.notes,
                 *lights.notes,
                 *inputs.size_notes(capture, scan),
@@ -132,6 +137,7 @@ class FitJob(Job):
             tables={m.name: [] for m in capture.materials},
             marked={m.name: 0 for m in capture.materials},
             votes=FaceVotes.empty(len(scan.mesh.faces), len(capture.materials)),
+            notes=Counter(),
         )
         lit_by = {light.name: 0 for light in capture.lights}
         seen_by = {light.name: 0 for light in capture.lights}
@@ -146,6 +152,7 @@ class FitJob(Job):
             trusted = trusted_pixels(view, lighting, capture.fit.margins) & ~in_shadow
             lit = photos.read(place)
             trusted &= lit.usable.ravel()[view.pixel]
+            taken.notes.update(lit.notes)
             for index, material in enumerate(capture.materials):
                 pixels = where[material.name]
                 taken.marked[material.name] += int(pixels.sum())

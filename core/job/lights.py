@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ from .photos import LitPhotos
 Array = NDArray[np.float64]
 
 SUN_RADIUS = np.radians(0.2666)  # mean angular radius
+MOST_CLIPPED = 0.02  # of a white target's pixels
 PIXELS = 1000  # of each photo, for refining
 
 
@@ -130,7 +132,7 @@ def _from_sphere(scan: Scan, photos: LitPhotos, entry: SphereEntry) -> tuple[Arr
         outline = read_mask(entry.mask)
     elif entry.centre is not None and entry.radius is not None:
         outline = Circle((float(entry.centre[0]), float(entry.centre[1])), entry.radius)
-    surface = "glossy" if entry.surface == "glossy" else "chrome"
+    surface: Literal["chrome", "glossy"] = "glossy" if entry.surface == "glossy" else "chrome"
     found = light_from_sphere(lit.radiance, camera, outline, surface=surface)
     said = [
         f"direction from the sphere, ± {np.degrees(found.uncertainty):.2f}°",
@@ -188,8 +190,11 @@ def _from_white(
             f"its mask is {mask.shape[1]} × {mask.shape[0]} pixels, its photo "
             f"{lit.usable.shape[1]} × {lit.usable.shape[0]}"
         )
+    clipped = float((mask & ~lit.usable).sum()) / max(int(mask.sum()), 1)
+    if clipped > MOST_CLIPPED:
+        raise InputError(f"{100 * clipped:.0f} % of the white target is clipped: expose it less")
     normal = direction if entry.normal is None else entry.normal
     found = irradiance_from_white(
-        lit.radiance, mask & lit.usable, entry.reflectance, normal, direction
+        lit.radiance, None, mask & lit.usable, entry.reflectance, normal, direction
     )
     return found.irradiance, found.notes

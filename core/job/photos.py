@@ -22,11 +22,13 @@ from ..photo.transfer import Transfer
 @dataclass(frozen=True)
 class LitPhoto:
     """radiance: (h, w, 3) float32 linear, divided by its exposure. usable: (h, w) neither clipped
-    nor, of a bracket, lost in noise. variance: (h, w, 3) of a bracket, else None."""
+    nor, of a bracket, lost in noise. variance: (h, w, 3) of a bracket, else None. notes: how its
+    numbers were read, sentences."""
 
     radiance: NDArray[np.float32]
     usable: NDArray[np.bool_]
     variance: NDArray[np.float32] | None = None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -54,13 +56,14 @@ class LitPhotos:
         """One lit photo. Raises InputError naming the capture's key."""
         photo = self.capture.photos[place]
         try:
-            curve = self._curve(photo.transfer)
+            curve = self.curve(place)
             if len(photo.files) == 1:
                 one = read_photo(photo.files[0], curve, photo.saturation)
                 radiance = one.radiance
                 if self.exposures[place][0] != 1.0:
                     radiance = radiance / np.float32(self.exposures[place][0])
-                return LitPhoto(radiance, ~one.clipped)
+                told = () if one.info.levels is None else (one.info.sentence,)
+                return LitPhoto(radiance, ~one.clipped, notes=(*told, *one.info.notes))
             merged = merge_bracket(
                 [partial(read_photo, file, curve, photo.saturation) for file in photo.files],
                 self.exposures[place],
@@ -68,7 +71,7 @@ class LitPhotos:
             )
         except InputError as error:
             raise self.capture.error(str(error), "photo", place, "file") from error
-        return LitPhoto(merged.radiance, merged.valid, merged.variance)
+        return LitPhoto(merged.radiance, merged.valid, merged.variance, merged.warnings)
 
     def read_other(self, file: Path, exposure: float | None = None) -> LitPhoto:
         """A photo of a sphere or a white target, in the same unit. Raises InputError."""
@@ -79,6 +82,10 @@ class LitPhotos:
                 own = read_exif(file).relative_exposure
                 exposure = 1.0 if own is None else own / self.first
         return LitPhoto(photo.radiance / np.float32(exposure), ~photo.clipped)
+
+    def curve(self, place: int) -> Transfer:
+        """The curve a photo is read with; "auto" is what its file says."""
+        return self._curve(self.capture.photos[place].transfer)
 
     def _curve(self, own: str | None) -> Transfer:
         if own is not None:

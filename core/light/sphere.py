@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from ..errors import InputError
 from ..scan.camera import Camera
 from .sphere_edge import RefinedOutline, refine_outline
 from .sphere_highlight import MOST, Blob, find_highlights
+from .sphere_mirror import mirror, mirrored_at, solid_angle
 from .sphere_outline import Circle, Sphere, circle_pixels, fit_sphere, mask_pixels, pixel_radius
 from .sphere_search import search_sphere
 
@@ -23,6 +25,7 @@ NEAR_RIM = 0.9  # a highlight beyond it is named in the notes
 SECOND = 0.1  # of the main highlight's strength: a second one above it is named in the notes
 COMPACT = 1.5  # pixels (RMS): a smaller highlight is the lens's blur, not the light's shape
 DRAWN = 1.0  # pixels: how well a circle or mask is placed that was not refined
+WELL_SEEN = 0.5  # of the outline
 SMALLEST = 8.0  # pixels: radius of a sphere that still tells a direction
 SAMPLES = 64  # of the grid on which the relative radius is computed, each way
 
@@ -113,7 +116,7 @@ def light_from_sphere(
         key=lambda pair: (-int(pair[1].clipped), -pair[0]),
     )[:MOST]
     main = found[0][0]
-    highlights = tuple(_relative(h, total / main) for total, h in found)
+    highlights = tuple(replace(h, strength=total / main) for total, h in found)
     first = highlights[0]
     uncertainty = _uncertainty(first, blobs, sphere, camera, sigma)
     notes += _notes(highlights, sphere, camera)
@@ -168,6 +171,11 @@ def _outline(
             "the sphere's edge does not stand out of its background: the outline is used as given"
         )
         return start, None
+    if best.support < WELL_SEEN:
+        notes.append(
+            f"only {100 * best.support:.0f} % of the sphere's outline stands out of its "
+            "background: check it, or draw a mask"
+        )
     return best.sphere, best
 
 
@@ -178,7 +186,7 @@ def _robust(camera: Camera, points: Array) -> Sphere:
     for _ in range(10):
         miss = sphere.relative_radius(camera, points) - 1
         spread = max(1.4826 * float(np.median(np.abs(miss))), 0.3 / pixel_radius(sphere, camera))
-        weights = np.maximum(1 - (miss / (4.685 * spread)) ** 2, 0.0) ** 2
+        weights = np.square(np.maximum(1 - np.square(miss / (4.685 * spread)), 0.0))
         if (weights > 0).sum() < 8:
             raise InputError("the edge of the sphere's mask is no outline of a sphere")
         sphere = fit_sphere(camera, points, weights)
@@ -190,36 +198,21 @@ def _inside(sphere: Sphere, camera: Camera) -> tuple[tuple[int, int], NDArray[np
     ring = sphere.outline(camera, np.arange(180) / 180 * 2 * np.pi)
     if not np.isfinite(ring).all():
         raise InputError("the sphere is not wholly in front of its camera")
-    low = np.maximum(np.floor(ring.min(axis=0)).astype(int), 0)
-    high = np.minimum(np.ceil(ring.max(axis=0)).astype(int), (camera.width, camera.height))
+    low = np.maximum(np.floor(ring.min(axis=0)), 0.0).astype(int)
+    high = np.minimum(np.ceil(ring.max(axis=0)), (camera.width, camera.height)).astype(int)
     if (high - low < 2).any():
         raise InputError("the sphere's outline lies outside its photo")
     # the relative radius is smooth: a lens with distortion is not asked for every pixel
-    count = np.minimum(high - low, SAMPLES)
+    count = [int(min(size, SAMPLES)) for size in high - low]
     xs = np.linspace(low[0] + 0.5, high[0] - 0.5, count[0])
     ys = np.linspace(low[1] + 0.5, high[1] - 0.5, count[1])
     grid = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
     radius = sphere.relative_radius(camera, grid).reshape(count[1], count[0])
-    from scipy.ndimage import map_coordinates
-
     width, height = high - low
     row = np.linspace(0, count[1] - 1, height)
     column = np.linspace(0, count[0] - 1, width)
-    fine = map_coordinates(radius, np.meshgrid(row, column, indexing="ij"), order=1)
+    fine = ndimage.map_coordinates(radius, np.meshgrid(row, column, indexing="ij"), order=1)
     return (int(low[1]), int(low[0])), fine < RIM
-
-
-def _mirror(sphere: Sphere, camera: Camera, pixels: Array) -> tuple[Array, Array]:
-    """(directions to the light, normals) (n, 3) where the pixels (n, 2) see the sphere; NaN
-    beside it."""
-    starts, rays = sphere.rays(camera, pixels)
-    towards = sphere.centre - starts
-    along = (towards * rays).sum(axis=1)
-    inside = along**2 - (towards * towards).sum(axis=1) + sphere.radius**2
-    with np.errstate(invalid="ignore"):
-        distance = along - np.sqrt(inside)
-    normals = (starts + distance[:, None] * rays - sphere.centre) / sphere.radius
-    return rays - 2 * (rays * normals).sum(axis=1, keepdims=True) * normals, normals
 
 
 def _highlight(
@@ -235,32 +228,34 @@ def _highlight(
     weights = blob.weights / blob.weights.sum()
     centre = weights @ places
     size = float(np.sqrt(weights @ ((places - centre) ** 2).sum(axis=1)))
-    directions, normals = _mirror(sphere, camera, places)
+    directions, normals = mirror(sphere, camera, places)
     half = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
-    corners, turned = _mirror(sphere, camera, (places[:, None] + half).reshape(-1, 2))
-    solid = _solid_angle(corners.reshape(-1, 4, 3))
+    corners, turned = mirror(sphere, camera, (places[:, None] + half).reshape(-1, 2))
+    solid = solid_angle(corners.reshape(-1, 4, 3))
     if size < COMPACT:
-        direction = _mirror(sphere, camera, centre[None])[0][0]
+        direction = mirror(sphere, camera, centre[None])[0][0]
     elif surface == "glossy":  # a lobe is symmetric about the half vector: mean over normals
-        spread = weights * np.nan_to_num(_solid_angle(turned.reshape(-1, 4, 3)))
+        spread = weights * np.nan_to_num(solid_angle(turned.reshape(-1, 4, 3)))
         normal = spread @ np.nan_to_num(normals)
-        direction = _mirrored_at(normal / np.linalg.norm(normal), sphere, camera, centre)
+        direction = mirrored_at(normal / np.linalg.norm(normal), sphere, camera, centre)
     else:  # a light's shape is seen as it is: mean over directions
         direction = (weights * np.nan_to_num(solid)) @ np.nan_to_num(directions)
     direction = direction / np.linalg.norm(direction)
     radiance = part[blob.rows, blob.columns].astype(float)
     above = np.maximum(radiance - blob.background, 0.0)
     energy = np.nan_to_num(solid) @ above
-    tall = radiance.mean(axis=1) - blob.background.mean() > 0.5 * (
-        blob.peak.mean() - blob.background.mean()
-    )
-    steradians = float(np.nan_to_num(solid)[tall].sum())
-    mirror = surface == "chrome" and not blob.clipped
+    height = float(blob.peak.mean() - blob.background.mean())
+    solid = np.nan_to_num(solid)
+    if blob.clipped:
+        steradians = float(solid[above.mean(axis=1) > 0.5 * height].sum())
+    else:  # of a disc as bright as the peak that gives as much light
+        steradians = float(energy.mean()) / max(height, 1e-300)
+    measured = surface == "chrome" and not blob.clipped
     highlight = Highlight(
         direction=direction,
         pixel=(float(centre[0]), float(centre[1])),
         peak=blob.peak,
-        irradiance=energy if mirror else None,
+        irradiance=energy if measured else None,
         angular_radius=float(np.arccos(max(1 - steradians / (2 * np.pi), -1.0))),
         strength=1.0,
         clipped=blob.clipped,
@@ -268,32 +263,12 @@ def _highlight(
     return max(float(energy.mean()), 1e-300), highlight
 
 
-def _mirrored_at(normal: Array, sphere: Sphere, camera: Camera, near: Array) -> Array:
-    point = sphere.centre + sphere.radius * normal
-    if sphere.origin is None:
-        ray = camera.rays(near[None])[0]
-    else:
-        ray = (point - sphere.origin) / np.linalg.norm(point - sphere.origin)
-    return ray - 2 * (ray @ normal) * normal
-
-
-def _solid_angle(corners: Array) -> Array:
-    """(n,) steradians of small quadrangles (n, 4, 3) of unit directions."""
-    diagonals = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
-    return 0.5 * np.linalg.norm(np.cross(*diagonals), axis=1)
-
-
-def _relative(highlight: Highlight, strength: float) -> Highlight:
-    values = {**vars(highlight), "strength": strength}
-    return Highlight(**values)
-
-
 def _uncertainty(
     highlight: Highlight, blobs: list[Blob], sphere: Sphere, camera: Camera, sigma: Array
 ) -> float:
     """Standard error of the direction, radians: outline (three parameters) and highlight (two)."""
     at = np.array([highlight.pixel])
-    base = _mirror(sphere, camera, at)[0][0]
+    base = mirror(sphere, camera, at)[0][0]
     sizes = [np.sqrt(len(b.rows) / np.pi) for b in blobs if np.allclose(b.peak, highlight.peak)]
     place = np.hypot(0.05, 0.05 * max(sizes, default=1.0))  # pixels
     total = 0.0
@@ -301,9 +276,9 @@ def _uncertainty(
         shift = [0.0, 0.0, 0.0]
         shift[which] = float(sigma[which])
         moved = sphere.moved(camera, (shift[0], shift[1], shift[2]))
-        total += _turn(base, _mirror(moved, camera, at)[0][0]) ** 2
+        total += _turn(base, mirror(moved, camera, at)[0][0]) ** 2
     for step in ((place, 0.0), (0.0, place)):
-        total += _turn(base, _mirror(sphere, camera, at + step)[0][0]) ** 2
+        total += _turn(base, mirror(sphere, camera, at + step)[0][0]) ** 2
     return float(np.sqrt(total))
 
 

@@ -17,12 +17,16 @@ from .sphere_rim import SHIFTS, best_blur, unexplained
 Array = NDArray[np.float64]
 
 PROFILES = 240
+COARSE = 100.0  # pixels of radius: a larger sphere is looked at as if it were this large, first
 STEP = 0.5  # pixels along a profile
 CANDIDATES = 5  # edges kept of a profile
-TRIALS = 800  # triples of edges tried
-CONES = 5  # of their cones, those refined
+OUTWARD = 2.0  # how much a cone wider by its own half-angle is preferred
+FINENESS = 0.015  # of the radius: steps of the votes for a cone
+CONES = 12  # with most votes, that are refined
+APART = 0.02  # of the radius: cones nearer to each other are one
 NEAR = 1.2  # pixels: an edge this near supports a cone
-WINDOW = 3.0  # pixels on either side of the outline, when it is refined
+WINDOW = 3.0  # pixels on either side of the outline, when it is refined,
+RIM_WIDTH = 0.045  # or this many radii
 LEAST_SUPPORT = 0.35  # of the profiles
 MOST_LEFT = 0.2  # of a profile's variance that is not the rim's: above it no edge is seen there
 CLEAREST = 0.01  # the same: below it an edge is as good as it gets
@@ -45,37 +49,38 @@ class RefinedOutline:
 
 
 def refine_outline(
-    pixels: NDArray, camera: Camera, sphere: Sphere, search: float = 0.15
+    pixels: NDArray, camera: Camera, sphere: Sphere, search: float = 0.2
 ) -> RefinedOutline | None:
     """The outline near ``sphere`` that the photo's edges agree on; None where they do not.
 
-    pixels: (h, w, 3) linear. search: how far from it to look, in radii. Profiles across it; their
-    strongest gradients; the cones of rays through three of them that most profiles support
-    (RANSAC). What the sphere mirrors has edges near its rim too, but on no cone: each candidate is
-    refined, by the rim's shape (sphere_rim.py) in all profiles at once, and the one that this
-    shape explains best is the outline.
+    pixels: (h, w, 3) linear. search: how far from it to look, in radii. Profiles across it, whose
+    strongest gradients vote for a cone of rays (Hough transform). What the sphere mirrors has edges
+    near its rim too, but on no cone: each candidate is refined, by the rim's shape (sphere_rim.py)
+    in all profiles at once, and the one that this shape explains best is the outline.
     """
     picture = np.asarray(pixels, float).sum(axis=2)
-    best: RefinedOutline | None = None
-    for start in _by_consensus(picture, camera, sphere, search):
-        found: RefinedOutline | None = None
-        for _ in range(3):
-            found = _by_rim(picture, camera, start)
-            if found is None:
-                break
-            start = found.sphere
-        if found is not None and (best is None or found.worth > best.worth):
-            best = found
-    return best
+    # the votes are as coarse as the sphere is large: so is the first look at what they found
+    unit = max(1.0, pixel_radius(sphere, camera) / COARSE)
+    tried = [
+        _by_rim(picture, camera, start, unit)
+        for start in _by_consensus(picture, camera, sphere, search)
+    ]
+    found = [outline for outline in tried if outline is not None]
+    # each time nearer to it, the rim's shape is laid across the outline more exactly
+    for keep in (3, 1, 1):
+        found = sorted(found, key=lambda outline: -outline.worth)[:keep]
+        unit = max(1.0, unit / 3)
+        found = [_by_rim(picture, camera, outline.sphere, unit) or outline for outline in found]
+    return found[0] if found else None
 
 
 def _profiles(
-    picture: Array, camera: Camera, sphere: Sphere, half_width: float
+    picture: Array, camera: Camera, sphere: Sphere, half_width: float, step: float = STEP
 ) -> tuple[Array, Array, Array]:
     """(azimuths (n,), offsets (k,) in pixels outward, values (n, k); NaN out of the photo)."""
     radius = pixel_radius(sphere, camera)
     azimuths = np.arange(PROFILES) / PROFILES * 2 * np.pi
-    offsets = np.arange(-half_width, half_width + STEP / 2, STEP)
+    offsets = np.arange(-half_width, half_width + step / 2, step)
     scales = 1 + offsets / radius
     turn, scale = np.repeat(azimuths, len(offsets)), np.tile(scales, len(azimuths))
     places = sphere.outline(camera, turn, scale)
@@ -111,43 +116,65 @@ def _by_consensus(picture: Array, camera: Camera, sphere: Sphere, search: float)
     limit = np.median(weight[having, 0])
     # a chrome sphere mirrors its table at the rim: a faint edge there is worth nearly a strong one
     worth = np.sqrt(np.minimum(weight / limit, 1.0))
-    # every candidate as a pixel, then as a function of the three parameters to first order: the
-    # outline shifted by (a, b) and widened by c passes azimuth t at a cos t + b sin t + c
-    rng = np.random.default_rng(0)
-    third = rng.integers(0, PROFILES, TRIALS)[:, None] + np.array([[0, 1, 2]]) * PROFILES // 3
-    wobble = rng.integers(-PROFILES // 8, PROFILES // 8, (TRIALS, 3))
-    chosen = (third + wobble) % PROFILES
-    share = np.cumsum(weight, axis=1)
-    pick = (rng.random((TRIALS, 3)) * share[chosen, -1])[..., None]
-    which = np.argmax(share[chosen] >= pick, axis=2)
-    usable = weight[chosen, which].min(axis=1) > 0
-    chosen, which = chosen[usable], which[usable]
-    if len(chosen) == 0:
-        return []
-    rows = np.stack([np.cos(azimuths), np.sin(azimuths), np.ones(PROFILES)], axis=1)
-    solved = np.linalg.solve(rows[chosen], places[chosen, which][..., None])[..., 0]
-    miss = np.abs(places[None] - (solved @ rows.T)[..., None])  # (trials, profiles, candidates)
-    # what the first order leaves out of an outline far off
-    allowed = NEAR + 0.5 * (solved[:, :2] ** 2).sum(axis=1)[:, None, None] / radius
-    score = (worth[None] * np.maximum(1 - (miss / allowed) ** 2, 0.0)).max(axis=2).sum(axis=1)
+    # votes: an outline moved by (x, y) and widened by w passes azimuth t at
+    # x cos t + y sin t + w − (x sin t − y cos t)² / 2R: an edge there tells w for each (x, y)
+    step = max(1.0, FINENESS * radius)
+    reach = float(offsets[-1])
+    shifts = np.arange(-reach, reach + step / 2, step)
+    x, y = (axis.reshape(-1, 1, 1) for axis in np.meshgrid(shifts, shifts, indexing="ij"))
+    cos, sin = np.cos(azimuths)[None, :, None], np.sin(azimuths)[None, :, None]
+    wider = places[None] - (x * cos + y * sin) + (x * sin - y * cos) ** 2 / (2 * radius)
+    column = np.round((wider + reach) / step).astype(int)
+    bins = round(2 * reach / step) + 1
+    usable = (column >= 0) & (column < bins) & (worth[None] > 0)
+    place = np.arange(len(x))[:, None, None] * bins + column
+    votes = np.bincount(
+        place[usable], np.broadcast_to(worth[None], place.shape)[usable], len(x) * bins
+    )
+    score = ndimage.gaussian_filter(votes.reshape(len(shifts), len(shifts), bins), 0.7)
+    widths = np.arange(bins) * step - reach
+    # what the sphere mirrors has edges too, and they are inside
+    score *= np.maximum(1 + OUTWARD * widths / radius, 0.1)
     found = []
-    while len(found) < CONES and score.size and score.max() > 0:
-        best = int(np.argmax(score))
-        near = np.where(miss[best] < allowed[best], weight, 0.0)
-        hit = near.max(axis=1) > 0
-        offset = places[np.arange(PROFILES), near.argmax(axis=1)]
-        if _covers(hit):
-            edge = sphere.outline(camera, azimuths[hit], 1 + offset[hit] / radius)
-            with contextlib.suppress(InputError):
-                found.append(fit_sphere(camera, edge))
-        score[np.abs(solved - solved[best]).max(axis=1) < NEAR] = 0.0
+    spaced = max(1, round(APART * radius / step))
+    for _ in range(CONES):
+        i, j, k = np.unravel_index(int(np.argmax(score)), score.shape)
+        if not score[i, j, k] > 0:
+            break
+        shift = (shifts[i] / radius, shifts[j] / radius, widths[k] / radius)
+        with contextlib.suppress(InputError):
+            found.append(fit_sphere(camera, _shifted(sphere, camera, azimuths, shift)))
+        score[
+            max(0, i - spaced) : i + spaced + 1,
+            max(0, j - spaced) : j + spaced + 1,
+            max(0, k - spaced) : k + spaced + 1,
+        ] = 0.0
     return found
 
 
-def _by_rim(picture: Array, camera: Camera, sphere: Sphere) -> RefinedOutline | None:
-    """All profiles at once: the cone on which the rim's shape leaves least of them unexplained."""
-    radius = pixel_radius(sphere, camera)
-    azimuths, offsets, values = _profiles(picture, camera, sphere, WINDOW)
+def _shifted(
+    sphere: Sphere, camera: Camera, azimuths: Array, shift: tuple[float, float, float]
+) -> Array:
+    """(n, 2) pixels of the outline moved by (x, y) and widened, in radii, seen from its middle."""
+    x, y, wider = shift
+    cos, sin = np.cos(azimuths), np.sin(azimuths)
+    scale = 1 + x * cos + y * sin + wider - (x * sin - y * cos) ** 2 / 2
+    return sphere.outline(camera, azimuths, scale)
+
+
+def _by_rim(
+    picture: Array, camera: Camera, sphere: Sphere, unit: float = 1.0
+) -> RefinedOutline | None:
+    """All profiles at once: the cone on which the rim's shape leaves least of them unexplained.
+
+    unit: pixels that count as one, 2 units or less from the outline.
+    """
+    radius = pixel_radius(sphere, camera) / unit
+    if not np.isfinite(radius):
+        return None
+    reach = max(WINDOW, RIM_WIDTH * radius)
+    azimuths, offsets, values = _profiles(picture, camera, sphere, reach * unit, STEP * unit)
+    offsets = offsets / unit
     good = np.isfinite(values).all(axis=1)
     if not _covers(good):
         return None
@@ -191,7 +218,7 @@ def _by_rim(picture: Array, camera: Camera, sphere: Sphere) -> RefinedOutline | 
     fewer = max(1.0, PROFILES / (2 * np.pi * radius))
     spread = np.linalg.inv(rows[on_it].T @ rows[on_it]) * (rms**2 * fewer)
     return RefinedOutline(
-        fit, float(hit.mean()), rms, worth, np.sqrt(np.diag(spread) + BIAS**2) / radius
+        fit, float(hit.mean()), rms * unit, worth, np.sqrt(np.diag(spread) + BIAS**2) / radius
     )
 
 

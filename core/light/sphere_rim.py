@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-BLURS = (0.35, 0.6, 1.0, 1.6)  # pixels; a pixel's own width is 0.29
+BLURS = (0.35, 0.6, 1.0, 1.6, 2.6, 4.0)  # pixels; a pixel's own width is 0.29
 SHIFTS = np.arange(-2.0, 2.01, 0.1)
 FINE = 0.1  # pixels of the shape's own grid
 

@@ -69,19 +69,20 @@ def _circles(small: Array) -> list[tuple[float, float, float]]:
     unit_y, unit_x = down[strong] / slope[strong], across[strong] / slope[strong]
     radii = np.arange(max(5.0, SMALLEST * max(small.shape)), LARGEST * max(small.shape), 1.5)
     scores = np.zeros((len(radii), height, width), np.float32)
-    for index, radius in enumerate(radii):
+    for layer, radius in enumerate(radii):
         for sign in (-1, 1):
             at_x = np.floor(x + 0.5 + sign * radius * unit_x).astype(int)
             at_y = np.floor(y + 0.5 + sign * radius * unit_y).astype(int)
             ok = (at_x >= 0) & (at_x < width) & (at_y >= 0) & (at_y < height)
             votes = np.bincount(at_y[ok] * width + at_x[ok], minlength=height * width)
-            scores[index] += votes.reshape(height, width)
+            scores[layer] += votes.reshape(height, width)
         # votes spread over more pixels the farther they are cast: 2° of gradient
         wide = 0.7 + 0.02 * radius
-        scores[index] = ndimage.gaussian_filter(scores[index], wide) * wide / np.sqrt(radius)
+        scores[layer] = ndimage.gaussian_filter(scores[layer], wide) * wide / np.sqrt(radius)
     found = []
     for _ in range(TRIED):
-        index, row, column = np.unravel_index(int(np.argmax(scores)), scores.shape)
+        place = np.unravel_index(int(np.argmax(scores)), scores.shape)
+        index, row, column = (int(axis) for axis in place)
         if scores[index, row, column] <= 0:
             break
         radius = float(radii[index])

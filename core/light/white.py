@@ -37,7 +37,7 @@ class WhiteIrradiance:
 
 def irradiance_from_white(
     pixels: NDArray,
-    camera: Camera,
+    camera: Camera | None,
     region: NDArray,
     reflectance: float | Sequence[float],
     normal: Sequence[float] | NDArray | None = None,
@@ -47,8 +47,9 @@ def irradiance_from_white(
     """E = π L / (ρ n·l): the irradiance at normal incidence of a distant light on a Lambertian
     target.
 
-    pixels: (h, w, 3) linear radiance of the photo of ``camera``. region: mask (h, w), white =
-    target, or polygon (n, 2) in pixels. reflectance: ρ, hemispherical (0.9; or one a channel).
+    pixels: (h, w, 3) linear radiance of the photo; camera: the one that took it, None where it is
+    no camera of the scan (then nobody checks that the normal faces it). region: mask (h, w), white
+    = target, or polygon (n, 2) in pixels. reflectance: ρ, hemispherical (0.9; or one a channel).
     normal: (3,) of the target, scan frame; direction: (3,) surface → light: any length. Where one
     is missing the target is taken to face the light, n·l = 1, and a note says so. saturation:
     radiance from which a pixel is clipped; guessed from a plateau where None.
@@ -57,14 +58,14 @@ def irradiance_from_white(
     reported. Raises InputError: a region that is none, a clipped, black or averted target.
     """
     light = np.asarray(pixels)
-    if light.shape != (camera.height, camera.width, 3):
+    if camera is not None and light.shape != (camera.height, camera.width, 3):
         raise InputError(
             f"the white target's photo is {light.shape[1]} × {light.shape[0]} pixels, its camera "
             f"{camera.width} × {camera.height}",
             key="white",
         )
     rho = _reflectance(reflectance)
-    rows, columns = np.nonzero(_mask(region, light.shape[:2]))
+    rows, columns = np.nonzero(_mask(region, (light.shape[0], light.shape[1])))
     if len(rows) < FEWEST:
         raise InputError(
             f"the white target covers {len(rows)} pixels; expected {FEWEST} or more", key="white"
@@ -75,7 +76,8 @@ def irradiance_from_white(
     notes: list[str] = []
     notes += _check_clipping(values, saturation)
     cosine = _cosine(normal, direction, notes)
-    _check_facing(normal, camera, rows, columns)
+    if camera is not None:
+        _check_facing(normal, camera, rows, columns)
 
     radiance, error, unevenness = _level(values, rows, columns)
     if not (radiance > 0).all():

@@ -30,7 +30,7 @@ CORRELATED = 4.2  # residuals per degree of freedom: sum of the mask's squared a
 QUIET = 0.2  # quantile of a brightness bin that starts the fit
 KEEP = 0.95  # of chi-squared
 GROWS = 1.3  # variance at twice the step that counts as correlation
-ENOUGH, FEWEST, MOST_BLOCKS = 300, 30, 20_000
+ENOUGH, SURE, FEWEST, MOST_BLOCKS = 300, 100, 30, 20_000
 BINS, LEAST, AGREE = 24, (6, 12), 0.3  # brightness bins; blocks in each; how well bins agree (log)
 
 
@@ -92,7 +92,7 @@ def _channel(
     best, step = lines[0], STEPS[0]
     for line, after in zip(lines[1:], STEPS[1:], strict=True):
         light = found[0][0][:, channel]
-        if not (best.blocks and line.blocks):
+        if not best.blocks or line.blocks < SURE:
             break
         middle = np.median(line.at(light)) / max(np.median(best.at(light)), 1e-30)
         if middle < GROWS:

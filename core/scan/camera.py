@@ -98,7 +98,7 @@ class Camera:
             return self.pose.centre
         return (lens.starts(pixels) - self.pose.translation) @ self.pose.rotation
 
-    def footprint(self, depth: Array) -> Array:
+    def footprint(self, depth: NDArray[np.floating]) -> NDArray[np.floating]:
         """The width of a pixel at a depth along the ray, scan units (any shape)."""
         lens = self.lens
         focal = 0.5 * (lens.focal_length_x + lens.focal_length_y)

@@ -105,7 +105,8 @@ def read_mesh(path: Path) -> Mesh:
         raise InputError(f"cannot be read ({error.strerror})", file=path) from error
     if not data:
         raise InputError("is empty", file=path)
-    polygons = reader(data, path)
+    with np.errstate(invalid="ignore", over="ignore"):  # what is no number is refused below
+        polygons = reader(data, path)
     polygons.check(path)
     return _mesh(polygons, path)
 
@@ -114,7 +115,7 @@ def _mesh(polygons: Polygons, path: Path) -> Mesh:
     """Triangles between distinct vertices."""
     corners, owner = polygons.triangles(path)
     first, number = distinct_places(polygons.vertices, polygons.vertex_colours)
-    faces = number[polygons.corners[corners]].astype(np.int32)
+    faces = number.astype(np.int32)[polygons.corners[corners]]
     keep = _proper(faces)
     if not keep.any():
         raise InputError("the mesh has no faces but degenerate ones", file=path)
@@ -145,5 +146,5 @@ def _proper(faces: NDArray[np.int32]) -> NDArray[np.bool_]:
     a, b, c = faces.T
     proper = (a != b) & (b != c) & (c != a)
     once = np.zeros(len(faces), bool)
-    once[distinct_rows(np.sort(faces, axis=1).astype(np.int64))[0]] = True
+    once[distinct_rows(np.sort(faces, axis=1))[0]] = True
     return proper & once

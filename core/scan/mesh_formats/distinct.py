@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 MIXERS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
 
 
-def distinct_rows(rows: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def distinct_rows(rows: NDArray[np.integer]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """(m,) the first place of every distinct row of ``rows`` (n, k), ascending, and (n,) the number
     of each row among them."""
     if not len(rows):
@@ -16,7 +16,7 @@ def distinct_rows(rows: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np
     key = np.zeros(len(rows), np.uint64)
     with np.errstate(over="ignore"):
         for k in range(rows.shape[1]):
-            key = (key ^ rows[:, k].view(np.uint64)) * MIXERS[k % 3]
+            key = (key ^ rows[:, k].astype(np.int64).view(np.uint64)) * MIXERS[k % 3]
             key ^= key >> np.uint64(29)
     order = np.argsort(key, kind="stable")
     differs = _differs(rows, order)
@@ -33,7 +33,7 @@ def distinct_rows(rows: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np
     return first[place], number
 
 
-def _differs(rows: NDArray[np.int64], order: NDArray[np.intp]) -> NDArray[np.bool_]:
+def _differs(rows: NDArray[np.integer], order: NDArray[np.intp]) -> NDArray[np.bool_]:
     """(n − 1,) whether a row is another one than the one before it, in that order."""
     differs = np.zeros(len(rows) - 1, bool)
     for k in range(rows.shape[1]):

@@ -20,6 +20,7 @@ from .gltf_nodes import placed_meshes
 from .polygons import Polygons
 from .precision import float32_note
 
+MOST_PARTS = 20_000
 POINTS, LINES, TRIANGLES, STRIP, FAN = 0, (1, 2, 3), 4, 5, 6
 
 
@@ -47,6 +48,8 @@ def read_gltf(data: bytes, path: Path) -> Polygons:
             part = _part(document, primitive, matrix, notes)
             if part is not None:
                 parts.append(part)
+            if len(parts) > MOST_PARTS:
+                raise document.error(f"glTF: its scene has more than {MOST_PARTS} parts")
     materials, textures = _materials(document, notes)
     return _joined(parts, materials, textures, tuple(notes))
 
@@ -80,8 +83,7 @@ def _part(
     triangles = _triangles(corners, mode)
     if np.linalg.det(matrix[:3, :3]) < 0:  # a mirrored node turns its faces inside out
         triangles = triangles[:, ::-1]
-    with np.errstate(over="ignore", invalid="ignore"):
-        vertices = stored.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    vertices = stored.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     material = document.member(primitive, "material", int, -1)
     entry = {} if material < 0 else document.entry("materials", material)
     uv = _of_vertices(document, attributes, f"TEXCOORD_{_uv_set(document, entry)}", 2, count)

@@ -10,7 +10,7 @@ import binascii
 import json
 import struct
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 from urllib.parse import unquote
 
 import numpy as np
@@ -196,14 +196,13 @@ class Gltf:
     def _refuse_extensions(self) -> None:
         required = self.member(self.json, "extensionsRequired", list, [])
         for name in required:
-            if name in COMPRESSED if isinstance(name, str) else False:
+            if isinstance(name, str) and name in COMPRESSED:
                 self.refuse_compressed(name)
-            if not isinstance(name, str) or (
-                name not in UNDERSTOOD and not name.startswith(HARMLESS)
-            ):
+            known = isinstance(name, str) and (name in UNDERSTOOD or name.startswith(HARMLESS))
+            if not known:
                 raise self.error(f"needs the glTF extension {str(name)[:60]!r}, which is not read")
 
-    def refuse_compressed(self, name: str) -> None:
+    def refuse_compressed(self, name: str) -> NoReturn:
         """Raise the InputError of geometry that a codec has packed."""
         raise self.error(
             f"its geometry is compressed with {COMPRESSED[name]} ({name}), which is not read; "

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from .gltf_buffers import Gltf
 
+MOST_NODES, MOST_PLACED = 200_000, 20_000
+
 
 def placed_meshes(document: Gltf) -> Iterator[tuple[Any, NDArray[np.float64]]]:
     """(index of a mesh, its 4 × 4 matrix to the scene's frame) of every node with a mesh.
@@ -21,20 +23,45 @@ def placed_meshes(document: Gltf) -> Iterator[tuple[Any, NDArray[np.float64]]]:
     The scene is the default one, else the first; a file without scenes shows every node that is no
     other's child. A node below two others, or below itself, is refused, as the format does.
     """
-    seen: set[int] = set()
-    waiting = [(root, np.eye(4)) for root in _roots(document)]
+    nodes = document.member(document.json, "nodes", list, [])
+    if len(nodes) > MOST_NODES:
+        raise document.error(f"glTF: it has {len(nodes)} nodes, expected at most {MOST_NODES}")
+    above: dict[int, int | None] = {}
+    known: dict[int | None, NDArray[np.float64]] = {None: np.eye(4)}
+    waiting: list[tuple[Any, int | None]] = [(root, None) for root in _roots(document)]
+    placed = 0
     while waiting:
-        index, above = waiting.pop()
+        index, parent = waiting.pop()
         node = document.entry("nodes", index)
-        if index in seen:
+        if index in above:
             raise document.error(f"glTF: nodes[{index}] stands in the tree twice")
-        seen.add(index)
-        with np.errstate(over="ignore", invalid="ignore"):
-            matrix = above @ _matrix(document, node)
+        above[index] = parent
         children = document.member(node, "children", list, [])
-        waiting += [(child, matrix) for child in reversed(children)]
+        waiting += [(child, index) for child in reversed(children)]
         if "mesh" in node:
-            yield node["mesh"], matrix
+            placed += 1
+            if placed > MOST_PLACED:
+                raise document.error(f"glTF: its scene shows more than {MOST_PLACED} meshes")
+            yield node["mesh"], _placed(document, index, above, known)
+
+
+def _placed(
+    document: Gltf,
+    index: int,
+    above: dict[int, int | None],
+    known: dict[int | None, NDArray[np.float64]],
+) -> NDArray[np.float64]:
+    """The matrix of a node to the scene's frame; those on the way to it become known too."""
+    chain: list[int] = []
+    at: int | None = index
+    while at is not None and at not in known:
+        chain.append(at)
+        at = above[at]
+    matrix = known[at]
+    for step in reversed(chain):
+        matrix = matrix @ _matrix(document, document.entry("nodes", step))
+        known[step] = matrix
+    return matrix
 
 
 def _roots(document: Gltf) -> list:

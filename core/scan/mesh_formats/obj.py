@@ -35,15 +35,18 @@ def read_obj(data: bytes, path: Path) -> Polygons:
     v_lines = lines.starting_with(b"v")
     vertices, every = lines.table(v_lines, b"v", 3)
     uv_lines = lines.starting_with(b"vt")
-    uv = lines.table(uv_lines, b"vt", 1)[1] if len(uv_lines) else None
     f_lines = lines.starting_with(b"f")
     corners, places, sizes = _faces(lines, f_lines)
     corners = _from_zero(lines, corners, sizes, f_lines, v_lines, "v")
-    corner_uv = None
-    if uv is not None and uv.shape[1] >= 2 and (places != 0).all():
-        places = _from_zero(lines, places, sizes, f_lines, uv_lines, "vt")
-        corner_uv = uv[places, :2].astype(np.float32)
     materials, textures, numbers, notes = _materials(lines, f_lines, path)
+    corner_uv, missing = None, int((places == 0).sum())
+    if missing < len(places):
+        uv = lines.table(uv_lines, b"vt", 2)[0]
+        corner_uv = np.zeros((len(places), 2), np.float32)
+        has = places != 0
+        corner_uv[has] = uv[_from_zero(lines, places, sizes, f_lines, uv_lines, "vt")[has]]
+        if missing:
+            notes += (f"{missing} corners of its faces have no texture coordinates: they get 0, 0",)
     if data and not data.endswith(b"\n"):
         notes += ("its last line has no line break: if the file was cut short, faces are missing",)
     return Polygons(
@@ -83,7 +86,6 @@ def _faces(
         values = parse_numbers(text, len(number_at), np.int64)
         if values is None:
             lines.refuse(int(these[0]), "faces of whole numbers (here or in the lines below)")
-            raise AssertionError  # refuse() has raised
         slashes = np.cumsum(slash, dtype=np.int32)
         of_corner = np.cumsum(corner, dtype=np.int32)[number_at] - 1
         slot = slashes[number_at] - slashes[corner_at][of_corner]
@@ -110,15 +112,10 @@ def _from_zero(
     listed: NDArray[np.intp],
     word: str,
 ) -> NDArray[np.int64]:
-    """Numbers counted from 0; negative ones count back from the face's own line."""
-    if not len(numbers):
-        return numbers
-    resolved = numbers - 1
-    negative = numbers < 0
-    if negative.any():
-        before = np.repeat(np.searchsorted(listed, f_lines), sizes)
-        resolved = np.where(negative, before + numbers, resolved)
-    wrong = (resolved < 0) | (resolved >= len(listed))
+    """Numbers counted from 0; negative ones count back from the face's own line. 0 (none) is -1."""
+    before = np.repeat(np.searchsorted(listed, f_lines), sizes) if (numbers < 0).any() else 0
+    resolved = np.where(numbers < 0, before + numbers, numbers - 1)
+    wrong = (numbers != 0) & ((resolved < 0) | (resolved >= len(listed)))
     if wrong.any():
         corner = int(np.argmax(wrong))
         line = int(f_lines[np.searchsorted(np.cumsum(sizes), corner, side="right")])

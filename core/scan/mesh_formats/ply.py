@@ -168,8 +168,7 @@ def _attributes(face: Table, header: Header, notes: list[str]) -> dict[str, NDAr
         if prop.count_type is not None or prop.declared[0] == "f":
             continue
         values = face.scalars[prop.name]
-        with np.errstate(invalid="ignore"):
-            whole = values.astype(np.int64)
+        whole = values.astype(np.int64)
         if len(values) and (
             (whole != values).any() or whole.min() < -(2**31) or whole.max() >= 2**31
         ):

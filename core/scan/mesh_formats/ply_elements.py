@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import struct
+from array import array
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from .ply_header import Element
+from .ply_header import Element, Property
 
 LETTERS = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q",
            "f4": "f", "f8": "d"}  # fmt: skip
@@ -86,50 +88,82 @@ def _alike(body: memoryview, place: int, element: Element) -> tuple[Table, int] 
 
 
 def _walk(body: memoryview, place: int, element: Element, path: Path) -> tuple[Table, int]:
-    """The table of rows of different lengths: one step a list."""
-    # bytes of scalars before the list, its count, bytes of one value, place of the property
-    steps: list[tuple[int, struct.Struct, int, int]] = []
-    before, offsets = 0, {}
-    for i, p in enumerate(element.properties):
+    """The table of rows of different lengths: one step of Python a list."""
+    lists: list[_List] = []
+    before = 0  # bytes of scalars since the row's beginning or its last list
+    scalars = {}  # name → (lists before it, bytes behind the last of them)
+    for p in element.properties:
         size = np.dtype(p.type).itemsize
         if p.count_type is None:
-            offsets[p.name] = (len(steps), before)
+            scalars[p.name] = (len(lists), before)
             before += size
         else:
-            order, kind = p.count_type[0], p.count_type[1:]
-            steps.append((before, struct.Struct(order + LETTERS[kind]), size, i))
+            lists.append(_List(before, struct.Struct(p.count_type[0] + LETTERS[p.count_type[1:]]),
+                               size, p))  # fmt: skip
             before = 0
-    tail, total = before, len(body)
-    starts = np.empty((element.count, len(steps) + 1), np.int64)  # where the parts of a row begin
-    counts = np.empty((element.count, len(steps)), np.int64)
-    at = place
+    counts, end = _list_lengths(body, place, element, lists, before, path)
+    # where the parts of each row begin: the part up to and with each list, and the tail
+    lengths = np.empty((element.count, len(lists) + 1), np.int64)
+    for k, one in enumerate(lists):
+        lengths[:, k] = one.before + one.form.size + counts[:, k] * one.size
+    lengths[:, -1] = before
+    ends = np.cumsum(lengths.ravel()).reshape(lengths.shape)
+    starts = ends - lengths + place
+    raw = np.frombuffer(body, np.uint8)
+    types = {p.name: p.type for p in element.properties}
+    columns = {
+        name: _gather(raw, starts[:, part] + offset, types[name])
+        for name, (part, offset) in scalars.items()
+    }
+    found = {}
+    for k, one in enumerate(lists):
+        here = counts[:, k]
+        within = np.arange(int(here.sum())) - np.repeat(np.cumsum(here) - here, here)
+        first = np.repeat(starts[:, k] + one.before + one.form.size, here)
+        values = _gather(raw, first + one.size * within, one.property.type)
+        found[one.property.name] = (here, _values(values, one.property.declared))
+    return Table(element.count, columns, found), end
+
+
+class _List(NamedTuple):
+    """Bytes before the count, the count's form, bytes of a value."""
+
+    before: int
+    form: struct.Struct
+    size: int
+    property: Property
+
+
+def _list_lengths(
+    body: memoryview, place: int, element: Element, lists: list[_List], tail: int, path: Path
+) -> tuple[NDArray[np.int64], int]:
+    """(n, lists) the length of every list, and where the rows end."""
+    lengths, total = array("q"), len(body)
+    append, at = lengths.append, place
+    steps = [(one.before, one.form.unpack_from, one.form.size, one.size) for one in lists]
     try:
-        for row in range(element.count):
-            for k, (before, form, size, _) in enumerate(steps):
-                starts[row, k] = at
-                (count,) = form.unpack_from(body, at + before)
-                if not 0 <= count <= total:
-                    raise _truncated(element, path)
-                counts[row, k] = count
-                at += before + form.size + int(count) * size
-            starts[row, -1] = at
-            at += tail
-    except (struct.error, ValueError) as error:
+        if len(steps) == 1 and lists[0].form.format in ("<B", ">B"):
+            before, _, _, size = steps[0]
+            more = before + 1 + tail
+            for _ in range(element.count):
+                count = body[at + before]
+                append(count)
+                at += more + count * size
+        else:
+            for _ in range(element.count):
+                for before, unpack, width, size in steps:
+                    at += before
+                    count = int(unpack(body, at)[0])
+                    if not 0 <= count <= total:
+                        raise _truncated(element, path)
+                    append(count)
+                    at += width + count * size
+                at += tail
+    except (struct.error, IndexError, ValueError, OverflowError) as error:
         raise _truncated(element, path) from error
     if at > total:
         raise _truncated(element, path)
-    raw = np.frombuffer(body, np.uint8)
-    scalars, lists = {}, {}
-    for name, (part, offset) in offsets.items():
-        p = next(p for p in element.properties if p.name == name)
-        scalars[name] = _gather(raw, starts[:, part] + offset, p.type)
-    for k, (before, form, size, i) in enumerate(steps):
-        p = element.properties[i]
-        lengths = counts[:, k]
-        within = np.arange(int(lengths.sum())) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-        first = np.repeat(starts[:, k] + before + form.size, lengths)
-        lists[p.name] = (lengths, _values(_gather(raw, first + size * within, p.type), p.declared))
-    return Table(element.count, scalars, lists), at
+    return np.frombuffer(lengths, np.int64).reshape(element.count, len(lists)), at
 
 
 def _gather(raw: NDArray[np.uint8], places: NDArray[np.int64], kind: str) -> NDArray:

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,8 +114,7 @@ class TextLines:
             parsed = parse_numbers(text, len(places), np.float64)
             if parsed is None:
                 self._refuse_first(these, word)
-            else:
-                values.append(parsed)
+            values.append(parsed)
             counts.append(count)
         if not values:
             return np.empty(0), np.empty(0, np.int64)
@@ -134,13 +134,13 @@ class TextLines:
         starts = np.cumsum(counts) - counts
         return values[starts[:, None] + np.arange(columns)], None
 
-    def refuse(self, line: int, expected: str) -> None:
+    def refuse(self, line: int, expected: str) -> NoReturn:
         """Raise the InputError of a line."""
         found = self.line(line)[:60].decode("utf-8", "replace")
         found = "".join(c if c.isprintable() else "?" for c in found)
         raise InputError(f"expected {expected}, found {found!r}", file=self.path, line=line + 1)
 
-    def _refuse_first(self, lines: NDArray[np.intp], word: bytes) -> None:
+    def _refuse_first(self, lines: NDArray[np.intp], word: bytes) -> NoReturn:
         for line in lines:
             try:
                 for token in self.line(int(line))[len(word) :].split():

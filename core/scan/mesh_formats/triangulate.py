@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-AT_ONCE = 1 << 18  # point-in-triangle tests
 CUT = -4.0  # the score of a corner that is no more there; others lie between -3 and 1
 NO_EAR = -2.0
 
@@ -46,11 +45,8 @@ def ear_clip(flat: NDArray[np.float64], sizes: NDArray[np.int64]) -> NDArray[np.
     Of a polygon's ears the one nearest to an equilateral triangle goes first. A polygon that cuts
     itself has times without an ear: the most convex corner is cut then.
     """
-    m, n = flat.shape[:2]
-    triangles = np.zeros((m, n - 2, 3), np.int64)
-    for begin in range(0, m, step := max(1, AT_ONCE // n)):
-        part = slice(begin, begin + step)
-        _Rings(flat[part], sizes[part]).clip(triangles[part])
+    triangles = np.zeros((len(flat), flat.shape[1] - 2, 3), np.int64)
+    _Rings(flat, sizes).clip(triangles)
     return triangles
 
 

@@ -1,0 +1,148 @@
+"""A capture file with other lights: only the lines concerned change, comments and all else stay."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Sequence
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, PatinaError
+from .entries import LightEntry
+from .model import Capture
+from .reader import read_capture
+from .toml_text import Statement, statements
+
+VECTORS = ("direction", "position", "mounted")
+TABLES = ("sphere", "sun", "white")
+
+
+def write_lights(capture: Capture, lights: Sequence[LightEntry], out: Path) -> None:
+    """Write a copy of the capture's file with ``lights`` in place of its own, one for one.
+
+    Taken over are direction, position, mounted, irradiance or intensity, angle and radius; what
+    they stand for (sphere, sun, white) becomes a comment. out may be the capture's own file; it
+    appears whole or not at all, and only after it has been read back and found to say just this.
+    Raises PatinaError.
+    """
+    try:
+        text = capture.file.read_bytes().decode("utf-8")
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be read ({error})", file=capture.file) from error
+    partial = out.with_name(f"{out.name}.part")
+    try:
+        partial.write_bytes(with_lights(text, capture, lights).encode("utf-8"))
+        _check(partial, capture, lights, out)
+        os.replace(partial, out)
+    except OSError as error:
+        raise InputError(f"cannot be written ({error.strerror or error})", file=out) from error
+    finally:
+        with contextlib.suppress(OSError):
+            partial.unlink(missing_ok=True)
+
+
+def with_lights(text: str, capture: Capture, lights: Sequence[LightEntry]) -> str:
+    """The text of the capture's file with ``lights`` in place of its own. Raises InputError where a
+    light that changes is not a [[light]] table of its own."""
+    found = list(statements(text))
+    edits: list[tuple[int, int, str]] = []
+    for place, (old, new) in enumerate(zip(capture.lights, lights, strict=True)):
+        values = _changes(old, new)
+        if values:
+            own = [s for s in found if s.path[:2] == ("light", place)]
+            name = next((s for s in own if s.path[2:] == ("name",)), None)
+            if name is None:
+                raise capture.error(
+                    "is written inside another value: give it a [[light]] table of its own, then "
+                    "its lamp can be saved", "light", place,
+                )  # fmt: skip
+            for key, value in values.items():
+                edits += _edits(text, [s for s in own if s.path[2:3] == (key,)], name, key, value)
+    for start, end, new_text in sorted(edits, key=lambda edit: edit[:2], reverse=True):
+        text = text[:start] + new_text + text[end:]
+    return text
+
+
+def _edits(
+    text: str, there: list[Statement], name: Statement, key: str, value: str | None
+) -> list[tuple[int, int, str]]:
+    """(start, end, what to put there instead) for one key of a light. name: the light's name, after
+    which a new key is put."""
+    if value is None:
+        return [(s.start, s.end, _commented(text[s.start : s.end])) for s in there]
+    if there and there[0].value is not None:
+        return [(*there[0].value, value)]
+    line = text[name.start : name.end]
+    indent = line[: len(line) - len(line.lstrip(" \t"))]
+    line_break = "\r\n" if line.endswith("\r\n") else "\n"
+    before = "" if line.endswith("\n") else line_break
+    return [(name.end, name.end, f"{before}{indent}{key} = {value}{line_break}")]
+
+
+def _commented(lines: str) -> str:
+    body, line_break = (lines[:-1], "\n") if lines.endswith("\n") else (lines, "")
+    return "\n".join(f"# {line}" for line in body.split("\n")) + line_break
+
+
+def _changes(old: LightEntry, new: LightEntry) -> dict[str, str | None]:
+    """Key → its new value as TOML, None where it goes."""
+    strength = "irradiance" if new.distant else "intensity"
+    pairs = {key: (getattr(old, key), getattr(new, key)) for key in VECTORS}
+    pairs[strength] = (old.strength, new.strength)
+    changes: dict[str, str | None] = {
+        key: None if after is None else f"[{', '.join(repr(float(x)) for x in after)}]"
+        for key, (before, after) in pairs.items()
+        if not _same(before, after)
+    }
+    if not _same(old.angle, new.angle):
+        changes["angle"] = None if new.angle is None else repr(float(np.degrees(new.angle)))
+    if not _same(old.radius, new.radius):
+        changes["radius"] = repr(float(new.radius))
+    for key in TABLES:
+        if getattr(old, key) is not None and getattr(new, key) is None:
+            changes[key] = None
+    return changes
+
+
+def _check(partial: Path, capture: Capture, lights: Sequence[LightEntry], out: Path) -> None:
+    """Refuse a file that does not say what it should."""
+    where = f"its files are named relative to {capture.file.parent}: save it in that folder"
+    try:
+        back = read_capture(partial)
+    except InputError as error:
+        elsewhere = out.resolve().parent != capture.file.parent
+        why = where if elsewhere else f"it would not be read again: {error}"
+        raise InputError(f"cannot be saved here; {why}", file=out) from error
+    for part in ("scan", "tone", "photos", "materials", "fit"):
+        if not _same(getattr(back, part), getattr(capture, part)):
+            raise InputError(f"cannot be saved here; {where}", file=out)
+    if not _same(back.lights, tuple(lights)):
+        raise PatinaError(
+            f"{capture.file}: its lights could not be changed in its text; give each light a "
+            "[[light]] table of its own, one key a line"
+        )
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Equal, numbers but for rounding, paths by where they lead."""
+    if type(one) is not type(other) and not (
+        isinstance(one, int | float) and isinstance(other, int | float)
+    ):
+        return False
+    if is_dataclass(one):
+        return all(_same(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
+    if isinstance(one, list | tuple):
+        return len(one) == len(other) and all(map(_same, one, other))
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(_same(one[key], other[key]) for key in one)
+    if isinstance(one, Path):
+        return one.resolve() == other.resolve()
+    if isinstance(one, np.ndarray):
+        return one.shape == other.shape and bool(np.allclose(one, other, rtol=1e-12, atol=1e-15))
+    if isinstance(one, float):
+        return bool(np.isclose(one, other, rtol=1e-12, atol=1e-15))
+    return bool(one == other)

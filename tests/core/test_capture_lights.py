@@ -1,0 +1,245 @@
+"""What a capture file may say of lights, tone, brackets and painted materials."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from patina.core.capture import read_capture
+from patina.core.errors import InputError, PatinaError
+from patina.core.job import FitJob, inputs
+from patina.core.job.lights import find_lights
+from patina.core.job.photos import LitPhotos
+from patina.core.light import DistantLight
+from tests import make_capture as made
+from tests.sampled import sampled
+
+
+@pytest.fixture
+def ball(tmp_path: Path) -> Path:
+    return made.make_capture(tmp_path)
+
+
+def with_light(path: Path, *lines: str) -> Path:
+    """All photos under one light that these lines describe."""
+    text = path.read_text()
+    scan, photos = text.partition("[[light]]")[0], text[text.index("[[photo]]") :]
+    for i in range(1, 7):
+        photos = photos.replace(f'light = "lamp{i}"', 'light = "lamp"')
+    light = "\n".join(["[[light]]", 'name = "lamp"', *lines, ""])
+    path.write_text(scan + light + photos)
+    return path
+
+
+WRONG = {
+    "two ways": (["direction = [0, 0, 1]", "position = [0, 0, 1]"], "found direction and position"),
+    "no way": (["irradiance = [1, 1, 1]"], "found none of them"),
+    "near with irradiance": (["position = [0, 0, 1]", "irradiance = [1, 1, 1]"], "expected intens"),
+    "distant with intensity": (["direction = [0, 0, 1]", "intensity = [1, 1, 1]"], "expected irra"),
+    "beam of a lamp": (["position = [0, 0, 1]", "beam = 30"], "unknown key 'beam'"),
+    "radius of a sun": (["direction = [0, 0, 1]", "radius = 2"], "unknown key 'radius'"),
+    "no zone": (['sun = {time = "2018-06-01T12:00:00"}'], "has no zone"),
+    "no such day": (['sun = {time = "2018-06-31T12:00:00+09:00"}'], "is no date"),
+    "half a place": (["sun = {latitude = 3.0}"], "belong together"),
+    "up without north": (["sun = {up = [0, 0, 1]}"], "belong together"),
+    "sphere without camera": (['sphere = {photo = "lit_1.exr"}'], "'camera' is missing"),
+    "half an outline": (
+        ['sphere = {photo = "lit_1.exr", camera = "view_01", radius = 4}'], "center and radius",
+    ),
+    "sphere elsewhere": (
+        ['sphere = {photo = "gone.exr", camera = "view_01"}'], "no such file.*gone.exr",
+    ),
+    "kind of sphere": (
+        ['sphere = {photo = "lit_1.exr", camera = "view_01", surface = "matte"}'], "'glossy'",
+    ),
+    "white twice": (
+        ["direction = [0, 0, 1]", "irradiance = [1, 1, 1]",
+         'white = {photo = "lit_1.exr", mask = "lit_1.exr", reflectance = 0.9}'], "leave one",
+    ),
+    "white of a flash": (
+        ["mounted = [0, 0, 0]",
+         'white = {photo = "lit_1.exr", mask = "lit_1.exr", reflectance = 0.9}'], "distant light",
+    ),
+    "refine": (["direction = [0, 0, 1]", "refine = 1"], "true or false"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mistake", WRONG)
+def test_mistakes_are_named(ball: Path, mistake: str) -> None:
+    lines, message = WRONG[mistake]
+    path = with_light(ball, *lines)
+    with pytest.raises(InputError, match=message) as caught:
+        read_capture(path)
+    assert f"{path}:" in str(caught.value) and "light 1" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def lights_of(path: Path):
+    capture = read_capture(path)
+    scan = inputs.open_scan(capture)
+    return find_lights(capture, scan, LitPhotos.open(capture))
+
+
+def test_the_sun_by_place_and_time(ball: Path) -> None:
+    """Noon at the equator on the March equinox: the sun stands overhead within a degree."""
+    lines = 'time = "2021-03-20T12:07:30Z", north = [0, 2, 0], up = [0, 0, 3]'
+    found = lights_of(with_light(ball, f"sun = {{latitude = 0.0, longitude = 0.0, {lines}}}"))
+    light = found.by_name["lamp"]
+    assert isinstance(light, DistantLight)
+    assert np.degrees(np.arccos(light.direction[2])) < 1.0
+    assert np.degrees(light.angular_radius) == pytest.approx(0.266, abs=0.01)
+    assert "elevation" in " ".join(found.notes)
+
+
+def test_the_sun_needs_north(ball: Path) -> None:
+    path = with_light(ball, 'sun = {latitude = 50, longitude = 8, time = "2021-06-01T12:00:00Z"}')
+    with pytest.raises(InputError, match=r"light 1\.sun.*north"):
+        lights_of(path)
+
+
+def test_the_sun_at_night(ball: Path) -> None:
+    time = 'time = "2021-06-01T00:00:00Z", north = [0, 1, 0], up = [0, 0, 1]'
+    path = with_light(ball, f"sun = {{latitude = 50.0, longitude = 8.0, {time}}}")
+    with pytest.raises(InputError, match="below the horizon"):
+        lights_of(path)
+
+
+def test_exif_of_a_photo_places_the_sun(ball: Path, shared: Path) -> None:
+    """The drone photo's time has no zone of its own: its GPS time is used, or asked for."""
+    photo = shared / "data" / "real" / "brighton_sun.jpg"
+    path = with_light(ball, "sun = {north = [0, 1, 0], up = [0, 0, 1]}")
+    path.write_text(path.read_text().replace('"lit_1.exr"', f'"{photo}"\nexposure = 1.0'))
+    with pytest.raises(InputError, match=r"sun.*(zone|time)"):
+        lights_of(path)
+    time = 'time = "2016-06-23T16:33:00-05:00"'
+    path.write_text(path.read_text().replace("sun = {", f"sun = {{{time}, "))
+    light = lights_of(path).by_name["lamp"]
+    east, north, up = light.direction
+    assert np.degrees(np.arcsin(up)) == pytest.approx(43.5, abs=0.3)
+    assert np.degrees(np.arctan2(east, north)) % 360 == pytest.approx(257.9, abs=0.5)
+
+
+def test_a_white_target_gives_the_irradiance(ball: Path) -> None:
+    folder = ball.parent
+    white = np.full((60, 80, 3), 0.05)
+    white[20:40, 30:60] = np.array([0.9, 0.8, 0.7]) / np.pi * 0.5 * 4
+    mask = np.zeros((60, 80))
+    mask[22:38, 32:58] = 255
+    made.write_exr(folder / "white.exr", white)
+    made.write_png(folder / "white.png", mask)
+    target = 'photo = "white.exr", mask = "white.png", reflectance = 0.5'
+    path = with_light(ball, "direction = [0, 0, 1]", f"white = {{{target}}}")
+    light = lights_of(path).by_name["lamp"]
+    assert light.irradiance == pytest.approx(np.array([3.6, 3.2, 2.8]), rel=1e-3)
+    tilted = f"white = {{{target}, normal = [0, 0.6, 0.8]}}"
+    path.write_text(path.read_text().replace(f"white = {{{target}}}", tilted))
+    light = lights_of(path).by_name["lamp"]
+    assert light.irradiance == pytest.approx(np.array([3.6, 3.2, 2.8]) / 0.8, rel=1e-3)
+
+
+def test_strengths_for_all_lights_or_none(ball: Path) -> None:
+    path = ball
+    text = path.read_text().replace("irradiance = [3.0, 3.0, 3.0]\n", "", 1)
+    path.write_text(text)
+    with pytest.raises(InputError, match=r"light 1\.irradiance.*all or none"):
+        read_capture(path)
+
+
+def test_exposures_that_only_some_photos_state(ball: Path) -> None:
+    path, folder = ball, ball.parent
+    pixels = np.full((90, 120, 3), 128, np.uint8)
+    write_jpeg(folder / "one.jpg", pixels, exposure=1 / 60)
+    path.write_text(path.read_text().replace('"lit_2.exr"', '"one.jpg"'))
+    with pytest.raises(InputError, match=r"photo 1\.exposure.*lit_1.exr does not say how"):
+        LitPhotos.open(read_capture(path))
+
+
+def test_exif_exposures_count_from_the_first(ball: Path) -> None:
+    path, folder = ball, ball.parent
+    for i in range(1, 7):
+        exposure = 1 / 50 if i == 1 else 1 / 200
+        level = 200 if i == 1 else 108  # sRGB: 0.5776 and 0.1500: a quarter of it and a bit
+        write_jpeg(folder / f"{i}.jpg", np.full((90, 120, 3), level, np.uint8), exposure)
+        path.write_text(path.read_text().replace(f'"lit_{i}.exr"', f'"{i}.jpg"'))
+    photos = LitPhotos.open(read_capture(path))
+    assert photos.exposures[0] == (1.0,) and photos.exposures[1] == pytest.approx((0.25,), rel=1e-3)
+    first, second = photos.read(0).radiance, photos.read(1).radiance
+    assert second.mean() / first.mean() == pytest.approx(0.1500 / 0.5776 * 4, rel=0.02)
+
+
+def test_clipped_pixels_are_no_samples(ball: Path) -> None:
+    whole, _ = sampled(ball)
+    text = ball.read_text()
+    ball.write_text(text.replace('file = "lit_1.exr"', 'file = "lit_1.exr"\nsaturation = 0.2'))
+    job = FitJob(read_capture(ball))
+    job.drain()
+    assert job.result is not None
+    bright = (whole.radiance[whole.photo == 0] >= 0.2 * 0.99).any(axis=1)
+    per_photo = job.result.materials[0].per_photo
+    assert bright.sum() > 100
+    assert per_photo[0] == pytest.approx((whole.photo == 0).sum() - bright.sum(), abs=20)
+
+
+def test_materials_painted_on_the_vertices(ball: Path) -> None:
+    """Two colours on the mesh's vertices split it into two materials."""
+    vertices, faces = made.sphere_mesh()
+    upper = vertices[:, 2] > made.CENTRE[2]
+    lines = ["ply", "format ascii 1.0", f"element vertex {len(vertices)}"]
+    lines += [f"property double {axis}" for axis in "xyz"]
+    lines += [f"property uchar {c}" for c in ("red", "green", "blue")]
+    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+    for position, up in zip(vertices, upper, strict=True):
+        colour = "250 10 10" if up else "10 10 250"
+        lines.append(" ".join(f"{x:.9g}" for x in position) + f" {colour}")
+    lines += ["3 " + " ".join(map(str, face)) for face in faces]
+    (ball.parent / "mesh.ply").write_text("\n".join(lines) + "\n")
+    extra = '[[material]]\nname = "red"\nvertex_colour = [255, 0, 0]\n'
+    extra += '[[material]]\nname = "blue"\nvertex_colour = [0, 0, 255]\n'
+    ball.write_text(ball.read_text() + extra)
+    job = FitJob(read_capture(ball))
+    job.drain()
+    assert job.result is not None
+    centre = vertices[faces].mean(axis=1)[:, 2]
+    far = np.abs(centre - made.CENTRE[2]) > 0.1
+    assert ((centre > made.CENTRE[2]) == (job.result.face_material == 0))[far].all()
+    assert min(m.samples for m in job.result.materials) > 1000
+
+
+def test_photos_that_were_localised_later(ball: Path) -> None:
+    """A camera of an extra file takes a photo like one of the scan's."""
+    capture = read_capture(ball)
+    camera = inputs.open_scan(capture).cameras[0]
+    entry = {
+        "label": "later", "width": camera.width, "height": camera.height, "model": camera.model,
+        "parameters": list(camera.parameters), "rotation": camera.pose.rotation.tolist(),
+        "translation": camera.pose.translation.tolist(), "photo": None,
+    }  # fmt: skip
+    extra = {"patina_cameras": 1, "frame": "mesh", "cameras": [entry]}
+    (ball.parent / "later.cameras.json").write_text(json.dumps(extra))
+    text = ball.read_text().replace('camera = "view_01.jpg"', 'camera = "later"')
+    ball.write_text(text.replace("[scan]", '[scan]\nextra = "later.cameras.json"'))
+    later = read_capture(ball)
+    scan = inputs.open_scan(later)
+    pose = inputs.camera_of(later, scan, 0).pose
+    assert np.allclose(pose.translation, camera.pose.translation)
+    entry["label"] = "view_02.jpg"
+    (ball.parent / "later.cameras.json").write_text(json.dumps(extra))
+    with pytest.raises(PatinaError, match=r"scan\.extra.*already"):
+        inputs.open_scan(later)
+
+
+def write_jpeg(path: Path, pixels: np.ndarray, exposure: float) -> None:
+    import OpenImageIO as oiio
+
+    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "uint8")
+    spec.attribute("ExposureTime", float(exposure))
+    spec.attribute("FNumber", 8.0)
+    spec.attribute("Exif:PhotographicSensitivity", 100)
+    spec.attribute("CompressionQuality", 98)
+    out = oiio.ImageOutput.create(str(path))
+    assert out.open(str(path), spec)
+    out.write_image(pixels)
+    out.close()

@@ -1,0 +1,147 @@
+"""The main job on real captures: what a fit predicts of a photo it has not seen.
+
+Errors are taken in the photos' own encoding (0..1, what a viewer shows): a tone curve that is
+assumed must not choose the scale it is judged on.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+THIN = 12  # every so many trusted pixels: neighbours say the same
+DARK = 0.02  # encoded; below it a relative error is the noise's
+
+
+def run(data: Path) -> None:
+    """Print both tables."""
+    from . import real_captures
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        print("\nDiLiGenT ball (orthographic, 24 distant lights), each photo predicted from the others:\n")
+        _table([("as published", real_captures.ball(data, folder))])
+        print("\nRodin bronze (16 flash photos), each photo predicted from the others:\n")
+        cases = []
+        for chart in (False, True):
+            for refine in (False, True):
+                label = f"{'tone by chart' if chart else 'sRGB curve'}, "
+                label += "flash refined" if refine else "flash at the lens"
+                cases.append((label, real_captures.rodin(data, folder, chart, refine)))
+        _table(cases)
+
+
+@dataclass(frozen=True)
+class _Case:
+    """What a capture gives: its samples and the curve of its photos."""
+
+    table: object
+    curve: tuple[np.ndarray, np.ndarray]
+    unexplained: tuple[float, float] | None
+    moved: dict[str, dict[str, tuple[float, float]]]
+
+
+def _table(cases: list[tuple[str, Path]]) -> None:
+    print("| capture | samples | paper's fit: typical, relative RMS | all samples, 20 components | "
+          "one Lambertian |")  # fmt: skip
+    print("|---|---|---|---|---|")
+    notes = []
+    for label, path in cases:
+        case = _samples(path)
+        errors = [_leave_one_out(case, way) for way in (_paper, _all_samples, _lambertian)]
+        cells = " | ".join(f"{100 * typical:.1f} %, {100 * rms:.1f} %" for typical, rms in errors)
+        print(f"| {label} | {len(case.table):,} | {cells} |", flush=True)  # type: ignore[arg-type]
+        for name, numbers in case.moved.items():
+            said = ", ".join(f"{k} {v:.2f} ± {e:.2f}" for k, (v, e) in numbers.items())
+            before, after = case.unexplained or (0, 0)
+            notes.append(
+                f"{label}: {name} at {said}; unexplained log residual {before:.3f} → {after:.3f}"
+            )
+    for note in notes:
+        print(f"\n{note}")
+
+
+def _samples(path: Path) -> _Case:
+    from patina.core.basis import Basis
+    from patina.core.capture import read_capture
+    from patina.core.geometry import RayScene, view_surface
+    from patina.core.job import inputs
+    from patina.core.job.lights import find_lights, refined
+    from patina.core.job.photos import LitPhotos
+    from patina.core.photo.transfer import Transfer
+    from patina.core.samples import SampleTable, sample_photo
+    from patina.core.samples.level import at_typical_level
+    from patina.core.samples.take import light_surface, trusted_pixels
+
+    capture, basis = read_capture(path), Basis.default()
+    scan = inputs.open_scan(capture)
+    inputs.check_photos(capture, scan)
+    rays, photos = RayScene.build(scan.mesh), LitPhotos.open(capture)
+    lights = find_lights(capture, scan, photos)
+    if any(light.refine for light in capture.lights):
+        lights = refined(lights, capture, scan, photos, rays, basis)
+    tables = []
+    for place in range(len(capture.photos)):
+        camera = inputs.camera_of(capture, scan, place)
+        view = view_surface(rays, camera)
+        lighting = light_surface(rays, view, lights.of(capture, place), camera)
+        lit = photos.read(place)
+        keep = trusted_pixels(view, lighting, capture.fit.margins)
+        keep &= lit.usable.ravel()[view.pixel]
+        keep[np.arange(len(keep)) % THIN != place % THIN] = False
+        tables.append(sample_photo(view, lighting, lit.radiance, keep))
+    table, _ = at_typical_level(SampleTable.join(tables), basis)
+    encoded = np.linspace(0, 1, 4097)
+    curve = photos.curve(0)
+    curve = curve if curve.curves else Transfer.named("srgb")  # what these JPEGs say themselves
+    linear = curve.decode(np.repeat(encoded[:, None], 3, axis=1))
+    return _Case(table, (encoded, linear), lights.unexplained, lights.moved)
+
+
+def _leave_one_out(case: _Case, way: object) -> tuple[float, float]:
+    """(typical, RMS) relative error of the encoded values of photos left out in turn."""
+    relative, missed, size = [], 0.0, 0.0
+    table = case.table
+    for photo in np.unique(table.photo):  # type: ignore[attr-defined]
+        out = table.photo == photo  # type: ignore[attr-defined]
+        held = table.select(out)  # type: ignore[attr-defined]
+        rho = way(table.select(~out), held)  # type: ignore[attr-defined,operator]
+        predicted = _encode(rho * held.irradiance * held.cos_i[:, None], case.curve)
+        measured = _encode(held.radiance, case.curve)
+        level = measured.mean(axis=1)
+        off = np.abs(predicted - measured).mean(axis=1)
+        relative.append((off / level)[level > DARK])
+        missed += float(np.sum((predicted - measured) ** 2))
+        size += float(np.sum(measured**2))
+    return float(np.median(np.concatenate(relative))), float(np.sqrt(missed / size))
+
+
+def _encode(radiance: np.ndarray, curve: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    encoded, linear = curve
+    return np.stack([np.interp(radiance[:, c], linear[:, c], encoded) for c in range(3)], axis=1)
+
+
+def _paper(table: object, held: object) -> np.ndarray:
+    from patina.core.basis import Basis
+    from patina.core.fit import fit_paper
+
+    return fit_paper(table, Basis.default()).brdf.evaluate(held.angles)  # type: ignore[attr-defined,arg-type,no-any-return]
+
+
+def _all_samples(table: object, held: object) -> np.ndarray:
+    """Nielsen's ridge on every sample: no choice of pixels at all."""
+    from patina.core.basis import Basis
+    from patina.core.fit import ridge
+
+    basis = Basis.default()
+    _, q = basis.rows(table.angles, 20)  # type: ignore[attr-defined]
+    mapped = basis.mapped(table.rho, table.angles)  # type: ignore[attr-defined]
+    return basis.evaluate(ridge.solve(q, mapped), held.angles)  # type: ignore[attr-defined]
+
+
+def _lambertian(table: object, held: object) -> np.ndarray:
+    """One colour, no gloss: what any BRDF must beat."""
+    return np.broadcast_to(np.median(table.rho, axis=0), held.rho.shape)  # type: ignore[attr-defined]

@@ -1,0 +1,75 @@
+"""Capture files for the real photographs in ../shared/data/real, written into a folder of choice.
+
+The photographs stay where they are: the captures name them.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+CHART_CORNERS = [[928, 880], [922, 480], [1160, 472], [1168, 880]]  # read off the photo, pixels
+
+
+def rodin(data: Path, folder: Path, chart: bool, refine: bool) -> Path:
+    """The museum bronze: 16 flash photos; with or without tone from the chart and flash refined."""
+    source = (data / "real" / "rodin_bronze").resolve()
+    photo = source / "colorchecker" / "231016_miaEURO_9505.jpg"
+    lines = ["[scan]", f'cameras = "{source / "cameras.xml"}"', f'mesh = "{source / "mesh.ply"}"']
+    if chart:
+        lines += ["[tone]", f'chart = {{photo = "{photo}", corners = {CHART_CORNERS}}}']
+    lines += ["[[light]]", 'name = "flash"', "mounted = [0, 0, 0]"]
+    lines += [f"refine = {str(refine).lower()}"]
+    for lit in sorted((source / "photos").glob("*.jpg")):
+        lines += ["[[photo]]", f'file = "{lit}"', f'camera = "{lit.stem}"', 'light = "flash"']
+    path = folder / f"rodin_{'chart' if chart else 'srgb'}_{'flash' if refine else 'camera'}"
+    return _write(path.with_suffix(".capture.toml"), lines)
+
+
+def ball(data: Path, folder: Path) -> Path:
+    """DiLiGenT's ball: a sphere seen along z without perspective, 24 distant lights.
+
+    One unit is one pixel; x right, y up, z to the camera as in its own files. Its intensities are
+    relative to each other: the BRDF is known up to one scale.
+    """
+    source = (data / "real" / "diligent_ball").resolve()
+    from patina.core.photo import read_mask  # the package is loaded by the caller
+
+    mask = read_mask(source / "mask.png")
+    height, width = mask.shape
+    rows, columns = np.nonzero(mask)
+    cx, cy = columns.mean() + 0.5, rows.mean() + 0.5
+    radius = float(np.sqrt(mask.sum() / np.pi))
+    camera = {
+        "label": "ball", "width": width, "height": height, "model": "ORTHOGRAPHIC",
+        "parameters": [1.0, 1.0, cx, cy], "rotation": np.diag([1.0, -1.0, -1.0]).tolist(),
+        "translation": [0.0, 0.0, 10 * radius], "photo": None,
+    }  # fmt: skip
+    cameras = {"patina_cameras": 1, "frame": "mesh", "cameras": [camera]}
+    (folder / "ball.cameras.json").write_text(json.dumps(cameras))
+    _write_sphere(folder / "ball.ply", radius)
+    lines = ["[scan]", 'cameras = "ball.cameras.json"', 'mesh = "ball.ply"']
+    lines += ["[tone]", 'transfer = "linear"', "[fit]", "absolute = false"]
+    directions = np.loadtxt(source / "light_directions.txt")
+    intensities = np.loadtxt(source / "light_intensities.txt")
+    names = (source / "filenames.txt").read_text().split()
+    photos = []
+    for name, direction, intensity in zip(names, directions, intensities, strict=True):
+        lines += ["[[light]]", f'name = "{name}"', f"direction = {direction.tolist()}"]
+        lines += [f"irradiance = {intensity.tolist()}"]
+        photos += ["[[photo]]", f'file = "{source / name}"', 'camera = "ball"', f'light = "{name}"']
+    return _write(folder / "ball.capture.toml", lines + photos)
+
+
+def _write(path: Path, lines: list[str]) -> Path:
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def _write_sphere(path: Path, radius: float) -> None:
+    """A finely divided sphere around the origin."""
+    import trimesh
+
+    trimesh.creation.icosphere(subdivisions=6, radius=radius).export(path)
