@@ -22,9 +22,11 @@ def run(data: Path) -> None:
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        print("\nDiLiGenT ball (orthographic, 24 distant lights), each photo predicted from the others:\n")
+        print(
+            "\nDiLiGenT ball (orthographic, 24 distant lights), each photo from the others:\n"
+        )
         _table([("as published", real_captures.ball(data, folder))])
-        print("\nRodin bronze (16 flash photos), each photo predicted from the others:\n")
+        print("\nRodin bronze (16 flash photos), each photo from the others:\n")
         cases = []
         for chart in (False, True):
             for refine in (False, True):

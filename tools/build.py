@@ -32,8 +32,12 @@ def main(arguments: Sequence[str]) -> int:
     """`run.py build`: every platform's zip, or one."""
     parser = argparse.ArgumentParser(prog="run.py build", description=__doc__)
     parser.add_argument("--platform", choices=PLATFORMS, action="append", help="default: all")
-    asked = parser.parse_args(arguments).platform or PLATFORMS
-    for archive in pack(extension_tool(), asked, PYTHONS, DIST):
+    parser.add_argument(
+        "--raw", action="store_true", help="with camera RAW (rawpy); the zips go to dist/raw"
+    )
+    told = parser.parse_args(arguments)
+    asked, out = told.platform or PLATFORMS, DIST / "raw" if told.raw else DIST
+    for archive in pack(extension_tool(), asked, PYTHONS, out, told.raw):
         say(f"{archive.name}: {megabytes([archive])}, validated")
         print(archive)
     return 0

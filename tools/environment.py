@@ -20,6 +20,8 @@ BPY = {(3, 11): "5.0.1", (3, 13): "5.2.3"}
 TEST_TOOLS = [
     "pytest==8.4.2",
     "hypothesis==6.140.3",
+    "rawpy==0.28.0",  # camera RAW is optional: the zips do not carry it
+    "trimesh==5.2.0",  # writes meshes that are not ours
     "ruff==0.13.3",
     "mypy==1.18.2",
 ]
@@ -134,7 +136,7 @@ def test_python() -> Path:
     wanted = "\n".join(TEST_TOOLS)
     with one_at_a_time(folder.name):
         if not (stamp.exists() and stamp.read_text(encoding="utf-8") == wanted):
-            say("installing pytest, hypothesis, ruff and mypy (about 30 MB, once) ...")
+            say("installing pytest, hypothesis, ruff, mypy … (about 35 MB, once) ...")
             pip_install(folder, TEST_TOOLS)
             stamp.write_text(wanted, encoding="utf-8")
     return python

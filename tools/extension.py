@@ -30,12 +30,19 @@ class ExtensionTool:
 
 
 def pack(
-    tool: ExtensionTool, platforms: Sequence[str], pythons: Sequence[str], out: Path
+    tool: ExtensionTool,
+    platforms: Sequence[str],
+    pythons: Sequence[str],
+    out: Path,
+    raw: bool = False,
 ) -> list[Path]:
-    """Build and validate the zips for these platforms; return them in the same order."""
-    download(wheel_names(platforms, pythons))
+    """Build and validate the zips for these platforms; return them in the same order.
+
+    raw: with the library for camera RAW.
+    """
+    download(wheel_names(platforms, pythons, raw))
     out.mkdir(parents=True, exist_ok=True)
-    with staged(platforms, pythons) as source:
+    with staged(platforms, pythons, raw) as source:
         tool.run("build", "--split-platforms", "--source-dir", source, "--output-dir", out)
     about = manifest()
     archives = []
@@ -45,7 +52,7 @@ def pack(
         if not archive.exists():
             raise Failure(f"Blender made no {name}", 1)
         tool.run("validate", archive)
-        check_wheels(archive, wheel_names([platform], pythons))
+        check_wheels(archive, wheel_names([platform], pythons, raw))
         archives.append(archive)
     return archives
 

@@ -69,7 +69,22 @@ def _write(path: Path, lines: list[str]) -> Path:
 
 
 def _write_sphere(path: Path, radius: float) -> None:
-    """A finely divided sphere around the origin."""
-    import trimesh
+    """A finely divided sphere around the origin: the hull of a Fibonacci lattice, as ASCII PLY."""
+    from scipy.spatial import ConvexHull
 
-    trimesh.creation.icosphere(subdivisions=6, radius=radius).export(path)
+    count = 40_000
+    i = np.arange(count)
+    z = 1 - (2 * i + 1) / count
+    turn = i * np.pi * (3 - np.sqrt(5))
+    flat = np.sqrt(1 - z**2)
+    points = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
+    faces = ConvexHull(points).simplices
+    a, b, c = points[faces].transpose(1, 0, 2)
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    lines = ["ply", "format ascii 1.0", f"element vertex {count}"]
+    lines += [f"property double {axis}" for axis in "xyz"]
+    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+    lines += [f"{x:.9g} {y:.9g} {z:.9g}" for x, y, z in radius * points]
+    lines += [f"3 {a} {b} {c}" for a, b, c in faces]
+    path.write_text("\n".join(lines) + "\n")

@@ -50,17 +50,17 @@ def source_hash(*extra: str) -> str:
     return digest.hexdigest()[:16]
 
 
-def filtered_manifest(platforms: Sequence[str], pythons: Sequence[str]) -> str:
+def filtered_manifest(platforms: Sequence[str], pythons: Sequence[str], raw: bool) -> str:
     """Return the manifest's text with only these platforms, and their wheels for these Pythons."""
     text = (ROOT / MANIFEST).read_text(encoding="utf-8")
-    wheels = manifest_list(wheel_names(platforms, pythons))
+    wheels = manifest_list(wheel_names(platforms, pythons, raw))
     words = ", ".join(f'"{platform}"' for platform in platforms)
     text = re.sub(r"^wheels = \[.*?^\]", lambda _: wheels, text, flags=re.M | re.S)
     return re.sub(r"^platforms = \[.*?\]", lambda _: f"platforms = [{words}]", text, flags=re.M)
 
 
 @contextlib.contextmanager
-def staged(platforms: Sequence[str], pythons: Sequence[str]) -> Iterator[Path]:
+def staged(platforms: Sequence[str], pythons: Sequence[str], raw: bool = False) -> Iterator[Path]:
     """Lay out a folder for `extension build`; the wheels must have been downloaded."""
     folder = cache_dir() / f"staging-{os.getpid()}"
     shutil.rmtree(folder, ignore_errors=True)
@@ -71,12 +71,12 @@ def staged(platforms: Sequence[str], pythons: Sequence[str]) -> Iterator[Path]:
                 shutil.copytree(path, folder / path.name, ignore=CRUMBS)
             else:
                 shutil.copy2(path, folder)
-        for name in wheel_names(platforms, pythons):
+        for name in wheel_names(platforms, pythons, raw):
             try:
                 os.link(FOLDER / name, folder / "wheels" / name)
             except OSError:  # another disk, or a file system without links
                 shutil.copy2(FOLDER / name, folder / "wheels")
-        text = filtered_manifest(platforms, pythons)
+        text = filtered_manifest(platforms, pythons, raw)
         (folder / MANIFEST).write_text(text, encoding="utf-8")
         yield folder
     finally:

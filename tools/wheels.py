@@ -26,10 +26,12 @@ PINS = {
     "embreex": "4.4.0.post1",
     "OpenImageIO": "3.0.19.1",
     "scipy": "1.15.3",
-    "trimesh": "5.2.0",
     "defusedxml": "0.7.1",
     "sunposition": "1.2.1",
 }
+
+OPTIONAL = {"rawpy": "0.28.0"}
+"""Camera RAW: only in the zips of `run.py build --raw`, too large for the extension site."""
 
 TAGS = {
     "pycolmap": ("manylinux_2_28_x86_64", "win_amd64", "macosx_14_0_arm64"),
@@ -40,9 +42,9 @@ TAGS = {
         "macosx_11_0_arm64",
     ),
     "scipy": ("manylinux_2_17_x86_64.manylinux2014_x86_64", "win_amd64", "macosx_12_0_arm64"),
-    "trimesh": None,
     "defusedxml": None,
     "sunposition": None,
+    "rawpy": ("manylinux_2_27_x86_64.manylinux_2_28_x86_64", "win_amd64", "macosx_11_0_arm64"),
 }
 """Per library the platform part of its wheels' names, in the order of PLATFORMS; None: pure Python.
 
@@ -62,22 +64,24 @@ def requirements() -> list[str]:
 
 def wheel_name(library: str, platform: str, python: str) -> str:
     """Return the file name of one wheel."""
-    tags = TAGS[library]
+    tags, version = TAGS[library], {**PINS, **OPTIONAL}[library]
     if tags is None:
-        return f"{library.lower()}-{PINS[library]}-{PURE.get(library, 'py3')}-none-any.whl"
+        return f"{library.lower()}-{version}-{PURE.get(library, 'py3')}-none-any.whl"
     tag = tags[PLATFORMS.index(platform)]
-    return f"{library.lower()}-{PINS[library]}-{python}-{python}-{tag}.whl"
+    return f"{library.lower()}-{version}-{python}-{python}-{tag}.whl"
 
 
 def wheel_names(
-    platforms: Iterable[str] = PLATFORMS, pythons: Iterable[str] = PYTHONS
+    platforms: Iterable[str] = PLATFORMS,
+    pythons: Iterable[str] = PYTHONS,
+    raw: bool = False,
 ) -> list[str]:
     """Return the file names of the wheels for these platforms and Pythons, in a fixed order."""
     pythons = list(pythons)
     names = (
         wheel_name(library, platform, python)
         for platform in platforms
-        for library in PINS
+        for library in (*PINS, *(OPTIONAL if raw else ()))
         for python in pythons
     )
     return list(dict.fromkeys(names))  # a pure wheel serves them all
