@@ -176,3 +176,13 @@ def picture(
     settings.use_border = False
     bpy.data.objects.remove(lamp)
     return image
+
+
+def mask(sphere: Shown) -> np.ndarray:
+    """(h, w) bool: the pixels whose centre sees the sphere."""
+    view = camera()
+    y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
+    rays = view.rays(np.stack([x.ravel(), y.ravel()], axis=1))
+    towards = sphere.centre - view.pose.centre
+    miss = np.linalg.norm(np.cross(rays, towards), axis=1)
+    return (miss < sphere.radius).reshape(HEIGHT, WIDTH)

@@ -48,13 +48,11 @@ def circle_of(folder, height: int) -> Circle:
     return Circle((x - 0.5, height - (y - 0.5)), radius)
 
 
-def photo_camera(pixels: np.ndarray, focal: float | None = None, principal=(0.0, 0.0)) -> Camera:
-    """Orthographic, a pixel a unit, or with a focal length in pixels."""
+def photo_camera(pixels: np.ndarray) -> Camera:
+    """Orthographic, a pixel a unit."""
     height, width = pixels.shape[:2]
     pose = Pose(np.eye(3), np.array([0.0, 0.0, 10.0]))
-    if focal is None:
-        return Camera("photo", width, height, "ORTHOGRAPHIC", (1.0, 1.0, 0.0, 0.0), pose)
-    return Camera("photo", width, height, "SIMPLE_PINHOLE", (focal, *principal), pose)
+    return Camera("photo", width, height, "ORTHOGRAPHIC", (1.0, 1.0, 0.0, 0.0), pose)
 
 
 def angle(a: np.ndarray, b: np.ndarray) -> float:
@@ -82,15 +80,16 @@ def test_the_twelve_published_directions(shared, probe):
     found = found_directions(folder)
     own = [angle(a, b) for a, b in zip(found, published(probe), strict=True)]
     merged = [angle(a, b) for a, b in zip(found, published("merged"), strict=True)]
-    print("own", np.round(own, 2), "merged", np.round(merged, 2))
     assert np.median(own) < 0.5 and max(own) < 2.0
     assert np.median(merged) < 2.0 and max(merged) < 2.0
 
 
 @pytest.mark.parametrize("probe", [1, 2])
 def test_the_outline_is_the_one_drawn_by_hand(shared, probe):
-    """The photo in room light shows the whole outline; the published circle is one fitted to 11 or
-    13 points clicked on it, which are 1.3 pixels (RMS) off it themselves."""
+    """The photo in room light shows the outline, out of focus by some 8 pixels. The published
+    circle was clicked where that run of brightness is half way in a picture for the eye; the
+    outline fitted here is 1 % wider, where it reaches the background: 0.4° of light direction at
+    30° incidence, either way."""
     folder = shared / f"data/real/psbox_spheres/LightProbe-{probe}"
     if not folder.is_dir():
         pytest.skip("the photos of the chrome spheres are not here")
@@ -100,6 +99,5 @@ def test_the_outline_is_the_one_drawn_by_hand(shared, probe):
     light = light_from_sphere(pixels, camera, rough)
     assert light.refined
     middle = camera.project(light.sphere.centre[None])[0]
-    print(probe, middle - circle.centre, light.sphere.radius - circle.radius)
-    assert np.abs(middle - circle.centre).max() < 2.5
-    assert light.sphere.radius == pytest.approx(circle.radius, abs=2.5)
+    assert np.abs(middle - circle.centre).max() < 2.0
+    assert light.sphere.radius == pytest.approx(circle.radius, rel=0.013)
