@@ -11,6 +11,8 @@ MODULES: tuple[str, ...] = (
     "scene.osl_files",
     "scene.lamps",
     "operators.import_capture",
+    "operators.solve",
+    "operators.masks",
     "operators.fit",
     "operators.look_through",
     "panels.sidebar",

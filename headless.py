@@ -20,6 +20,9 @@ from typing import NoReturn
 COMMANDS = {
     "fit": "fit",
     "import": "import_",
+    "masks": "masks",
+    "solve": "solve",
+    "localise": "localise",
     "demo": "demo",
     "basis": "basis",
     "build-basis": "build_basis",

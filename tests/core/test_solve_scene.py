@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import shutil
 import time
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -60,13 +61,12 @@ def solved(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Solve
     (scene / "photos" / "torn.jpg").write_bytes(b"\xff\xd8\xff\xe0 no picture")
     (scene / "photos" / "notes.txt").write_text("not a photo")
     job = SolveJob(scene / "photos", threads=2)
-    fractions, longest, before = [], 0.0, time.perf_counter()
+    fractions, moments = [], [time.perf_counter()]
     while job.step():
         fractions.append(job.now.fraction)
-        now = time.perf_counter()
-        longest, before = max(longest, now - before), now
-    assert longest < 1.5  # of a step: the window goes on (0.1 s on a machine with nothing else on)
-    assert fractions == sorted(fractions) and 0 <= fractions[0] and fractions[-1] <= 1
+        moments.append(time.perf_counter())
+    assert np.median(np.diff(moments)) < 0.3  # a step: the window goes on meanwhile
+    assert fractions == sorted(fractions) and min(fractions) >= 0 and max(fractions) <= 1
     out = tmp_path_factory.mktemp("solved")
     job.solution.write(out, out, scene / "photos")
     return job, out
@@ -78,7 +78,7 @@ def number(name: str) -> int:
 
 @pytest.mark.slow
 def test_solve_finds_the_cameras(solved: tuple[SolveJob, Path]) -> None:
-    job, out = solved
+    _, out = solved
     truth = list(made.ring(VIEWS))
     found = read_colmap(out / "sparse").cameras
     assert len(found) == VIEWS
@@ -103,8 +103,6 @@ def test_solve_says_what_it_found(solved: tuple[SolveJob, Path], scene: Path) ->
     assert f"{VIEWS} of {VIEWS + 1} photos placed" in said
     assert "torn.jpg" in said and "notes.txt" not in said
     assert job.solution.error < 0.6
-    import tomllib
-
     (capture,) = out.glob("*.capture.toml")
     data = tomllib.loads(capture.read_text("utf-8"))
     assert (out / data["scan"]["images"]).resolve() == (scene / "photos").resolve()
@@ -116,11 +114,12 @@ def test_solve_says_what_it_found(solved: tuple[SolveJob, Path], scene: Path) ->
 
 @pytest.mark.slow
 def test_lit_photos_are_localised(scene: Path, tmp_path: Path) -> None:
+    views = list(made.ring(VIEWS))
     cameras = [
-        Camera(p.name, made.WIDTH, made.HEIGHT, "SIMPLE_PINHOLE",
-               (made.FOCAL, *made.PRINCIPAL), Pose(v.rotation, v.translation))
-        for p, v in zip(find_photos(scene / "photos"), views_of(scene), strict=False)
-    ]  # fmt: skip
+        exact(views[number(photo.name)], photo.name)
+        for photo in find_photos(scene / "photos")
+        if "view" in photo.name
+    ]
     other = tmp_path / "other.jpg"  # something that the scan does not show
     noise = np.random.default_rng(0).uniform(size=(120, 160, 3)).repeat(4, axis=0).repeat(4, axis=1)
     made.write_picture(other, noise)
@@ -134,17 +133,17 @@ def test_lit_photos_are_localised(scene: Path, tmp_path: Path) -> None:
     assert [c.label for c in read.cameras] == ["lit_0.jpg", "lit_1.jpg"]
     for camera, found, (view, _) in zip(read.cameras, result.placed, lit_views(), strict=True):
         assert (camera.pose.rotation == found.camera.pose.rotation).all()
-        truth = Camera("t", made.WIDTH, made.HEIGHT, "SIMPLE_PINHOLE",
-                       (made.FOCAL, *made.PRINCIPAL), Pose(view.rotation, view.translation))  # fmt: skip
+        truth = exact(view)
         off = np.linalg.norm(camera.project(mesh.vertices) - truth.project(mesh.vertices), axis=1)
         assert np.median(off) < 0.4
         assert np.degrees(angle(camera.pose.rotation, view.rotation)) < 0.2
         assert np.linalg.norm(camera.pose.centre - view.centre) < 0.003 * made.DISTANCE
 
 
-def views_of(scene: Path):
-    views = list(made.ring(VIEWS))
-    return [views[number(p.name)] for p in find_photos(scene / "photos") if "view" in p.name]
+def exact(view, label="x"):
+    lens = (made.FOCAL, *made.PRINCIPAL)
+    pose = Pose(view.rotation, view.translation)
+    return Camera(label, made.WIDTH, made.HEIGHT, "SIMPLE_PINHOLE", lens, pose)
 
 
 def angle(one, other):

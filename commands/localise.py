@@ -1,0 +1,110 @@
+"""``localise SCAN --photos LIT … --out DIR``: cameras for further photos of a scanned object."""
+
+from __future__ import annotations
+
+import argparse
+import tomllib
+from pathlib import Path
+
+from ..core.capture.lines import key_lines
+from ..core.capture.section import Section
+from ..core.errors import InputError, PatinaError
+from ..core.scan import Camera, Mesh
+from ..core.scan.colmap import is_colmap
+from ..core.scan.formats import read_reconstruction
+from ..core.scan.scan import read_scan
+from ..core.solve import LocaliseJob, find_photos
+from .progress import Progress
+from .solve import check_threads
+from .staging import check_out, staged_folder
+
+HELP = "cameras for lit photos that share no viewpoint with a photo of the scan"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "scan", type=Path, help="the capture file (*.capture.toml), or a scan's camera file"
+    )
+    parser.add_argument("--mesh", type=Path, help="the scan's mesh, where no capture file names it")
+    parser.add_argument("--images", type=Path, help="folder of the scan's own photos, likewise")
+    parser.add_argument("--chunk", help="label of the chunk, likewise")
+    parser.add_argument(
+        "--photos", type=Path, nargs="+", required=True, help="the lit photos, or their folder"
+    )
+    parser.add_argument("--out", type=Path, required=True, help="folder for the results")
+    parser.add_argument("--threads", type=int, help="at most so many (default: all cores)")
+
+
+def run(arguments: argparse.Namespace) -> None:
+    check_threads(arguments.threads)
+    out = check_out(arguments.out)
+    photos = _photos(arguments.photos)
+    cameras, mesh, images, model, notes = _scan(arguments)
+    job = LocaliseJob(cameras, images, photos, mesh, model, arguments.threads)
+    try:
+        job.drain(Progress())
+    finally:
+        job.cancel()
+    result = job.result
+    for note in (*notes, *result.notes):
+        print(f"  note: {note}")
+    if result.placed:
+        with staged_folder(out) as folder:
+            name = result.write(folder).name
+        for found in result.placed:
+            print(f"  {found.sentence()}")
+        print(f'wrote {out / name}: name it in the capture file, [scan] extra = "{name}"')
+    if result.refused:
+        more = f" (and {len(result.refused) - 1} more)" if len(result.refused) > 1 else ""
+        count = f"{len(result.placed)} of {len(photos)} photos localised; "
+        raise PatinaError(f"{count}{result.refused[0]}{more}")
+
+
+def _photos(given: list[Path]) -> list[Path]:
+    found: list[Path] = []
+    for path in given:
+        if path.is_dir():
+            found += [photo.path for photo in find_photos(path)]
+        elif path.is_file():
+            found.append(path)
+        else:
+            raise InputError("no such file", file=path, key="--photos")
+    return found
+
+
+def _scan_section(path: Path) -> Section:
+    """[scan] of a capture file, which may lack all that comes after localising: lights, photos."""
+    try:
+        text = path.read_text("utf-8-sig")
+        data = tomllib.loads(text)
+    except (OSError, ValueError, RecursionError) as error:  # also what is no TOML, or no UTF-8
+        raise InputError(f"is not a capture file ({error})", file=path) from error
+    return Section(data, path.resolve(), key_lines(text)).table("scan")
+
+
+def _scan(
+    told: argparse.Namespace,
+) -> tuple[tuple[Camera, ...], Mesh | None, Path, Path | None, tuple[str, ...]]:
+    """(cameras, mesh, folder of the scan's photos, COLMAP model where there is no mesh, notes)."""
+    cameras, mesh, images, chunk, frame = told.scan, told.mesh, told.images, told.chunk, None
+    if told.scan.is_file() and told.scan.suffix.lower() == ".toml":
+        for key in ("mesh", "images", "chunk"):
+            if getattr(told, key) is not None:
+                raise InputError(f"a capture file says its {key} itself", key=f"--{key}")
+        entry = _scan_section(told.scan)
+        cameras, mesh = entry.file_path("cameras"), entry.file_path("mesh")
+        images = entry.optional_file_path("images")
+        chunk, frame = entry.optional_text("chunk"), entry.optional_text("frame")
+    if images is None:
+        raise InputError(
+            "say where the scan's own photos lie: a new photo is found by comparing it with them",
+            key="--images",
+        )
+    if not images.is_dir():
+        raise InputError("no such folder", file=images, key="--images")
+    if mesh is not None:
+        scan = read_scan(cameras, mesh, images, chunk, frame)
+        return scan.cameras, scan.mesh, images, None, scan.notes
+    found = read_reconstruction(cameras, images, chunk)
+    model = cameras if cameras.is_dir() and is_colmap(cameras) else None
+    return found.cameras, None, images, model, found.notes

@@ -1,0 +1,9 @@
+"""Cameras from photos alone (structure from motion, by COLMAP), and poses of further photos in a
+reconstruction that is there already."""
+
+from .localise import Localised
+from .localise_job import LocaliseJob
+from .photo_set import find_photos
+from .solve_job import Solution, SolveJob
+
+__all__ = ["LocaliseJob", "Localised", "Solution", "SolveJob", "find_photos"]

@@ -1,0 +1,207 @@
+"""Structure from motion: photos → cameras and sparse points, by COLMAP's incremental mapper
+(Schönberger & Frahm 2016). Runs in a thread: see background.py."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+from numpy.typing import NDArray
+
+from ..errors import PatinaError
+from ..photo import read_exif
+from .background import Work
+from .database import FeatureStore
+from .features import Detector, Features
+from .pairs import LARGEST_FEATURES, choose_pairs
+from .photo_set import LensKey, PhotoFile, first_focal
+from .picture import grey_of, read_picture
+from .solution import Solution, Unplaced
+
+LENSES = ("SIMPLE_RADIAL", "RADIAL", "OPENCV", "OPENCV_FISHEYE", "SIMPLE_PINHOLE", "PINHOLE")
+FEWEST = 3  # photos: two have no third to agree with
+PAIRS_AT_ONCE = 100  # between two looks at whether to go on
+PHOTOS_AT_ONCE = 4  # a gigabyte each, for photos of LARGEST_SIDE
+EXTRACTED, CHOSEN, MATCHED = 0.45, 0.5, 0.8  # fractions of the whole job
+MORE_OVERLAP = (
+    "take more photos, each showing two thirds of what its neighbour shows, of a surface that has "
+    "marks to recognise, under light that stays still while the camera moves"
+)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What is kept of one photo after its features were found. colours: (n, 3) at the features."""
+
+    key: LensKey
+    focal: tuple[float, bool]
+    features: Features
+    colours: NDArray[np.uint8]
+
+
+def solve(photos: Sequence[PhotoFile], lens: str, threads: int | None, work: Work) -> Solution:
+    """Cameras of all photos that can be placed. Raises PatinaError where there are too few."""
+    _enough(len(photos), "")
+    cores = threads or os.cpu_count() or 1
+    with tempfile.TemporaryDirectory(prefix="patina-solve-") as room:
+        store = FeatureStore(Path(room) / "features.db", lens)
+        try:
+            colours, first, unreadable = _extract(photos, store, cores, work)
+            _enough(len(colours), f"; {len(unreadable)} cannot be read: {_first(unreadable)}")
+            numbers = sorted(colours)
+            work.at("choosing pairs", EXTRACTED)
+            chosen = choose_pairs(
+                [first[n] for n in numbers],
+                lambda done: work.at("choosing pairs", EXTRACTED + done * (CHOSEN - EXTRACTED)),
+            )
+            pairs = [(numbers[i], numbers[j]) for i, j in chosen]
+            _match(store.path, pairs, cores, work)
+            agreeing = store.verified()
+        finally:
+            store.close()
+        models = _map(store.path, len(colours), cores, work)
+    by_size = sorted(models, key=lambda model: -model.num_reg_images())
+    if not by_size or by_size[0].num_reg_images() < FEWEST:
+        best = max((points for _, points in agreeing.values()), default=0)
+        raise PatinaError(
+            f"no {FEWEST} of the {len(colours)} photos fit together (the best of them shares "
+            f"{best} points with all others); {MORE_OVERLAP}"
+        )
+    model = by_size[0]
+    _colour(model, colours)
+    names = {str(number): photo.name for number, photo in enumerate(photos)}
+    for image in model.images.values():
+        image.name = names[image.name]
+    placed = {image.name for image in model.images.values() if image.has_pose}
+    unplaced = [
+        Unplaced(names[str(n)], *agreeing[str(n)])
+        for n in sorted(colours)
+        if names[str(n)] not in placed
+    ]
+    others = tuple(
+        tuple(sorted(names[image.name] for image in other.images.values() if image.has_pose))
+        for other in by_size[1:]
+    )
+    return Solution(model, len(photos), tuple(unplaced), tuple(unreadable), others)
+
+
+def _enough(count: int, why: str) -> None:
+    if count < FEWEST:
+        raise PatinaError(f"{count} photos are too few to solve, expected at least {FEWEST}{why}")
+
+
+def _first(unreadable: Sequence[tuple[str, str]]) -> str:
+    return unreadable[0][1] if unreadable else "none"
+
+
+def _extract(
+    photos: Sequence[PhotoFile], store: FeatureStore, cores: int, work: Work
+) -> tuple[dict[int, NDArray[np.uint8]], dict[int, NDArray[np.uint8]], list[tuple[str, str]]]:
+    """(by number: colours at the features; descriptors of the largest; (name, why) not read)."""
+    colours: dict[int, NDArray[np.uint8]] = {}
+    first: dict[int, NDArray[np.uint8]] = {}
+    unreadable: list[tuple[str, str]] = []
+    for number, found in enumerate(_all_seen(photos, cores, work)):
+        work.at("finding features", EXTRACTED * (number + 1) / len(photos))
+        if isinstance(found, str):
+            unreadable.append((photos[number].name, found))
+            continue
+        store.add(number, found.key, found.focal, found.features)
+        colours[number] = found.colours
+        first[number] = found.features.descriptors[:LARGEST_FEATURES]
+    return colours, first, unreadable
+
+
+def _all_seen(photos: Sequence[PhotoFile], cores: int, work: Work) -> Iterator[Seen | str]:
+    """In the order of the photos: what was found, or why the photo cannot be read."""
+
+    def see(photo: PhotoFile) -> Seen | str:
+        work.check()
+        try:
+            return seen_in(photo.path)
+        except PatinaError as error:
+            return str(error)
+
+    pool = ThreadPoolExecutor(min(cores, PHOTOS_AT_ONCE))
+    try:
+        yield from pool.map(see, photos)
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def seen_in(path: Path) -> Seen:
+    """Features of a photo file. Raises InputError."""
+    picture, exif = read_picture(path), read_exif(path)
+    size = (picture.shape[1], picture.shape[0])
+    features = Detector(pooled=True)(grey_of(picture))
+    columns, rows = np.clip(features.pixels.astype(np.intp), 0, np.array(size) - 1).T
+    key = LensKey.of(size, exif)
+    return Seen(key, first_focal(size, exif), features, picture[rows, columns])
+
+
+def _match(database: Path, pairs: Sequence[tuple[int, int]], cores: int, work: Work) -> None:
+    """Compare pairs of photos; each pair's geometry is checked (Schönberger & Frahm 2016)."""
+    matching = pycolmap.FeatureMatchingOptions()
+    matching.use_gpu, matching.num_threads = False, cores
+    checking = pycolmap.TwoViewGeometryOptions()
+    checking.ransac.random_seed = 0
+    pairing = pycolmap.ImportedPairingOptions()
+    listed = database.with_name("pairs.txt")
+    pairing.match_list_path = str(listed)
+    for begin in range(0, len(pairs), PAIRS_AT_ONCE):
+        work.at("matching", CHOSEN + (MATCHED - CHOSEN) * begin / len(pairs))
+        some = pairs[begin : begin + PAIRS_AT_ONCE]
+        listed.write_text("".join(f"{i} {j}\n" for i, j in some), "ascii")
+        pycolmap.match_image_pairs(
+            database,
+            matching_options=matching,
+            pairing_options=pairing,
+            verification_options=checking,
+            device=pycolmap.Device.cpu,
+            cancellation_token=work.token,
+        )
+
+
+def _map(database: Path, count: int, cores: int, work: Work) -> list[pycolmap.Reconstruction]:
+    options = pycolmap.IncrementalPipelineOptions()
+    options.num_threads = cores
+    options.random_seed = 0
+    options.min_model_size = FEWEST
+    options.extract_colors = False  # it would look for the photos by their names in the database
+    out, nothing = database.with_name("models"), database.with_name("nothing")
+    out.mkdir()
+    nothing.mkdir()
+    work.at("placing cameras", MATCHED)
+    placed = 0
+
+    def one_more() -> None:
+        nonlocal placed
+        placed += 1
+        work.say("placing cameras", MATCHED + (1 - MATCHED) * min(1.0, placed / count))
+
+    found = pycolmap.incremental_mapping(
+        database,
+        nothing,
+        out,
+        options,
+        initial_image_pair_callback=one_more,
+        next_image_callback=one_more,
+        cancellation_token=work.token,
+    )
+    work.check()
+    return list(found.values())
+
+
+def _colour(model: pycolmap.Reconstruction, colours: dict[int, NDArray[np.uint8]]) -> None:
+    """Each point's colour: the mean over the photos it is seen in."""
+    for point in model.points3D.values():
+        seen = [
+            colours[int(model.images[e.image_id].name)][e.point2D_idx] for e in point.track.elements
+        ]
+        point.color = np.round(np.mean(seen, axis=0)).astype(np.uint8)

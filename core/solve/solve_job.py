@@ -1,0 +1,44 @@
+"""Solving a folder of photos as a job: steps that only look how far the work is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from ..errors import InputError
+from ..job.job import Job, Step
+from .background import Background
+from .photo_set import find_photos
+from .solution import Solution
+from .solve import LENSES, solve
+
+
+class SolveJob(Job):
+    """Cameras of a folder's photos. The work is in a thread that never touches bpy; a step takes
+    a tenth of a second. Dropping the job, or cancel(), ends the work."""
+
+    def __init__(
+        self, folder: Path, lens: str = "SIMPLE_RADIAL", threads: int | None = None
+    ) -> None:
+        """lens: the camera model, one of LENSES. threads: at most so many; None: all cores.
+        Raises InputError where there is no such folder or lens."""
+        super().__init__()
+        if lens not in LENSES:
+            raise InputError(f"found {lens!r}, expected one of {', '.join(LENSES)}", key="--lens")
+        self.photos = find_photos(folder)
+        if not self.photos:
+            raise InputError("holds no photos", file=folder)
+        self._work = Background(lambda work: solve(self.photos, lens, threads, work))
+
+    @property
+    def solution(self) -> Solution:
+        """What was found; only when the job is done."""
+        return self._work.result
+
+    def run(self) -> Iterator[Step]:
+        yield from self._work.steps()
+
+    def cancel(self) -> None:
+        """Let the work end; what it had made so far is thrown away."""
+        if self._steps is not None:
+            self._steps.close()  # type: ignore[attr-defined]
