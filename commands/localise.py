@@ -10,8 +10,8 @@ from ..core.capture.lines import key_lines
 from ..core.capture.section import Section
 from ..core.errors import InputError, PatinaError
 from ..core.scan import Camera, Mesh
-from ..core.scan.colmap import is_colmap
 from ..core.scan.formats import read_reconstruction
+from ..core.scan.readers.colmap import is_colmap
 from ..core.scan.scan import read_scan
 from ..core.solve import LocaliseJob, find_photos
 from .progress import Progress

@@ -8,7 +8,7 @@ import bpy
 
 from ..commands.staging import check_out, staged_folder
 from ..core.errors import InputError, PatinaError
-from ..core.scan.colmap import read_colmap
+from ..core.scan.readers.colmap import read_colmap
 from ..core.solve import SolveJob
 from ..core.solve.solution import MODEL
 from ..core.solve.solve import LENSES

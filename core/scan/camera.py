@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import PatinaError
-from .fold import beyond_fold
 from .lens import Lens, make_lens, resized_parameters
+from .lenses.fold import beyond_fold
 
 Array = NDArray[np.float64]
 

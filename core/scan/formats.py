@@ -7,8 +7,8 @@ from importlib import import_module
 from pathlib import Path
 
 from ..errors import InputError
-from .colmap import is_colmap, read_colmap
-from .json_file import read_json
+from .parsing.json_file import read_json
+from .readers.colmap import is_colmap, read_colmap
 from .reconstruction import Reconstruction
 
 # (path, folder of the photos, chunk) → Reconstruction
@@ -51,8 +51,8 @@ def read_reconstruction(
 
 
 def _reader(name: str) -> Reader:
-    """read_NAME of the module NAME."""
-    return getattr(import_module(f".{name}", __package__), f"read_{name}")
+    """read_NAME of the module NAME in readers/."""
+    return getattr(import_module(f".readers.{name}", __package__), f"read_{name}")
 
 
 def _folder(path: Path, images: Path | None, chunk: str | None) -> Reconstruction:

@@ -50,15 +50,15 @@ def make_lens(model: str, width: int, height: int, parameters: Sequence[float]) 
     parameters: metashape_lens.py), MEASURED_RADIAL (measured_radial_lens.py) or ORTHOGRAPHIC
     (orthographic.py). Raises ValueError."""
     if model == "ORTHOGRAPHIC":
-        from .orthographic import OrthographicLens
+        from .lenses.orthographic import OrthographicLens
 
         return OrthographicLens(*parameters)
     if model.startswith("METASHAPE_"):
-        from .metashape_lens import metashape_lens
+        from .lenses.metashape_lens import metashape_lens
 
         return metashape_lens(model, parameters)
     if model == "MEASURED_RADIAL":
-        from .measured_radial_lens import MeasuredRadialLens
+        from .lenses.measured_radial_lens import MeasuredRadialLens
 
         return MeasuredRadialLens(*parameters)
     return pycolmap.Camera(model=model, width=width, height=height, params=list(parameters))
@@ -74,11 +74,11 @@ def resized_parameters(
         scale_x, scale_y, cx, cy = parameters
         return scale_x * across, scale_y * down, cx * across, cy * down
     if model.startswith("METASHAPE_"):
-        from .metashape_lens import resized
+        from .lenses.metashape_lens import resized
 
         return resized(model, parameters, across, down)
     if model == "MEASURED_RADIAL":
-        from .measured_radial_lens import resized as resized_measured
+        from .lenses.measured_radial_lens import resized as resized_measured
 
         return resized_measured(tuple(parameters), across, down)
     lens = pycolmap.Camera(model=model, width=old[0], height=old[1], params=list(parameters))

@@ -126,7 +126,7 @@ def check_camera(camera: Camera, file: object) -> None:
 
 
 def reconstruction_of(cameras: list[Camera], file: object, **others: object) -> Reconstruction:
-    """A Reconstruction of these cameras, each checked, sorted, no label twice. Raises InputError."""
+    """A Reconstruction of these cameras, each checked, sorted, no label twice; else InputError."""
     seen: set[str] = set()
     for camera in cameras:
         if camera.label in seen:

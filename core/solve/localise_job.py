@@ -13,7 +13,7 @@ from ..geometry import RayScene
 from ..job.job import Job, Step
 from ..photo import image_size
 from ..scan import Camera, Mesh
-from ..scan.patina_cameras import write_patina_cameras
+from ..scan.readers.patina_cameras import write_patina_cameras
 from .background import Background, Work
 from .features import Detector, Features
 from .landmarks import Landmarks, OnMesh, OnSparsePoints

@@ -58,7 +58,7 @@ TEXT_MISTAKES = {
         r"light 1\.irradiance.*three numbers",
     ),
     "text for a number": (added('[fit]\nsamples = "six"'), r"fit\.samples.*whole number"),
-    "near light with an irradiance": (replaced("direction", "position"), "has no irradiance; expected intensity"),
+    "near light with an irradiance": (replaced("direction", "position"), "has no irradiance"),
     "not TOML": (added("[[["), "not valid TOML"),
     "unknown face attribute": (
         added('[[material]]\nname = "a"\nfaces = "x"'),

@@ -18,8 +18,8 @@ from patina.core.capture import read_capture
 from patina.core.errors import InputError, PatinaError
 from patina.core.job import FitJob
 from patina.core.photo import read_mask, read_radiance
-from patina.core.scan.colmap import read_colmap
 from patina.core.scan.mesh import read_mesh
+from patina.core.scan.readers.colmap import read_colmap
 from tests import make_capture as made
 
 FILES = ("cameras.bin", "images.bin", "frames.bin", "rigs.bin", "points3D.bin")
@@ -161,7 +161,7 @@ def test_cropped_disguised_and_broken_photos(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="holds a png"):
         read_radiance(path)
     with pytest.raises(InputError, match="not read"):
-        read_radiance(tmp_path / "p.png")
+        read_radiance(tmp_path / "p.bmp")
 
 
 def test_masks(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

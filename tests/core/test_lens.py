@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patina.core.scan.camera import Camera, Pose
-from patina.core.scan.fold import beyond_fold, fold_radius
 from patina.core.scan.lens import make_lens, resized_parameters
-from patina.core.scan.metashape_distortion import Calibration
-from patina.core.scan.metashape_lens import colmap_model, metashape_lens
+from patina.core.scan.lenses.fold import beyond_fold, fold_radius
+from patina.core.scan.lenses.metashape_distortion import Calibration
+from patina.core.scan.lenses.metashape_lens import colmap_model, metashape_lens
 
 WIDTH, HEIGHT = 4000, 3000
 FRAME, FISHEYE, EQUISOLID = "METASHAPE_FRAME", "METASHAPE_FISHEYE", "METASHAPE_EQUISOLID"

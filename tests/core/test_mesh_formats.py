@@ -150,6 +150,13 @@ def test_relative_indices_count_from_their_own_line(tmp_path: Path) -> None:
     assert mesh.uv is not None and mesh.uv[1].tolist() == [[0.5, 0], [0.5, 0.5], [0, 0.5]]
 
 
+def test_faces_without_texture_coordinates_among_others(tmp_path: Path) -> None:
+    text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt .5 .25\nvt 1 0 0\nf 1/1 2/2 3/-1\nf 1 3 4\n"
+    mesh = read_mesh(saved(tmp_path, "m.obj", text))
+    assert mesh.uv is not None and "3 corners" in mesh.notes[0]
+    assert mesh.uv.tolist() == [[[0.5, 0.25], [1, 0], [1, 0]], [[0, 0]] * 3]
+
+
 @pytest.mark.parametrize("scale", [1, 255])
 def test_obj_vertex_colours(tmp_path: Path, scale: int) -> None:
     vertices, faces = made.two_triangles()
@@ -390,7 +397,7 @@ def test_a_fan_would_leave_the_arrow(tmp_path: Path) -> None:
 @given(st.lists(st.lists(st.floats(0.2, 1.0), min_size=3, max_size=20), min_size=1, max_size=9))
 def test_dented_faces_of_many_sizes(stars: list[list[float]]) -> None:
     """Each face's triangles are its own: they follow each other and have its area."""
-    rings = [star(radii) + [3.0 * i, 0] for i, radii in enumerate(stars)]
+    rings = [star(radii) + np.array([3.0 * i, 0]) for i, radii in enumerate(stars)]
     flat = np.concatenate(rings)
     sizes = np.array([len(ring) for ring in rings])
     vertices = np.concatenate([flat, np.zeros((len(flat), 1))], axis=1)

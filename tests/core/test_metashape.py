@@ -10,8 +10,8 @@ import pytest
 
 from patina.core.errors import InputError
 from patina.core.scan.formats import read_reconstruction
-from patina.core.scan.metashape import read_metashape
-from patina.core.scan.metashape_frames import geodetic
+from patina.core.scan.readers.metashape import read_metashape
+from patina.core.scan.readers.metashape_frames import geodetic
 from patina.core.scan.reconstruction import Similarity
 from tests import make_metashape as made
 
@@ -365,7 +365,7 @@ def test_the_bronze_is_in_its_photos(shared):
 
 
 def test_similarities_between_frames_compose():
-    from patina.core.scan.metashape_frames import between
+    from patina.core.scan.readers.metashape_frames import between
 
     rng = np.random.default_rng(1)
     a, b = (Similarity(made.rotation(rng), rng.normal(size=3), s) for s in (2.0, 0.3))

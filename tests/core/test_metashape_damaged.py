@@ -11,9 +11,9 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from patina.core.errors import InputError, PatinaError
-from patina.core.scan import xml_file
 from patina.core.scan.formats import read_reconstruction
-from patina.core.scan.xml_file import line_of, read_xml
+from patina.core.scan.parsing import xml_file
+from patina.core.scan.parsing.xml_file import line_of, read_xml
 from tests import make_metashape as made
 
 SECONDS = 5.0

@@ -15,8 +15,8 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from patina.core.errors import InputError, PatinaError
-from patina.core.scan import metashape_zip
 from patina.core.scan.formats import read_reconstruction
+from patina.core.scan.readers import metashape_zip
 from tests import make_metashape as made
 
 SECONDS = 5.0
@@ -179,7 +179,7 @@ def test_a_zip_that_lies_about_its_size(tmp_path):
 
 
 def test_a_project_of_many_large_documents(tmp_path, monkeypatch):
-    from patina.core.scan import metashape_project
+    from patina.core.scan.readers import metashape_project
 
     chunk = made.chunk_xml(made.simple(), extra="<x>" + "y" * 5000 + "</x>")
     listed = "".join(f'<chunk id="{i}" path="0.xml"/>' for i in range(100))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from patina.core.errors import InputError
 from patina.core.scan.formats import read_reconstruction
-from patina.core.scan.patina_cameras import read_patina_cameras
+from patina.core.scan.readers.patina_cameras import read_patina_cameras
 
 
 def entry(**changed):

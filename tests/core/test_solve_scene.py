@@ -14,9 +14,9 @@ import pytest
 
 from patina.core.errors import InputError, PatinaError
 from patina.core.scan import Camera, Pose
-from patina.core.scan.colmap import read_colmap
 from patina.core.scan.formats import read_reconstruction
 from patina.core.scan.mesh import read_mesh
+from patina.core.scan.readers.colmap import read_colmap
 from patina.core.solve import LocaliseJob, SolveJob, find_photos
 from tests import make_photos_of_scene as made
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from patina.core.scan.colmap import read_colmap
 from patina.core.scan.formats import read_reconstruction
+from patina.core.scan.readers.colmap import read_colmap
 from tests import make_photos_of_scene as made
 
 pytestmark = [pytest.mark.blender, pytest.mark.slow]

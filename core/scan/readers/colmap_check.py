@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pycolmap
 
-from ..errors import InputError
+from ...errors import InputError
 
 LARGEST = 1 << 17  # pixels a side
 LEAST_RECORD = {"camera": 24, "image": 73, "frame": 68, "rig": 8, "point": 51}  # bytes

@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from .brown import Lens, brown_lens, fisheye_lens, panorama_lens
-from .camera import Camera, Pose
-from .json_file import read_json
-from .json_record import Record, root_record
-from .photo_labels import labels_of
-from .photo_sizes import PhotoSizes
-from .reconstruction import Reconstruction, Similarity, reconstruction_of
+from ...errors import InputError
+from ..camera import Camera, Pose
+from ..lenses.brown import Lens, brown_lens, fisheye_lens, panorama_lens
+from ..parsing.json_file import read_json
+from ..parsing.json_record import Record, root_record
+from ..parsing.photo_labels import labels_of
+from ..parsing.photo_sizes import PhotoSizes
+from ..reconstruction import Reconstruction, Similarity, reconstruction_of
 
 Array = NDArray[np.float64]
 

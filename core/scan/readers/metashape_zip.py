@@ -7,9 +7,9 @@ import zipfile
 from pathlib import Path
 from typing import BinaryIO
 
-from ..errors import UNREADABLE_NPZ, InputError
+from ...errors import UNREADABLE_NPZ, InputError
+from ..parsing.xml_file import LARGEST
 from .metashape_values import Source
-from .xml_file import LARGEST
 
 DAMAGED = (*UNREADABLE_NPZ, RuntimeError, struct.error, OverflowError)
 READ_AS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # others may need any amount of memory

@@ -9,10 +9,10 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ...errors import InputError
+from ..parsing.xml_file import line_of
 from .metashape_sensors import Sensor, read_sensor
 from .metashape_values import Source, flag, numbers, properties
-from .xml_file import line_of
 
 Array = NDArray[np.float64]
 

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from .camera import Pose
-from .lens import make_lens
-from .measured_radial_lens import MODEL as MEASURED_RADIAL
-from .tracks import Tracks
+from ...errors import InputError
+from ..camera import Pose
+from ..lens import make_lens
+from ..lenses.measured_radial_lens import MODEL as MEASURED_RADIAL
+from ..parsing.tracks import Tracks
 
 Array = NDArray[np.float64]
 

@@ -20,11 +20,11 @@ import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from .camera import Camera, Pose
-from .json_file import read_json
-from .lens import make_lens
-from .reconstruction import LARGEST_SIDE, Reconstruction, reconstruction_of
+from ...errors import InputError
+from ..camera import Camera, Pose
+from ..lens import make_lens
+from ..parsing.json_file import read_json
+from ..reconstruction import LARGEST_SIDE, Reconstruction, reconstruction_of
 
 KEY = "patina_cameras"
 VERSION = 1

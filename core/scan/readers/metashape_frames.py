@@ -8,10 +8,10 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ...errors import InputError
+from ..parsing.xml_file import line_of
+from ..reconstruction import Georeference, Similarity
 from .metashape_values import Source, numbers
-from .reconstruction import Georeference, Similarity
-from .xml_file import line_of
 
 Array = NDArray[np.float64]
 

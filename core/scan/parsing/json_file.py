@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ...errors import InputError
 
 LARGEST = 1 << 30  # bytes: Meshroom's .sfm with features' colours has some hundred MB
 

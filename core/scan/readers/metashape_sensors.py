@@ -12,11 +12,11 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from .metashape_distortion import Calibration
-from .metashape_lens import colmap_model
+from ...errors import InputError
+from ..lenses.metashape_distortion import Calibration
+from ..lenses.metashape_lens import colmap_model
+from ..parsing.xml_file import line_of
 from .metashape_values import Source, flag, number, numbers, properties, size
-from .xml_file import line_of
 
 Array = NDArray[np.float64]
 

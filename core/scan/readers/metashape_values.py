@@ -9,8 +9,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from .xml_file import line_of
+from ...errors import InputError
+from ..parsing.xml_file import line_of
 
 Array = NDArray[np.float64]
 Source = Path | str  # the file that messages name

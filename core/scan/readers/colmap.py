@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pycolmap
 
-from ..errors import InputError
-from .camera import Camera, Pose
+from ...errors import InputError
+from ..camera import Camera, Pose
+from ..reconstruction import Reconstruction, reconstruction_of
 from .colmap_check import check_binary_model
-from .reconstruction import Reconstruction, reconstruction_of
 
 
 def is_colmap(folder: Path) -> bool:

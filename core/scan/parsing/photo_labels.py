@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from ..errors import InputError
+from ...errors import InputError
 
 LONGEST = 4096  # characters of a path
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..errors import InputError
+from ...errors import InputError
+from ..parsing.xml_file import XmlElement, line_of, read_xml
+from ..reconstruction import Reconstruction
 from .metashape_chunk import Chunk, read_chunk, with_notes
 from .metashape_values import Source, flag
-from .reconstruction import Reconstruction
-from .xml_file import XmlElement, line_of, read_xml
 
 
 def read_metashape(path: Path, images: Path | None, chunk: str | None) -> Reconstruction:

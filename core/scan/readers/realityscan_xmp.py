@@ -13,13 +13,13 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from .camera import Camera, Pose
-from .json_record import as_number, shown
-from .photo_labels import labels_of
-from .photo_sizes import PhotoSizes
-from .reconstruction import Reconstruction, reconstruction_of
-from .xml_file import line_of, read_xml
+from ...errors import InputError
+from ..camera import Camera, Pose
+from ..parsing.json_record import as_number, shown
+from ..parsing.photo_labels import labels_of
+from ..parsing.photo_sizes import PhotoSizes
+from ..parsing.xml_file import line_of, read_xml
+from ..reconstruction import Reconstruction, reconstruction_of
 
 Array = NDArray[np.float64]
 

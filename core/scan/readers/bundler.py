@@ -12,16 +12,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from .brown import brown_lens
-from .camera import Camera, Pose
-from .json_record import BEYOND
-from .number_stream import NumberStream
-from .photo_labels import labels_of
-from .photo_sizes import PhotoSizes
-from .reconstruction import Reconstruction, reconstruction_of
-from .sparse import sparse_points
-from .tracks import Tracks
+from ...errors import InputError
+from ..camera import Camera, Pose
+from ..lenses.brown import brown_lens
+from ..parsing.json_record import BEYOND
+from ..parsing.number_stream import NumberStream
+from ..parsing.photo_labels import labels_of
+from ..parsing.photo_sizes import PhotoSizes
+from ..parsing.sparse import sparse_points
+from ..parsing.tracks import Tracks
+from ..reconstruction import Reconstruction, reconstruction_of
 
 Array = NDArray[np.float64]
 

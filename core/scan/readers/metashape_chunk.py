@@ -9,13 +9,13 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from .camera import Camera, Pose
+from ...errors import InputError
+from ..camera import Camera, Pose
+from ..parsing.xml_file import line_of
+from ..reconstruction import Reconstruction, Similarity, reconstruction_of
 from .metashape_frames import between, read_georeference, read_transform
 from .metashape_rig import Entry, Rig
 from .metashape_values import Source
-from .reconstruction import Reconstruction, Similarity, reconstruction_of
-from .xml_file import line_of
 
 Array = NDArray[np.float64]
 

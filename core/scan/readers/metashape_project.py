@@ -16,12 +16,12 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from xml.etree.ElementTree import Element
 
-from ..errors import InputError
+from ...errors import InputError
+from ..parsing.xml_file import LARGEST, XmlElement, line_of, read_xml
+from ..reconstruction import Reconstruction
 from .metashape import chunk_elements, select_chunk
 from .metashape_chunk import Chunk, read_chunk, with_notes
 from .metashape_zip import document, document_in, member, open_zip
-from .reconstruction import Reconstruction
-from .xml_file import LARGEST, XmlElement, line_of, read_xml
 
 # path inside the project → its XML; None: there is no such file
 Opener = Callable[[str], bytes | None]

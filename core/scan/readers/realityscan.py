@@ -15,14 +15,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from .brown import Lens, brown_lens
-from .camera import Camera, Pose
-from .json_record import as_number
-from .photo_labels import labels_of
-from .photo_sizes import PhotoSizes
+from ...errors import InputError
+from ..camera import Camera, Pose
+from ..lenses.brown import Lens, brown_lens
+from ..parsing.json_record import as_number
+from ..parsing.photo_labels import labels_of
+from ..parsing.photo_sizes import PhotoSizes
+from ..reconstruction import Reconstruction, reconstruction_of
 from .realityscan_xmp import read_xmp_folder
-from .reconstruction import Reconstruction, reconstruction_of
 
 Array = NDArray[np.float64]
 

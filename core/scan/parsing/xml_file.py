@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element, ParseError, TreeBuilder
 from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser
 
-from ..errors import InputError
+from ...errors import InputError
 
 LARGEST = 1 << 27  # bytes; a hundred thousand cameras of Metashape are 50 MB
 MOST_ELEMENTS = 1_000_000  # the same are 600,000

@@ -12,16 +12,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from .camera import Camera, Pose
-from .json_record import as_number
-from .number_stream import NumberStream
+from ...errors import InputError
+from ..camera import Camera, Pose
+from ..parsing.json_record import as_number
+from ..parsing.number_stream import NumberStream
+from ..parsing.photo_labels import labels_of
+from ..parsing.photo_sizes import PhotoSizes
+from ..parsing.sparse import sparse_points
+from ..parsing.tracks import Tracks
+from ..reconstruction import Reconstruction, reconstruction_of
 from .nvm_flavour import NvmFlavour, NvmModel
-from .photo_labels import labels_of
-from .photo_sizes import PhotoSizes
-from .reconstruction import Reconstruction, reconstruction_of
-from .sparse import sparse_points
-from .tracks import Tracks
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
-from ..errors import InputError
+from ...errors import InputError
 from .photo_labels import base_name
 
 MOST_FILES = 100_000  # of a photo folder that are looked at
@@ -39,7 +39,7 @@ class PhotoSizes:
         if path is None:
             return None
         if path not in self._known:
-            from ..photo.image import image_size  # photo imports scan
+            from ...photo.image import image_size  # photo imports scan
 
             try:
                 self._known[path] = image_size(path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .reconstruction import LARGEST_PLACE
+from ..reconstruction import LARGEST_PLACE
 
 Array = NDArray[np.float64]
 

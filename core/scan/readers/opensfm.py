@@ -13,15 +13,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from .brown import Lens, brown_lens, fisheye_lens, panorama_lens
-from .camera import Camera, Pose
-from .json_file import read_json
-from .json_record import Record
-from .photo_labels import labels_of
-from .photo_sizes import PhotoSizes
-from .reconstruction import Georeference, Reconstruction, reconstruction_of
-from .sparse import sparse_points
+from ...errors import InputError
+from ..camera import Camera, Pose
+from ..lenses.brown import Lens, brown_lens, fisheye_lens, panorama_lens
+from ..parsing.json_file import read_json
+from ..parsing.json_record import Record
+from ..parsing.photo_labels import labels_of
+from ..parsing.photo_sizes import PhotoSizes
+from ..parsing.sparse import sparse_points
+from ..reconstruction import Georeference, Reconstruction, reconstruction_of
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""What the readers share: files opened without believing them, labels, sizes, sparse points."""

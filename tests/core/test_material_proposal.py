@@ -1,0 +1,244 @@
+"""Proposed materials against spheres whose materials are known, and against real stereo meshes of
+one material."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from patina.core.capture import read_capture
+from patina.core.errors import FitError, InputError
+from patina.core.masks.proposal import propose_materials
+from patina.core.masks.proposal_cells import Cells
+from patina.core.masks.proposal_job import ProposalJob
+from patina.core.masks.proposal_surface import Surface, smooth_labels, without_islands
+from patina.core.scan import Mesh
+from tests import make_capture as made
+
+
+def painted(paints, part):
+    """A reflectance whose matte colour and Blinn lobe depend on the place on the unit sphere.
+    paints: (matte (3,), lobe, exponent) of each part; part: normals (n, 3) → (n,) its number."""
+
+    def brdf(normal, light, view):
+        half = light + view
+        half = half / np.linalg.norm(half, axis=-1, keepdims=True)
+        cosine = np.maximum(np.sum(normal * half, axis=-1), 0.0)
+        out = np.zeros_like(normal)
+        which = part(normal)
+        for number, (matte, lobe, exponent) in enumerate(paints):
+            here = which == number
+            out[here] = np.array(matte) + lobe * cosine[here, None] ** exponent
+        return out
+
+    return brdf
+
+
+def caps(normal):
+    """Three parts: a cap, another one, the rest."""
+    first = normal @ np.array([0.6, 0.0, 0.8]) > 0.45
+    second = normal @ np.array([-0.48, 0.6, -0.64]) > 0.5
+    return np.where(first, 1, np.where(second, 2, 0))
+
+
+def halves(normal):
+    """Two parts with a wavy border."""
+    return (normal[:, 2] > 0.1 + 0.15 * np.sin(3 * np.arctan2(normal[:, 1], normal[:, 0]))) * 1
+
+
+def proposed(path: Path, count: int | None = None):
+    job = ProposalJob(read_capture(path), count)
+    job.drain()
+    assert job.result is not None
+    return job.result
+
+
+def truth(result, part) -> np.ndarray:
+    corners = result.scan.mesh.vertices[result.scan.mesh.faces]
+    centre = corners.mean(axis=1) - made.CENTRE
+    return part(centre / np.linalg.norm(centre, axis=1, keepdims=True))
+
+
+def accuracy(labels, true, where) -> float:
+    """Share of faces called right, each label standing for what most of it is."""
+    right = 0
+    names = []
+    for label in np.unique(labels[where]):
+        counts = np.bincount(true[where & (labels == label)])
+        right += counts.max()
+        names.append(counts.argmax())
+    assert len(set(names)) == len(names), "two labels for one material"
+    return right / where.sum()
+
+
+@pytest.mark.parametrize("count", [None, 3])
+def test_three_colours(tmp_path: Path, count) -> None:
+    paints = [
+        ((0.16, 0.05, 0.04), 0.5, 60),
+        ((0.05, 0.12, 0.05), 0.5, 60),
+        ((0.2, 0.2, 0.2), 0.1, 9),
+    ]
+    path = made.make_capture(tmp_path, photos=9, brdf=painted(paints, caps))
+    result = proposed(path, count)
+    found = result.proposal
+    assert found.count == 3
+    seen = found.confidence > 0
+    assert seen.mean() > 0.6  # faces are smaller than pixels
+    true = truth(result, caps)
+    assert accuracy(found.labels, true, seen) > 0.97
+    areas = np.bincount(found.labels)
+    assert (np.diff(areas) <= 0).all()  # the largest first (the triangles are of one size)
+
+
+def test_one_colour_with_two_glosses(tmp_path: Path) -> None:
+    paints = [((0.12, 0.09, 0.05), 0.0, 1), ((0.12, 0.09, 0.05), 0.35, 25)]
+    path = made.make_capture(tmp_path, photos=9, brdf=painted(paints, halves))
+    result = proposed(path)
+    labels, true = result.proposal.labels, truth(result, halves)
+    assert result.proposal.count == 2
+    # where some photo has half vector and normal within 25° the lobe shows; elsewhere the two
+    # materials are the same, and a face can only follow those around it
+    corners = result.scan.mesh.vertices[result.scan.mesh.faces].mean(axis=1) - made.CENTRE
+    normal = corners / np.linalg.norm(corners, axis=1, keepdims=True)
+    shows = np.zeros(len(true), bool)
+    for (rotation, shift), light in zip(made.poses(9), made.light_directions(9), strict=True):
+        view = -rotation.T @ shift - made.CENTRE - normal
+        half = view / np.linalg.norm(view, axis=1, keepdims=True) + light
+        half /= np.linalg.norm(half, axis=1, keepdims=True)
+        lit = (normal @ light > 0.15) & (np.sum(normal * view, axis=1) > 0.5)
+        shows |= lit & (np.sum(normal * half, axis=1) > np.cos(np.radians(25)))
+    assert 0.2 < shows.mean() < 0.5
+    assert accuracy(labels, true, shows) > 0.99
+    assert accuracy(labels, true, np.ones(len(true), bool)) > 0.95
+
+
+def test_light_and_dark_of_one_colour(tmp_path: Path) -> None:
+    paints = [((0.20, 0.16, 0.12), 0.1, 20), ((0.10, 0.08, 0.06), 0.1, 20)]
+    path = made.make_capture(tmp_path, photos=9, brdf=painted(paints, halves))
+    result = proposed(path)
+    assert result.proposal.count == 2
+    seen = result.proposal.confidence > 0
+    assert accuracy(result.proposal.labels, truth(result, halves), seen) > 0.97
+
+
+@pytest.mark.parametrize("exponent", [4, 60, 400])
+def test_one_material_stays_one(tmp_path: Path, exponent: int) -> None:
+    """On a mesh whose normals are off, as stereo's are."""
+    paint = [((0.16, 0.05, 0.04), 0.02 * exponent**0.8, exponent)]
+    path = made.make_capture(tmp_path, brdf=painted(paint, lambda n: np.zeros(len(n), int)))
+    vertices, faces = made.sphere_mesh(4)
+    rng = np.random.default_rng(2)
+    rough = made.CENTRE + (vertices - made.CENTRE) * (1 + rng.normal(0, 2e-3, (len(vertices), 1)))
+    made.write_ply(tmp_path / "mesh.ply", rough, faces)
+    found = proposed(path).proposal
+    assert found.count == 1
+    assert (found.labels == 0).all()
+
+
+def test_a_shadow_nobody_explains_is_no_material(tmp_path: Path) -> None:
+    """Something beside the object, not in the scan, darkens one place under one of the lamps."""
+    import OpenImageIO as oiio
+
+    path = made.make_capture(tmp_path, photos=6)
+    light = next(made.light_directions(6))
+    rotation, translation = next(made.poses(6))
+    file = str(tmp_path / "lit_1.exr")
+    pixels = oiio.ImageBuf(file).get_pixels(oiio.FLOAT)[..., :3]
+    bright = pixels.sum(axis=2) > 0.3 * pixels.sum(axis=2).max()
+    rows, columns = np.nonzero(bright)
+    dark = (np.indices(bright.shape)[1] < np.median(columns)) & bright
+    pixels[dark] *= 0.15  # some stray light is left
+    made.write_exr(tmp_path / "lit_1.exr", pixels)
+    assert proposed(path).proposal.count == 1
+    assert light.shape == translation.shape == rotation[0].shape
+
+
+def test_the_number_asked_for(tmp_path: Path) -> None:
+    path = made.make_capture(tmp_path, photos=6)
+    one = proposed(path, 1).proposal
+    assert one.count == 1 and not one.splits
+    assert proposed(path, 2).proposal.count <= 2
+
+
+def test_nothing_lit_is_said(tmp_path: Path) -> None:
+    path = made.make_capture(tmp_path, photos=2)
+    for i in (1, 2):
+        made.write_exr(tmp_path / f"lit_{i}.exr", np.zeros((made.HEIGHT, made.WIDTH, 3)))
+    with pytest.raises(InputError, match="lit"):
+        proposed(path)
+
+
+def test_no_cells_is_said() -> None:
+    vertices, faces = made.sphere_mesh(2)
+    k = 2
+    none = Cells(
+        *(np.zeros(0, np.int32),) * 2, np.zeros(0), np.zeros((0, 3)), np.zeros((0, k)),
+        np.zeros(0), np.zeros((2, 0, k)), np.zeros((2, 0)), np.zeros(0),
+    )  # fmt: skip
+    with pytest.raises(FitError, match="lit"):
+        propose_materials(none, Mesh(vertices, faces.astype(np.int32)))
+
+
+def ball() -> Surface:
+    vertices, faces = made.sphere_mesh(4)
+    return Surface.of(Mesh(vertices, faces.astype(np.int32)))
+
+
+def test_neighbours_share_an_edge() -> None:
+    surface = ball()
+    assert (surface.neighbours.sum(axis=1) == 3).all()
+    assert np.isclose(surface.area.sum(), 1.0)
+
+
+def test_patches_are_compact_and_about_as_many_as_asked() -> None:
+    surface = ball()
+    patch = surface.patches(200)
+    count = patch.max() + 1
+    assert 100 < count < 400
+    centre = np.stack([np.bincount(patch, surface.centre[:, a]) for a in range(3)], axis=1)
+    centre /= np.bincount(patch)[:, None]
+    far = np.linalg.norm(surface.centre - centre[patch], axis=1)
+    assert far.max() < 0.45  # a disc of 1/200 of the unit sphere has radius 0.14
+    assert (surface.joined(patch).sum(axis=1) > 0).all()
+
+
+def test_noise_is_smoothed_and_islands_vanish() -> None:
+    surface = ball()
+    true = (surface.centre[:, 0] > made.CENTRE[0]).astype(int)
+    rng = np.random.default_rng(0)
+    likely = np.eye(2)[true] * 2.0 + rng.normal(0, 1.2, (len(true), 2))
+    noisy = (likely.argmax(axis=1) == true).mean()
+    smooth = smooth_labels(likely, surface.neighbours, 4.0)
+    clean = without_islands(smooth, surface, 0.01)
+    assert noisy < 0.9 < 0.97 < (clean == true).mean()
+    island = np.where(np.arange(len(true)) == 7, 1 - true, true).astype(np.int32)
+    assert np.array_equal(without_islands(island, surface, 0.01), true)
+
+
+def test_demo_capture(root: Path) -> None:
+    """Glaze and clay of the embedded capture, against the masks that were painted for it."""
+    from patina.core.geometry import view_surface
+    from patina.core.job import inputs
+
+    path = root / "assets" / "demo" / "demo.capture.toml"
+    result = proposed(path)
+    assert result.proposal.count == 2
+    capture, right, all_of_them = read_capture(path), 0, 0
+    for place in range(len(capture.photos)):
+        camera = inputs.camera_of(capture, result.scan, place)
+        view = view_surface(result.rays, camera)
+        where, _ = inputs.material_pixels(capture, result.scan, view, place)
+        label = result.proposal.labels[view.face]
+        right += (where["glaze"] & (label == 0)).sum() + (where["clay"] & (label == 1)).sum()
+        all_of_them += where["glaze"].sum() + where["clay"].sum()
+    assert right / all_of_them > 0.99
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["bunny_red", "bunny_bronze", "bunny_fabric"])
+def test_scans_of_one_material(shared: Path, name: str) -> None:
+    found = proposed(shared / "data" / "scans" / name / "scan.capture.toml").proposal
+    assert found.count == 1, [replace(split) for split in found.splits]

@@ -1,0 +1,264 @@
+"""Lights back into a capture file's text: only the lines concerned change."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from patina.core.capture import read_capture
+from patina.core.capture.toml_text import statements
+from patina.core.capture.write_lights import write_lights
+from patina.core.errors import PatinaError
+from tests import make_capture as made
+
+LIGHTS = '''# the capture of a Tuesday
+[[light]]  # the first
+  name = "lamp1"   # by the window
+  direction = [ 0.0,  # x
+      0.6, # y ]
+      0.8 ] # up
+  irradiance = [1.0, 1.0, 1.0]
+
+[[light]]
+irradiance = [1, 1, 1]
+"name" = 'lamp2'
+sphere = {photo = "lit_1.exr", camera = "view_01.jpg", center = [40.0, 30.5], radius = 12.0} # ball
+# a note between [[light]] and
+[["light"]]
+name = """lamp3"""
+[light.sun]
+latitude = 40.0
+longitude = 10.0 # degrees
+time = "2020-06-01T12:00:00Z"
+north = [0, 1,
+  0]
+up = [0, 0, 1]
+[light.white]
+photo = "lit_1.exr"
+mask = "white.png"
+reflectance = 0.9
+
+[[light]]
+name = "lamp4"
+mounted = [0.1, 0.2, 0.3]
+intensity = [2.0, 2.0, 2.0]
+beam = 30
+[[light]]
+name = "lamp5"
+position = [500000.25, 4000000.5, 3]
+intensity = [2.0, 2.0, 2.0]
+[[light]]
+name = "lamp6"
+sphere.photo = "lit_2.exr"
+sphere.camera = "view_02.jpg"
+irradiance = [1.0, 1.0, 1.0]
+
+'''
+
+
+def _captured(folder: Path, lights: str = LIGHTS) -> Path:
+    path = made.make_capture(folder, photos=6)
+    made.write_png(folder / "white.png", np.full((made.HEIGHT, made.WIDTH), 255))
+    head, tail = path.read_text().split("[[light]]", 1)
+    path.write_text(head + lights + tail[tail.index("[[photo]]") :] + "\n# the end")
+    return path
+
+
+AXIS = np.array([0.36, 0.48, 0.8])
+
+
+def test_changed_lights_are_read_back_and_all_else_is_kept(tmp_path: Path) -> None:
+    path = _captured(tmp_path)
+    capture = read_capture(path)
+    one, two, three, four, five, six = capture.lights
+    lights = (
+        replace(one, direction=AXIS),
+        replace(two, direction=AXIS, sphere=None, angle=0.01),
+        replace(three, direction=AXIS, sun=None, white=None, strength=np.array([0.1, 2.0, 3e-9])),
+        replace(four, mounted=np.array([-0.1, 1 / 3, 1e-20]), radius=0.25),
+        replace(five, position=five.position + 1 / 3, strength=np.array([1.0, 2.0, 1e7])),
+        replace(six, direction=-AXIS, sphere=None),
+    )
+    write_lights(capture, lights, tmp_path / "new.capture.toml")
+    back = read_capture(tmp_path / "new.capture.toml")
+    for light, there in zip(lights, back.lights, strict=True):
+        for key in ("direction", "position", "mounted", "strength", "angle", "radius", "beam"):
+            told, found = getattr(light, key), getattr(there, key)
+            assert (told is None) == (found is None), (light.name, key)
+            assert told is None or np.allclose(told, found, rtol=1e-14, atol=0), (light.name, key)
+        assert there.sphere is there.sun is there.white is None
+    old, new = path.read_text().splitlines(), (tmp_path / "new.capture.toml").read_text()
+    lines = list(difflib.ndiff(old, new.splitlines()))
+    gone = [line[2:] for line in lines if line.startswith("- ")]
+    come = [line[2:] for line in lines if line.startswith("+ ")]
+    assert sorted(line[2:] for line in come if line.startswith("# ")) == sorted(
+        line for line in gone if f"# {line}" in come
+    )
+    assert (
+        len(gone) == 3 + 1 + 7 + 4 + 1 + 2 + 2
+        and "# the capture of a Tuesday" in new
+        and new.endswith("# the end")
+    )
+    assert "  direction = [0.36, 0.48, 0.8] # up" in new
+    assert "time" in new and "# longitude = 10.0 # degrees" in new
+    assert sorted(p.name for p in tmp_path.iterdir() if "toml" in p.name) == [
+        "ball.capture.toml",
+        "new.capture.toml",
+    ]
+
+
+def test_nothing_changed_is_the_same_file(tmp_path: Path) -> None:
+    path = _captured(tmp_path)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
+    before, capture = path.read_bytes(), read_capture(path)
+    write_lights(capture, capture.lights, tmp_path / "same.capture.toml")
+    assert (tmp_path / "same.capture.toml").read_bytes() == before
+    lights = (replace(capture.lights[0], direction=AXIS, radius=0.0, angle=0.02),)
+    write_lights(capture, (*lights, *capture.lights[1:]), path)  # in its own place
+    after = path.read_bytes()
+    assert after.startswith(b"\xef\xbb\xbf") and after.count(b"\n") == after.count(b"\r\n")
+    assert np.allclose(read_capture(path).lights[0].direction, AXIS)
+
+
+def test_the_last_line_without_a_break(tmp_path: Path) -> None:
+    path = _captured(tmp_path)
+    head, lights = path.read_text().replace("\n# the end", "").split("[[light]]  # the first")
+    lights, photos = lights.split("[[photo]]", 1)
+    text = f'{head}[[photo]]{photos}\n[[light]]{lights}\n[[light]]\nposition=[1,2,3]\nname="z"'
+    text = text.replace('name="z"', 'intensity=[1,1,1]\nname="z"')
+    path.write_text(text)
+    capture = read_capture(path)
+    lights_now = (*capture.lights[:-1], replace(capture.lights[-1], radius=2.0))
+    write_lights(capture, lights_now, path)
+    assert path.read_text() == text + "\nradius = 2.0\n"
+
+
+@pytest.mark.parametrize("other", [True, False])
+def test_elsewhere_its_files_would_not_be_found(tmp_path: Path, other: bool) -> None:
+    path = _captured(tmp_path / "a")
+    if other:  # files of the same names, but other ones
+        _captured(tmp_path / "b")
+    else:
+        (tmp_path / "b").mkdir()
+    before = sorted(p.name for p in (tmp_path / "b").iterdir())
+    capture = read_capture(path)
+    with pytest.raises(PatinaError, match="save it in that folder"):
+        write_lights(capture, capture.lights, tmp_path / "b" / "new.capture.toml")
+    assert sorted(p.name for p in (tmp_path / "b").iterdir()) == before
+    with pytest.raises(PatinaError, match="cannot be written"):
+        write_lights(capture, capture.lights, tmp_path / "c" / "new.capture.toml")
+
+
+def test_lights_within_a_value_are_refused(tmp_path: Path) -> None:
+    names = ", ".join(
+        f'{{name = "lamp{i}", direction = [0, 0, 1], irradiance = [1, 1, 1]}}' for i in range(1, 7)
+    )
+    path = _captured(tmp_path, "")
+    path.write_text(f"light = [{names}]\n" + path.read_text())
+    before, capture = path.read_bytes(), read_capture(path)
+    lights = (replace(capture.lights[0], direction=AXIS), *capture.lights[1:])
+    with pytest.raises(PatinaError, match=r"\[light 1\].*table of its own"):
+        write_lights(capture, lights, path)
+    assert path.read_bytes() == before
+
+
+# TOML written in many ways, from values that are known
+
+keys = st.sampled_from(["a", "b", "key-1", "light", '"a = b"', "'[x]'", '"q\\"]"', '"#"'])
+strings = st.sampled_from(
+    [
+        '"x"',
+        "'\\'",
+        '"""a\n]"#\\""b"""',
+        "'''it's # [\n'''",
+        '""',
+        '"\\\\"',
+        '"""q"""""',
+        "''''x'''",
+    ]
+)
+scalars = st.one_of(strings, st.sampled_from(["1", "-2.5e3", "true", "1979-05-27T07:32:00Z"]))
+gaps = st.sampled_from(["", " ", "\n", " # ] \" '\n", "\n\n\t"])
+spaces = st.sampled_from(["", " ", "\t "])
+
+
+@st.composite
+def arrays(draw: Any) -> str:
+    items = draw(st.lists(st.one_of(scalars, st.just("[1, [2]]")), max_size=3))
+    return "[" + ",".join(draw(gaps) + item + draw(gaps) for item in items) + draw(gaps) + "]"
+
+
+@st.composite
+def documents(draw: Any) -> str:
+    lines = []
+    for _ in range(draw(st.integers(0, 8))):
+        key = draw(spaces).join(["", draw(keys), ""])
+        tail = draw(st.sampled_from(["", " # no ' \" [", "\t"]))
+        form = draw(st.integers(0, 5))
+        if form == 0:
+            lines.append(f"[{key}]{tail}")
+        elif form == 1:
+            lines.append(f"[[{key}.{draw(keys)}]]{tail}")
+        elif form == 2:
+            lines.append(f"[[{key}]]{tail}")
+        else:
+            inline = st.builds(lambda v, w: f"{{x = {v}, y.z = {w}}}", arrays(), scalars)
+            value = draw(st.one_of(scalars, arrays(), inline))
+            dotted = draw(st.sampled_from([key, f"{key}.{draw(keys)}"]))
+            lines.append(f"{dotted}={draw(spaces)}{value}{tail}")
+    return "\n".join(lines) + draw(st.sampled_from(["", "\n", "\n\n# end"]))
+
+
+def _says_nothing(text: str) -> bool:
+    """True for empty lines and comments."""
+    lines = text.removeprefix("\ufeff").split("\n")
+    return all(not line.strip() or line.strip().startswith("#") for line in lines)
+
+
+def _at(data: Any, path: tuple[str | int, ...]) -> Any:
+    for part in path:
+        data = data[part]
+    return data
+
+
+@settings(max_examples=300, deadline=None)
+@given(documents())
+@example("\ufeffa = 1\n[[b]]\n[[b.c]]\nx = 1\n[[b]]\n[[b.c]]\nx = 2\n[b.c.d]\ny = 3")
+def test_every_value_is_found_where_it_stands(text: str) -> None:
+    """What tomllib reads of the whole is what it reads of each value alone."""
+    plain = text.removeprefix("\ufeff")
+    try:
+        data = tomllib.loads(plain)
+    except tomllib.TOMLDecodeError:  # a key twice
+        return
+    last = 0
+    for one in statements(text):
+        assert one.start >= last and _says_nothing(text[last : one.start])
+        last = one.end
+        found = _at(data, one.path)
+        if one.value is not None:
+            begin, end = one.value
+            assert tomllib.loads(f"x = {text[begin:end]}")["x"] == found
+            assert text[begin:end].strip() == text[begin:end]
+        else:
+            assert isinstance(found, dict)
+    assert _says_nothing(text[last:])
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.text(alphabet="[]{}=\"'#\\\n\r .,a1\ufeff", max_size=60))
+@example('"""')
+@example("[[")
+@example("a='''")
+def test_any_text_ends(text: str) -> None:
+    """Nonsense gives statements within the text, and an end."""
+    for one in statements(text):
+        assert 0 <= one.start < one.end <= len(text)
