@@ -102,7 +102,7 @@ def _row(lamp_object: bpy.types.Object) -> Lamp:
     rotation = world.to_3x3().normalized()
     beam = tuple(-rotation.col[2])  # lamps shine along their -z
     at = tuple(world.translation)
-    watts = _power(lamp)
+    watts = lamp_power(lamp)
     if lamp.type == "SUN":
         form = (math.tan(lamp.angle / 2), 0.0, 0.0)
         return Lamp(shown * SUN, tuple(rotation.col[2]), watts, beam, form=form)
@@ -126,7 +126,7 @@ def _area(lamp, world, at, beam, watts, shown) -> Lamp:  # type: ignore[no-untyp
     return Lamp(shown * AREA, at, intensity, beam, tuple(side), (half, float(round_shape), 0.0))
 
 
-def _power(lamp: bpy.types.Light) -> Vector3:
+def lamp_power(lamp: bpy.types.Light) -> Vector3:
     """Strength × colour, linear RGB, with what newer versions add (exposure, temperature)."""
     strength = lamp.energy * 2.0 ** getattr(lamp, "exposure", 0.0)
     tint = (1.0, 1.0, 1.0)

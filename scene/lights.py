@@ -1,23 +1,32 @@
-"""The capture's lights as real lamps: what the artist sees, drags, and the next fit reads back."""
+"""The capture's lights as real lamps: what the artist sees and drags."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import bpy
 import mathutils
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.capture import Capture, LightEntry
 from ..core.light import DistantLight, Light, MountedLight, NearLight
+from . import lamp_beam
+from .lamp_stand import (
+    DISTANT,
+    FROM_CAMERA,
+    HOLDER,
+    KIND,
+    KNOWN,
+    LIGHT,
+    MOUNTED,
+    NEAR,
+    mark_as_made,
+    offset_of,
+)
+from .moved_lamps import with_dragged_lamps
 from .properties import CAPTURE
 
-LIGHT = "patina_light"  # custom property: the light's name
-MADE = "patina_made"  # and where its lamp stood when it was made: x, y, z, then its axis
-MOVED = 1e-4  # of the object's size, or radians: less than this is no drag
-FROM_CAMERA = np.array([1.0, -1.0, -1.0])  # right, down, forward → Blender's camera axes
+__all__ = ["LIGHT", "create_lamp", "shine_only", "with_dragged_lamps"]
 
 
 def create_lamp(
@@ -31,12 +40,14 @@ def create_lamp(
 
     origin: what the scan was shifted by; centre: (3,) of the object in Blender; size: its own. A
     distant light is a sun drawn beside the object, a near or mounted one a point lamp; a mounted
-    one belongs to whichever camera is looked through (shine_only).
+    one belongs to whichever camera is looked through (shine_only), and its beam is in nodes that
+    Cycles obeys.
     """
     data = bpy.data.lights.new(light.name, "SUN" if isinstance(light, DistantLight) else "POINT")
     result = bpy.data.objects.new(light.name, data)
     result.rotation_mode = "QUATERNION"
     if isinstance(light, DistantLight):
+        result[KIND] = DISTANT
         # Blender's sun strength IS irradiance at normal incidence
         _shine(data, light.effective_irradiance)
         data.angle = 2 * light.angular_radius
@@ -47,12 +58,21 @@ def create_lamp(
         known = np.ones(3) * size**2 if light.intensity is None else light.intensity
         _shine(data, 4 * math.pi * known)  # E = P / (4π d²)
         data.shadow_soft_size = light.radius
-        at = light.offset * FROM_CAMERA if isinstance(light, MountedLight) else None
-        result.location = (light.position - origin if at is None else at).tolist()
+        if hasattr(data, "use_soft_falloff"):
+            data.use_soft_falloff = False  # a disc that faces each point: not quite E = I / d²
+        if isinstance(light, MountedLight):
+            result[KIND] = MOUNTED
+            result.location = (light.offset * FROM_CAMERA).tolist()
+            result.lock_rotation = (True, True, True)  # its beam looks where the camera looks
+            if light.beam is not None:
+                lamp_beam.narrow(result, light.beam)
+        else:
+            result[KIND] = NEAR
+            result.location = (light.position - origin).tolist()
     else:
         raise TypeError(f"no lamp for a {type(light).__name__}")
-    result[LIGHT] = light.name
-    result[MADE] = _place(result)
+    result[LIGHT], result[KNOWN] = light.name, light.known
+    mark_as_made(result)
     collection.objects.link(result)
     return result
 
@@ -65,64 +85,26 @@ def shine_only(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
             continue
         if lamp.get(CAPTURE) != camera.get(CAPTURE):
             continue
-        off = lamp[LIGHT] != camera.get(LIGHT)
+        off = lamp[LIGHT] != camera.get("patina_light")
         lamp.hide_render = off
-        lamp.hide_set(off)
-        if not off and lamp.get("patina_mounted"):
-            lamp.parent = camera
-            lamp.matrix_parent_inverse.identity()
+        for layer in scene.view_layers:
+            if lamp.name in layer.objects:  # its collection may be excluded
+                lamp.hide_set(off, view_layer=layer)
+        if not off and lamp.get(KIND) == MOUNTED:
+            _mount(scene, lamp, camera)
 
 
-def with_dragged_lamps(capture: Capture, scene: bpy.types.Scene) -> tuple[Capture, list[str]]:
-    """(the capture with its lights where the artist has put their lamps, names of those moved).
-
-    A moved lamp overrides the sphere, the sun or the numbers of the capture file.
-    """
-    lamps = {
-        o[LIGHT]: o
-        for o in scene.objects
-        if o.type == "LIGHT" and o.get(CAPTURE) == str(capture.file) and LIGHT in o
-    }
-    origin = np.zeros(3)
-    for collection in scene.collection.children_recursive:
-        if collection.get(CAPTURE) == str(capture.file):
-            origin = np.array(collection.get("patina_origin", (0.0, 0.0, 0.0)))
-    entries, moved = [], []
-    for entry in capture.lights:
-        lamp = lamps.get(entry.name)
-        if lamp is None or not _dragged(lamp, entry):
-            entries.append(entry)
-            continue
-        entries.append(_from_lamp(entry, lamp, origin))
-        moved.append(entry.name)
-    return replace(capture, lights=tuple(entries)), moved
+def _mount(scene: bpy.types.Scene, lamp: bpy.types.Object, camera: bpy.types.Object) -> None:
+    """Put a flash on another camera, as it stood on the last one."""
+    offset = offset_of(lamp, scene)
+    lamp.parent, lamp.parent_type = camera, "OBJECT"
+    lamp.matrix_parent_inverse.identity()
+    lamp.rotation_mode, lamp.rotation_quaternion = "QUATERNION", (1, 0, 0, 0)
+    if np.abs(offset - np.array(lamp.location)).max() > 0:  # the artist took it off its camera
+        lamp.location, lamp.delta_location = offset.tolist(), (0, 0, 0)
+    lamp[HOLDER] = camera.get("patina_label", camera.name)
 
 
 def _shine(data: bpy.types.Light, strength: NDArray[np.float64]) -> None:
     data.energy = float(strength.max())
     data.color = tuple(float(x) for x in strength / strength.max())
-
-
-def _place(lamp: bpy.types.Object) -> list[float]:
-    axis = lamp.rotation_quaternion.to_matrix().col[2]
-    return [*lamp.location, *axis]
-
-
-def _dragged(lamp: bpy.types.Object, entry: LightEntry) -> bool:
-    made = np.array(lamp.get(MADE, [0.0] * 6))
-    if entry.distant:  # a sun may be moved about: only its direction counts
-        axis = np.array(lamp.matrix_world.to_3x3().normalized().col[2])
-        return bool(np.linalg.norm(axis - made[3:]) > MOVED)
-    here = np.array(lamp.location)
-    return bool(np.linalg.norm(here - made[:3]) > MOVED * max(1e-6, np.linalg.norm(made[:3])))
-
-
-def _from_lamp(
-    entry: LightEntry, lamp: bpy.types.Object, origin: NDArray[np.float64]
-) -> LightEntry:
-    if entry.mounted is not None:
-        return replace(entry, mounted=np.array(lamp.location) * FROM_CAMERA)
-    if entry.position is not None:
-        return replace(entry, position=np.array(lamp.matrix_world.translation) + origin)
-    axis = np.array(lamp.matrix_world.to_3x3().normalized().col[2])
-    return replace(entry, direction=axis, sphere=None, sun=None)

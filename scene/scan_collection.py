@@ -15,7 +15,6 @@ from ..core.capture import Capture
 from ..core.errors import PatinaError
 from ..core.job import inputs
 from ..core.job.lights import Lights
-from ..core.light import MountedLight
 from ..core.photo.image import image_size
 from ..core.scan import Camera, Reconstruction, Scan
 from . import cameras, lights, meshes, photos
@@ -50,7 +49,7 @@ def create_scan_collection(
     lit = []
     for place, photo in enumerate(capture.photos):
         camera = inputs.camera_of(capture, scan, place)
-        lit.append((camera.label, photos.photo_for(camera, photo.file, rectified), photo))
+        lit.append((camera, photos.photo_for(camera, photo.file, rectified), photo))
     top, camera_room, light_room = _rooms(scene, name, ("cameras", "lights"))
     top[CAPTURE] = str(capture.file)
     used = scan.mesh.vertices[np.unique(scan.mesh.faces)]
@@ -59,7 +58,10 @@ def create_scan_collection(
     top["patina_origin"] = origin.tolist()
     mesh = meshes.create_mesh_object(name, scan.mesh, origin, top)
     made = _cameras(scan.cameras, own, origin, centre, camera_room)
-    for place, (label, shown, photo) in enumerate(lit):
+    for place, (camera, shown, photo) in enumerate(lit):
+        label = camera.label
+        # a scaled copy of what was calibrated is rendered at its own size
+        made[label]["patina_resolution"] = (camera.width, camera.height)
         cameras.put_photo_behind(made[label], shown)
         made[label]["patina_lit"] = photo.file.name
         made[label]["patina_place"] = place
@@ -71,8 +73,7 @@ def create_scan_collection(
     }
     for lamp in lamps.values():
         lamp[CAPTURE] = str(capture.file)
-        lamp["patina_mounted"] = isinstance(found.by_name[lamp[lights.LIGHT]], MountedLight)
-    first = made[lit[0][0]]
+    first = made[lit[0][0].label]
     cameras.look_through(scene, first)
     lights.shine_only(scene, first)
     return ScanCollection(top, mesh, made, lamps)
