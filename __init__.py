@@ -15,6 +15,7 @@ MODULES: tuple[str, ...] = (
     "operators.masks",
     "operators.fit",
     "operators.look_through",
+    "operators.save_lights",
     "panels.sidebar",
 )
 

@@ -10,8 +10,10 @@ from ..core.capture import read_capture
 from ..core.errors import InputError, PatinaError
 from ..core.job import FitJob
 from ..scene.apply import apply_result
+from ..scene.face_slots import with_painted_slots
 from ..scene.lights import with_dragged_lamps
 from ..scene.running import Running, running, tell
+from ..scene.shadow_images import with_shadow_images
 from .report_errors import refuse
 
 TICK = 0.01
@@ -83,7 +85,8 @@ class PATINA_OT_fit(bpy.types.Operator):
         capture, dragged = with_dragged_lamps(read_capture(path), context.scene)
         if dragged:
             self.report({"INFO"}, f"lights as their lamps stand now: {', '.join(dragged)}")
-        self._job, self._timer = FitJob(capture), None
+        capture, prepare = with_painted_slots(with_shadow_images(capture), context.scene)
+        self._job, self._timer = FitJob(capture, prepare=prepare), None
         self._scene = context.scene.name  # by name: a reference does not survive undo
 
     def _show(self) -> None:

@@ -11,6 +11,8 @@ from ..scene.apply import measured_materials
 from ..scene.materials import REASON_PROPERTY
 from ..scene.properties import capture_path, stored_result
 from ..scene.running import running
+from .lamp_box import draw_lamp
+from .mask_box import draw_materials, draw_shadow
 
 
 class _Stage:
@@ -29,6 +31,7 @@ class PATINA_PT_scan(_Stage, bpy.types.Panel):
         if there:
             layout.label(text=mesh.name, icon="MESH_DATA")
         layout.operator("patina.import_capture", icon="IMPORT")
+        layout.operator("patina.solve_photos", icon="CAMERA_DATA")
         if not there:
             layout.operator("patina.import_demo", icon="MONKEY")
 
@@ -47,12 +50,13 @@ class PATINA_PT_photos(_Stage, bpy.types.Panel):
         if camera in found:
             place = f"{found.index(camera) + 1} of {len(found)}: {camera['patina_lit']}"
             layout.label(text=place, icon="CAMERA_DATA")
-            layout.label(text=f"Lamp: {camera['patina_light']}", icon="LIGHT_SUN")
+            draw_lamp(layout, context.scene, camera)
         else:
             layout.label(text=f"{len(found)} lit photos", icon="CAMERA_DATA")
         row = layout.row(align=True)
         row.operator("patina.next_photo", text="Previous", icon="TRIA_LEFT").step = -1
         row.operator("patina.next_photo", text="Next", icon="TRIA_RIGHT").step = 1
+        draw_shadow(layout, context.scene)
 
 
 class PATINA_PT_fit(_Stage, bpy.types.Panel):
@@ -65,6 +69,7 @@ class PATINA_PT_fit(_Stage, bpy.types.Panel):
             layout.progress(text=now.stage, factor=now.fraction, type="BAR")
             layout.label(text="ESC cancels", icon="CANCEL")
             return
+        draw_materials(layout, context.scene)
         layout.operator("patina.fit", icon="SHADERFX")
         result = stored_result(capture_path(context.scene))
         for material in (result or {}).get("materials", []):

@@ -26,6 +26,11 @@ class PatinaScene(bpy.types.PropertyGroup):
         type=bpy.types.Object,
         poll=lambda self, candidate: candidate.type == "MESH",
     )
+    use_slots: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Fit Slots",
+        description="Fit one material to each material slot of the scanned mesh, instead of those "
+        "of the capture file",
+    )
 
 
 def store_result(capture: str, description: dict[str, Any]) -> None:

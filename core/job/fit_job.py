@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,12 +82,21 @@ def _way(entry: LightEntry) -> str:
 
 
 class FitJob(Job):
-    """Fit every material of a capture; ``result`` is there when the job is done."""
+    """Fit every material of a capture; ``result`` is there when the job is done.
 
-    def __init__(self, capture: Capture, basis: Basis | None = None) -> None:
+    prepare: what is done to the scan once it is read (face attributes that no file has).
+    """
+
+    def __init__(
+        self,
+        capture: Capture,
+        basis: Basis | None = None,
+        prepare: Callable[[Scan], Scan] | None = None,
+    ) -> None:
         super().__init__()
         self.capture = capture
         self.basis = basis
+        self.prepare = prepare
         self.result: CaptureResult | None = None
 
     def run(self) -> Iterator[Step]:
@@ -96,6 +105,8 @@ class FitJob(Job):
         yield Step("reading the scan", 0.0)
         basis = self.basis or Basis.default()
         scan = inputs.open_scan(capture)
+        if self.prepare is not None:
+            scan = self.prepare(scan)
         inputs.check_face_attributes(capture, scan)
         inputs.check_photos(capture, scan)
         yield Step("reading the scan", 0.03)

@@ -3,7 +3,6 @@ one material."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -143,17 +142,14 @@ def test_a_shadow_nobody_explains_is_no_material(tmp_path: Path) -> None:
     import OpenImageIO as oiio
 
     path = made.make_capture(tmp_path, photos=6)
-    light = next(made.light_directions(6))
-    rotation, translation = next(made.poses(6))
     file = str(tmp_path / "lit_1.exr")
     pixels = oiio.ImageBuf(file).get_pixels(oiio.FLOAT)[..., :3]
     bright = pixels.sum(axis=2) > 0.3 * pixels.sum(axis=2).max()
-    rows, columns = np.nonzero(bright)
+    _, columns = np.nonzero(bright)
     dark = (np.indices(bright.shape)[1] < np.median(columns)) & bright
     pixels[dark] *= 0.15  # some stray light is left
     made.write_exr(tmp_path / "lit_1.exr", pixels)
     assert proposed(path).proposal.count == 1
-    assert light.shape == translation.shape == rotation[0].shape
 
 
 def test_the_number_asked_for(tmp_path: Path) -> None:
@@ -241,4 +237,4 @@ def test_demo_capture(root: Path) -> None:
 @pytest.mark.parametrize("name", ["bunny_red", "bunny_bronze", "bunny_fabric"])
 def test_scans_of_one_material(shared: Path, name: str) -> None:
     found = proposed(shared / "data" / "scans" / name / "scan.capture.toml").proposal
-    assert found.count == 1, [replace(split) for split in found.splits]
+    assert found.count == 1, found.splits

@@ -33,10 +33,10 @@ def disc_beyond(t):
 def roof() -> RayScene:
     """A floor z = 0 and over its half x < 0 a roof at HEIGHT, its edge along y."""
     vertices = np.array(
-        [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)]
-        + [(-9, -9, HEIGHT), (0, -9, HEIGHT), (0, 9, HEIGHT), (-9, 9, HEIGHT)],
+        [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0),
+         (-9, -9, HEIGHT), (0, -9, HEIGHT), (0, 9, HEIGHT), (-9, 9, HEIGHT)],
         float,
-    )
+    )  # fmt: skip
     faces = np.array([(0, 1, 2), (0, 2, 3), (4, 5, 6), (4, 6, 7)], np.int32)
     return RayScene.build(Mesh(vertices, faces))
 
@@ -151,7 +151,7 @@ def bowl() -> tuple[RayScene, Camera, SurfaceView]:
     "light",
     [
         DistantLight("a", np.array([0.48, -0.6, 0.64])),
-        NearLight("b", made.CENTRE + (3.0, -2.0, 2.0)),
+        NearLight("b", made.CENTRE + np.array([3.0, -2.0, 2.0])),
         MountedLight("c", np.array([0.5, -0.2, 0.1])),
     ],
 )

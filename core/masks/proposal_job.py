@@ -1,0 +1,104 @@
+"""Capture → what its photos show of every face → proposed materials."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..basis import Basis
+from ..capture import Capture
+from ..errors import FitError
+from ..geometry import RayScene, view_surface
+from ..job import inputs
+from ..job.job import Job, Step
+from ..job.lights import Lights, find_lights, refined
+from ..job.photos import LitPhotos
+from ..samples import sample_photo
+from ..samples.level import at_typical_level
+from ..samples.take import light_surface, trusted_pixels
+from ..scan import Scan
+from .proposal import Proposal, propose_materials
+from .proposal_cells import Cells
+
+
+@dataclass(frozen=True)
+class Proposed:
+    """What a ProposalJob found, and what it read on the way."""
+
+    scan: Scan
+    rays: RayScene
+    lights: Lights
+    photos: LitPhotos
+    proposal: Proposal
+
+
+def standing_lights(
+    capture: Capture, scan: Scan, photos: LitPhotos, rays: RayScene, basis: Basis
+) -> Lights:
+    """The capture's lights; those to be refined are, as if all were one material."""
+    lights = find_lights(capture, scan, photos)
+    if any(entry.refine for entry in capture.lights):
+        lights = refined(lights, capture, scan, photos, rays, basis)
+    return lights
+
+
+class ProposalJob(Job):
+    """Propose materials for a capture; ``result`` is there when the job is done.
+
+    count: how many materials; None: as many as there are.
+    """
+
+    def __init__(
+        self, capture: Capture, count: int | None = None, basis: Basis | None = None
+    ) -> None:
+        super().__init__()
+        self.capture, self.count, self.basis = capture, count, basis
+        self.result: Proposed | None = None
+
+    def run(self) -> Iterator[Step]:
+        """Scan, one photo after the other, the division."""
+        capture = self.capture
+        yield Step("reading the scan", 0.0)
+        basis = self.basis or Basis.default()
+        scan = inputs.open_scan(capture)
+        inputs.check_photos(capture, scan)
+        rays = RayScene.build(scan.mesh)
+        photos = LitPhotos.open(capture)
+        lights = standing_lights(capture, scan, photos, rays, basis)
+        parts: list[Cells] = []
+        factor: float | None = None if not lights.known else 1.0
+        for place in range(len(capture.photos)):
+            yield Step("looking at the photos", 0.05 + 0.7 * place / len(capture.photos))
+            camera = inputs.camera_of(capture, scan, place)
+            view = view_surface(rays, camera)
+            if not len(view.pixel):
+                continue
+            lighting = light_surface(rays, view, lights.of(capture, place), camera)
+            _, in_shadow = inputs.material_pixels(capture, scan, view, place)
+            keep = trusted_pixels(view, lighting, capture.fit.margins) & ~in_shadow
+            lit = photos.read(place)
+            keep &= lit.usable.ravel()[view.pixel]
+            if not keep.any():
+                continue
+            table = sample_photo(view, lighting, lit.radiance, keep)
+            if factor is None:  # of unknown scale: brought to a usual level, all photos alike
+                table, factor = at_typical_level(table, basis)
+            elif factor != 1.0:
+                table = replace(table, rho=table.rho * np.float32(factor))
+            parts.append(Cells.of(table, view.face[keep], place, basis))
+        if not parts:
+            raise self.capture.error(
+                "no photo shows any of the mesh lit: no materials to tell apart", "scan", "mesh"
+            )
+        yield Step("telling materials apart", 0.8)
+        try:
+            names = [light.name for light in capture.lights]
+            lamps = [names.index(photo.light) for photo in capture.photos]
+            if any(light.mounted is not None for light in capture.lights):
+                lamps = list(range(len(capture.photos)))  # each from where its camera stands
+            proposal = propose_materials(Cells.join(parts), scan.mesh, self.count, lamps)
+        except FitError as error:
+            raise self.capture.error(str(error), "scan", "mesh") from error
+        self.result = Proposed(scan, rays, lights, photos, proposal)

@@ -1,0 +1,167 @@
+"""Shadow masks and proposed materials as pictures beside a new capture file: to look at, repaint
+and fit with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..basis import Basis
+from ..capture import Capture
+from ..capture.model import SHADOW_MASK
+from ..errors import InputError
+from ..geometry import RayScene, SurfaceView, edges, view_surface
+from ..job import inputs
+from ..job.job import Job, Step
+from ..job.photos import LitPhotos
+from ..photo import read_mask, write_png
+from .capture_text import capture_with_masks
+from .proposal import Proposal
+from .proposal_job import ProposalJob, standing_lights
+from .shadow import light_visibility, to_grey
+
+FOLDER = "masks"
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """shadows: shadow masks; materials: proposed ones, count of them (None: as many as there are);
+    uncertainty: of the mesh, scan units (None: shadow.mesh_uncertainty)."""
+
+    shadows: bool = True
+    materials: bool = False
+    count: int | None = None
+    uncertainty: float | None = None
+
+
+@dataclass
+class Written:
+    """capture: the new capture file; shadows, materials: mask files by photo; proposal."""
+
+    capture: Path
+    shadows: list[str] = field(default_factory=list)
+    materials: list[dict[str, str]] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+    proposal: Proposal | None = None
+
+
+class MasksJob(Job):
+    """Write masks of a capture into ``folder``, for a capture file that will lie in ``final`` (the
+    same, unless files are moved there later). ``result`` is there when the job is done."""
+
+    def __init__(self, capture: Capture, wanted: Wanted, folder: Path, final: Path) -> None:
+        super().__init__()
+        self.capture, self.wanted = capture, wanted
+        self.folder, self.final = folder, final
+        self.result: Written | None = None
+
+    def run(self) -> Iterator[Step]:
+        """The division into materials, then every photo's masks."""
+        capture, wanted = self.capture, self.wanted
+        done = Written(self.folder / new_name(capture))
+        share = 0.0
+        if wanted.materials:
+            share = 0.6
+            proposing = ProposalJob(capture, wanted.count)
+            while proposing.step():
+                yield Step(proposing.now.stage, share * proposing.now.fraction)
+            found = proposing.result
+            if found is None:  # pragma: no cover - the job raises or finishes
+                raise RuntimeError("the job ended without a result")
+            scan, rays, lights, done.proposal = (
+                found.scan, found.rays, found.lights, found.proposal,
+            )  # fmt: skip
+            done.names = material_names(done.proposal.count)
+        else:
+            yield Step("reading the scan", 0.0)
+            scan = inputs.open_scan(capture)
+            inputs.check_photos(capture, scan)
+            rays = RayScene.build(scan.mesh)
+            photos = LitPhotos.open(capture)
+            lights = standing_lights(capture, scan, photos, rays, Basis.default())
+        (self.folder / FOLDER).mkdir(parents=True, exist_ok=True)
+        stems = _stems(capture)
+        for place in range(len(capture.photos)):
+            part = place / len(capture.photos)
+            yield Step("painting masks", share + (1.0 - share) * part)
+            camera = inputs.camera_of(capture, scan, place)
+            view = view_surface(rays, camera)
+            if wanted.shadows:
+                light = lights.of(capture, place)
+                seen = light_visibility(
+                    rays, view, light, camera, uncertainty=wanted.uncertainty
+                ) if len(view.pixel) else np.zeros(0, np.float32)  # fmt: skip
+                grey = view.image(to_grey(seen), fill=0)
+                grey[_painted_shadow(capture, place, grey.shape)] = 255
+                done.shadows.append(self._write(f"{stems[place]}_{SHADOW_MASK}.png", grey))
+            if done.proposal is not None and done.proposal.count > 1:
+                done.materials.append(self._materials(done, view, stems[place]))
+        text = capture_with_masks(
+            capture,
+            self.final,
+            done.shadows if wanted.shadows else None,
+            done.names if done.proposal is not None else None,
+            done.materials,
+        )
+        done.capture.write_text(text, "utf-8")
+        self.result = done
+
+    def _materials(self, done: Written, view: SurfaceView, stem: str) -> dict[str, str]:
+        assert done.proposal is not None
+        label = done.proposal.labels[view.face]
+        outline = edges.widen(view.silhouette, max(self.capture.fit.margins.silhouette - 1, 0))
+        files = {}
+        for number, name in enumerate(done.names):
+            mask = view.image(label == number, fill=0).astype(bool) & ~outline
+            files[name] = self._write(f"{stem}_{name}.png", mask * np.uint8(255))
+        return files
+
+    def _write(self, name: str, grey: NDArray[np.uint8]) -> str:
+        write_png(self.folder / FOLDER / name, grey)
+        return f"{FOLDER}/{name}"
+
+
+def new_name(capture: Capture) -> str:
+    """The capture's own file name: in another folder, nothing is overwritten."""
+    name = capture.file.name
+    return name if name.endswith(".capture.toml") else f"{capture.file.stem}.capture.toml"
+
+
+def check_final(capture: Capture, final: Path) -> None:
+    """Refuse a folder in which the new files would take the place of the capture's own."""
+    mine = final / new_name(capture)
+    inputs_of_it = {capture.file, *(p.resolve() for photo in capture.photos for p in photo.files)}
+    for photo in capture.photos:
+        inputs_of_it |= {mask.resolve() for mask in photo.masks.values()}
+    room = (final / FOLDER).resolve()
+    if mine.resolve() in inputs_of_it or any(room == file.parent for file in inputs_of_it):
+        raise InputError(
+            "holds files of the capture itself, which would be overwritten: choose another folder",
+            file=final,
+            key="--out",
+        )
+
+
+def material_names(count: int) -> list[str]:
+    """Names of proposed materials, the largest first."""
+    return ["surface"] if count == 1 else [f"material_{i + 1}" for i in range(count)]
+
+
+def _stems(capture: Capture) -> list[str]:
+    """A name for each photo's masks: its own, with its number where another photo has the same."""
+    stems = [photo.file.stem for photo in capture.photos]
+    folded = [stem.casefold() for stem in stems]
+    return [
+        stem if folded.count(folded[i]) == 1 else f"{i + 1:03d}_{stem}"
+        for i, stem in enumerate(stems)
+    ]
+
+
+def _painted_shadow(capture: Capture, place: int, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """What the artist has marked as shadow before stays marked."""
+    file = capture.photos[place].masks.get(SHADOW_MASK)
+    return np.zeros(shape, bool) if file is None else read_mask(file)

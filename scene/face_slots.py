@@ -1,0 +1,147 @@
+"""Which face is of which material, as the artist sees and repaints it: the mesh's slots."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.capture import Capture, MaterialEntry
+from ..core.capture.model import SHADOW_MASK
+from ..core.errors import InputError, PatinaError
+from ..core.scan import Scan
+from .apply import MEASURED
+
+SLOTS = "patina_slots"  # the scan's face attribute while a fit runs
+PROPOSED = "patina_materials"  # face attribute of the mesh: what was proposed last
+CONFIDENCE = "patina_confidence"
+STAND_IN = "patina_proposed"  # on the coloured materials that stand for proposed ones
+# tell apart with any eyes (Okabe & Ito 2008), linear
+COLOURS = (
+    (0.788, 0.347, 0.0), (0.093, 0.456, 0.815), (0.0, 0.342, 0.171), (0.871, 0.776, 0.054),
+    (0.0, 0.168, 0.445), (0.665, 0.112, 0.0), (0.604, 0.191, 0.386), (0.2, 0.2, 0.2),
+)  # fmt: skip
+FORBIDDEN = set('/\\:*?"<>|')
+
+Prepare = Callable[[Scan], Scan]
+
+
+def show_proposal(
+    target: bpy.types.Object,
+    capture: str,
+    labels: NDArray[np.int32],
+    confidence: NDArray[np.float32],
+    names: Sequence[str],
+) -> None:
+    """Proposed materials as coloured slots of the scanned mesh, and as face attributes.
+
+    Raises PatinaError where the mesh no longer has the scan's faces.
+    """
+    leave_edit_mode(target)
+    data = target.data
+    if len(data.polygons) != len(labels):
+        raise PatinaError(
+            f"{target.name} has {len(data.polygons):,} faces, the scan {len(labels):,}: import the "
+            "capture anew, or undo what cut the mesh"
+        )
+    _attribute(data, PROPOSED, "INT", labels.astype(np.int32))
+    _attribute(data, CONFIDENCE, "FLOAT", confidence.astype(np.float32))
+    data.materials.clear()
+    for number, name in enumerate(names):
+        data.materials.append(_stand_in(name, COLOURS[number % len(COLOURS)], capture))
+    data.polygons.foreach_set("material_index", labels.astype(np.int32))
+    data.update()
+    for material in [m for m in bpy.data.materials if m.get(STAND_IN) == capture and not m.users]:
+        bpy.data.materials.remove(material)
+
+
+def with_painted_slots(capture: Capture, scene: bpy.types.Scene) -> tuple[Capture, Prepare | None]:
+    """(the capture with a material for every slot that faces wear, what brings the slots to its
+    scan). Where the artist has not accepted the slots (Scene.patina.use_slots): as it was, None.
+
+    The capture's own materials and their masks give way; shadow masks stay. Raises PatinaError
+    where there is nothing to take slots from.
+    """
+    if not scene.patina.use_slots:
+        return capture, None
+    target = scene.patina.mesh
+    if target is None or target.type != "MESH" or target.name not in scene.objects:
+        raise PatinaError("the scanned mesh is not in this scene: there are no slots to fit")
+    if target.mode == "EDIT":
+        target.update_from_editmode()
+    data = target.data
+    slot = np.empty(len(data.polygons), np.int32)
+    data.polygons.foreach_get("material_index", slot)
+    if not len(slot) or not any(data.materials):
+        raise PatinaError(f"{target.name} has no material slots: propose materials, or make some")
+    used, place = np.unique(np.clip(slot, 0, len(data.materials) - 1), return_inverse=True)
+    names = [_capture_name(data.materials[number], int(number)) for number in used]
+    for i, name in enumerate(names):
+        if name.casefold() in [other.casefold() for other in names[:i]]:
+            raise PatinaError(f"two slots of {target.name} wear {name!r}: give them two materials")
+    photos = tuple(
+        replace(photo, masks={k: v for k, v in photo.masks.items() if k == SHADOW_MASK})
+        for photo in capture.photos
+    )
+    materials = tuple(MaterialEntry(name, faces=SLOTS) for name in names)
+    faces = place.ravel().astype(np.int32)
+    return replace(capture, materials=materials, photos=photos), _bring(faces, target.name)
+
+
+def leave_edit_mode(target: bpy.types.Object) -> None:
+    """End the edit session that a mesh's faces belong to while it lasts."""
+    if target.data.is_editmode:
+        with bpy.context.temp_override(active_object=target, object=target):
+            bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def _bring(faces: NDArray[np.int32], name: str) -> Prepare:
+    def prepare(scan: Scan) -> Scan:
+        if len(scan.mesh.faces) != len(faces):
+            raise InputError(
+                f"{name} has {len(faces):,} faces, the scan {len(scan.mesh.faces):,}: its slots "
+                "say nothing about the scan; import the capture anew, or do without the slots"
+            )
+        attributes = {**scan.mesh.face_attributes, SLOTS: faces}
+        return replace(scan, mesh=replace(scan.mesh, face_attributes=attributes))
+
+    return prepare
+
+
+def _capture_name(material: bpy.types.Material | None, slot: int) -> str:
+    """A material's name as a capture file may have it: part of file names on every system."""
+    if material is None:
+        return f"slot_{slot + 1}"
+    name = str(material.get(MEASURED, material.name))
+    safe = "".join("_" if c in FORBIDDEN or not c.isprintable() else c for c in name).strip(". ")
+    return f"slot_{slot + 1}" if not safe or safe == SHADOW_MASK else safe[:60]
+
+
+def _attribute(data: bpy.types.Mesh, name: str, kind: str, values: NDArray) -> None:
+    old = data.attributes.get(name)
+    if old is not None and (old.domain != "FACE" or old.data_type != kind):
+        data.attributes.remove(old)
+        old = None
+    if old is None:
+        old = data.attributes.new(name, kind, "FACE")
+    old.data.foreach_set("value", values)
+
+
+def _stand_in(name: str, colour: tuple[float, float, float], capture: str) -> bpy.types.Material:
+    """A coloured material of that name; one that an earlier proposal made is used again."""
+    for material in bpy.data.materials:
+        if material.get(STAND_IN) == capture and material.name == name:
+            return material
+    material = bpy.data.materials.new(name)
+    material[STAND_IN] = capture
+    material.diffuse_color = (*colour, 1.0)
+    if bpy.app.version < (5, 0):
+        material.use_nodes = True
+    shader = next((n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED"), None)
+    if shader is not None:
+        shader.inputs["Base Color"].default_value = (*colour, 1.0)
+        shader.inputs["Roughness"].default_value = 0.8
+    return material
