@@ -22,9 +22,7 @@ def run(data: Path) -> None:
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        print(
-            "\nDiLiGenT ball (orthographic, 24 distant lights), each photo from the others:\n"
-        )
+        print("\nDiLiGenT ball (orthographic, 24 distant lights), each photo from the others:\n")
         _table([("as published", real_captures.ball(data, folder))])
         print("\nRodin bronze (16 flash photos), each photo from the others:\n")
         cases = []

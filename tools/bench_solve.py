@@ -24,8 +24,8 @@ def run(data: Path) -> None:
 
 def _rendered() -> None:
     from patina.core.scan import Camera, Pose
-    from patina.core.scan.readers.colmap import read_colmap
     from patina.core.scan.mesh import read_mesh
+    from patina.core.scan.readers.colmap import read_colmap
     from patina.core.solve import LocaliseJob, SolveJob
     from tests import make_photos_of_scene as made
     from tests.core.test_solve_scene import similarity

@@ -182,9 +182,7 @@ def _lit(
     return found
 
 
-def _level(
-    rho: Array, mean: NDArray[np.floating], angles: Angles, weight: Array
-) -> float:
+def _level(rho: Array, mean: NDArray[np.floating], angles: Angles, weight: Array) -> float:
     """What brings the typical reflectance to the basis' mean material's (samples/level.py)."""
     full = weight > 0.99
     if not full.any():

@@ -110,9 +110,7 @@ def _calm(
     keep &= whole & (light > 0)
     hits = Hits(face[keep], u[keep].astype(np.float32), v[keep].astype(np.float32))
     mean = light[keep] / len(window) ** 2
-    return Seen(
-        camera, rays.points(hits), centre[keep], -along[keep], mean, np.ones(len(mean))
-    )
+    return Seen(camera, rays.points(hits), centre[keep], -along[keep], mean, np.ones(len(mean)))
 
 
 def not_dark(seen: list[Seen]) -> list[Seen]:
