@@ -18,12 +18,13 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class SphereEntry:
     """A photo of a sphere. camera: label of the scan camera it was taken with; surface: "chrome" or
-    "glossy"; centre (2,) and radius: its outline, pixels; mask: or the sphere in white; neither: it
-    is searched for."""
+    "glossy"; reflectance: of a chrome one, which gives the light's irradiance; centre (2,) and
+    radius: its outline, pixels; mask: or the sphere in white; neither: it is searched for."""
 
     photo: Path
     camera: str
     surface: str = "chrome"
+    reflectance: float | None = None
     centre: Array | None = None
     radius: float | None = None
     mask: Path | None = None
@@ -60,7 +61,8 @@ class LightEntry:
 
     strength: (3,) irradiance of a distant light, intensity of a near one. angle: radians,
     diameter of a distant source as the object sees it; radius: of a near source, scan units; beam:
-    radians to half of the intensity. refine: what is given is where the search starts."""
+    radians to half of the intensity. refine: what is given is where the search starts. charted: the
+    colour chart of [tone] says how strong it is."""
 
     name: str
     direction: Array | None = None
@@ -74,11 +76,13 @@ class LightEntry:
     radius: float = 0.0
     beam: float | None = None
     refine: bool = False
+    charted: bool = False
 
     @property
     def strength_given(self) -> bool:
         """True where reflectance will have a scale."""
-        return self.strength is not None or self.white is not None
+        mirror = self.sphere is not None and self.sphere.reflectance is not None
+        return self.strength is not None or self.white is not None or mirror or self.charted
 
     @property
     def distant(self) -> bool:
@@ -90,11 +94,15 @@ class LightEntry:
 class ChartEntry:
     """A photo of a colour chart or a grey scale. corners: (4, 2) pixels, the centres of its corner
     patches: dark skin, bluish green, black, white of a ColorChecker; first and last of a grey scale
-    are corners[0] and corners[1]. reflectance: of a grey scale's patches, first to last."""
+    are corners[0] and corners[1]. reflectance: of a grey scale's patches, first to last. light:
+    name of the distant light that shines on it, whose irradiance it then gives; normal: (3,) the
+    chart's, scan frame; None: it faces that light."""
 
     photo: Path
     corners: Array
     reflectance: tuple[float, ...] | None = None
+    light: str | None = None
+    normal: Array | None = None
 
 
 @dataclass(frozen=True)

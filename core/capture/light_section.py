@@ -48,8 +48,13 @@ def read_light(section: Section) -> LightEntry:
         beam=beam,
         refine=section.flag("refine", False),
     )
-    if entry.white is not None and entry.strength is not None:
-        raise section.error("irradiance is given already: leave one of the two out", "white")
+    mirror = entry.sphere is not None and entry.sphere.reflectance is not None
+    if sum((entry.white is not None, entry.strength is not None, mirror)) > 1:
+        raise section.error(
+            "the irradiance is given twice (irradiance, white, the sphere's reflectance): leave "
+            "one in",
+            "white" if entry.white is not None else "irradiance",
+        )
     section.close()
     return entry
 
@@ -82,16 +87,19 @@ def _sphere(section: Section) -> SphereEntry:
     radius = section.number("radius", 0.0, 1.0) if "radius" in section else None
     mask = section.optional_file_path("mask")
     surface = section.optional_text("surface") or "chrome"
+    mirror = section.number("reflectance", 0.6, 0.01, 1.0) if "reflectance" in section else None
     section.close()
     if surface not in ("chrome", "glossy"):
         raise section.error(f"found {surface!r}, expected 'chrome' or 'glossy'", "surface")
+    if mirror is not None and surface != "chrome":
+        raise section.error("only a chrome sphere's reflectance gives irradiance", "reflectance")
     if (centre is None) != (radius is None) or (centre is not None and mask is not None):
         raise section.error(
             "expected center and radius of its outline in pixels, or a mask, or neither: then it "
             "is searched for",
             "center",
         )
-    return SphereEntry(photo, camera, surface, centre, radius, mask)
+    return SphereEntry(photo, camera, surface, mirror, centre, radius, mask)
 
 
 def _sun(section: Section) -> SunEntry:

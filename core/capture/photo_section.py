@@ -40,8 +40,9 @@ def _chart(section: Section) -> ChartEntry:
     corners = section.points("corners", 2 if greys is not None else 4)
     if greys is not None and not all(0.001 < grey <= 1.0 for grey in greys):
         raise section.error("expected reflectances from 0.001 to 1", "reflectance")
+    light, normal = section.optional_text("light"), section.vector("normal")
     section.close()
-    return ChartEntry(photo, corners, greys)
+    return ChartEntry(photo, corners, greys, light, normal)
 
 
 def read_photo_entry(section: Section, lights: set[str], materials: set[str]) -> PhotoEntry:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 from ..errors import InputError
 from ..fit import PaperSettings
 from ..samples import Margins
-from .entries import FitOptions, MaterialEntry
+from .entries import FitOptions, LightEntry, MaterialEntry, ToneEntry
 from .light_section import read_light
 from .lines import key_lines
 from .model import SHADOW_MASK, Capture, ScanEntry
@@ -44,6 +45,7 @@ def read_capture(path: Path) -> Capture:
     materials = tuple(_material(section) for section in top.tables("material"))
     _refuse_twins(top, "light", [light.name for light in lights])
     _refuse_twins(top, "material", [material.name for material in materials])
+    lights = _charted(top, tone, lights)
     known = [light.strength_given for light in lights]
     if any(known) and not all(known):
         place = known.index(False)
@@ -74,6 +76,32 @@ def read_capture(path: Path) -> Capture:
         fit=fit,
         lines=lines,
     )
+
+
+def _charted(
+    top: Section, tone: ToneEntry, lights: tuple[LightEntry, ...]
+) -> tuple[LightEntry, ...]:
+    """The lights, the one that shone on the chart marked."""
+    chart = tone.chart
+    if chart is None or chart.light is None:
+        return lights
+    names = [light.name for light in lights]
+    if chart.light not in names:
+        known = ", ".join(names) or "none"
+        raise top.error(
+            f"no [[light]] is named {chart.light!r}; there are: {known}", "tone", "chart", "light"
+        )
+    place = names.index(chart.light)
+    if not lights[place].distant:
+        raise top.error(
+            "a chart gives the irradiance of a distant light only", "tone", "chart", "light"
+        )
+    if lights[place].strength_given:
+        raise top.error(
+            f"the irradiance of {chart.light!r} is given already: leave one of the two out",
+            "tone", "chart", "light",
+        )  # fmt: skip
+    return (*lights[:place], replace(lights[place], charted=True), *lights[place + 1 :])
 
 
 def _scan(section: Section) -> ScanEntry:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..basis import Basis
 from ..calibrate.refine import refine_lights
 from ..calibrate.seen import Seen, draw_pixels
-from ..capture import Capture, LightEntry, SphereEntry, SunEntry, WhiteEntry
+from ..capture import Capture, ChartEntry, LightEntry, SphereEntry, SunEntry, WhiteEntry
 from ..errors import InputError, PatinaError
 from ..geometry import RayScene
 from ..light import DistantLight, Light, MountedLight, NearLight
@@ -31,6 +31,7 @@ from .photos import LitPhotos
 Array = NDArray[np.float64]
 
 SUN_RADIUS = np.radians(0.2666)  # mean angular radius
+LEAST_COSINE = 0.1  # of a chart with its light
 MOST_CLIPPED = 0.02  # of a white target's pixels
 PIXELS = 1000  # of each photo, for refining
 
@@ -95,11 +96,11 @@ def _light(
     if entry.mounted is not None:
         return MountedLight(entry.name, entry.mounted, entry.strength, entry.radius, entry.beam)
     radius = 0.0 if entry.angle is None else 0.5 * entry.angle
-    key = "direction"
+    key, mirrored = "direction", None
     try:
         if entry.sphere is not None:
             key = "sphere"
-            direction, said = _from_sphere(scan, photos, entry.sphere)
+            direction, mirrored, said = _from_sphere(scan, photos, entry.sphere)
         elif entry.sun is not None:
             key = "sun"
             direction, said = _from_sun(capture, scan, entry)
@@ -107,7 +108,12 @@ def _light(
         else:
             assert entry.direction is not None  # the reader has made sure of one
             direction, said = entry.direction, []
-        strength = entry.strength
+        strength = entry.strength if mirrored is None else mirrored
+        chart = capture.tone.chart
+        if entry.charted and chart is not None:
+            key = "direction"
+            strength, more = _from_chart(photos, chart, direction)
+            said = [*said, *more]
         if entry.white is not None:
             key = "white"
             strength, more = _from_white(photos, entry.white, direction)
@@ -118,7 +124,10 @@ def _light(
     return DistantLight(entry.name, direction, strength, radius)
 
 
-def _from_sphere(scan: Scan, photos: LitPhotos, entry: SphereEntry) -> tuple[Array, Sequence[str]]:
+def _from_sphere(
+    scan: Scan, photos: LitPhotos, entry: SphereEntry
+) -> tuple[Array, Array | None, Sequence[str]]:
+    """(direction, irradiance where the sphere's reflectance is known, notes)."""
     camera = find_camera(scan.cameras, entry.camera)
     if camera is None:
         raise InputError(
@@ -138,7 +147,30 @@ def _from_sphere(scan: Scan, photos: LitPhotos, entry: SphereEntry) -> tuple[Arr
         f"direction from the sphere, ± {np.degrees(found.uncertainty):.2f}°",
         *found.notes,
     ]
-    return found.direction, said
+    if entry.reflectance is None:
+        return found.direction, None, said
+    mirrored = found.highlights[0].irradiance
+    if mirrored is None:
+        raise InputError(
+            "the sphere's highlight is clipped: its photo gives the direction, not the irradiance; "
+            "expose it less or leave reflectance out"
+        )
+    return found.direction, mirrored / entry.reflectance, said
+
+
+def _from_chart(
+    photos: LitPhotos, chart: ChartEntry, direction: Array
+) -> tuple[Array, Sequence[str]]:
+    """Decoded by its own curve, a patch shows its reflectance R: R = (R/π) E n·l, so E = π / n·l,
+    in the unit that one exposure of the chart's photo makes."""
+    cosine, said = 1.0, ["the chart is taken to face the light"]
+    if chart.normal is not None:
+        length = float(np.linalg.norm(chart.normal))
+        cosine = float(chart.normal @ direction) / max(length, 1e-12)
+        said = []
+        if cosine < LEAST_COSINE:
+            raise InputError("the chart's normal does not face the light that shines on it")
+    return np.full(3, np.pi / cosine / photos.exposure_of(chart.photo)), said
 
 
 def _from_sun(capture: Capture, scan: Scan, light: LightEntry) -> tuple[Array, Sequence[str]]:

@@ -77,11 +77,13 @@ class LitPhotos:
         """A photo of a sphere or a white target, in the same unit. Raises InputError."""
         photo = read_photo(file, self._curve(None))
         if exposure is None:
-            exposure = 1.0
-            if self.first is not None:
-                own = read_exif(file).relative_exposure
-                exposure = 1.0 if own is None else own / self.first
+            exposure = self.exposure_of(file)
         return LitPhoto(photo.radiance / np.float32(exposure), ~photo.clipped)
+
+    def exposure_of(self, file: Path) -> float:
+        """EXIF's exposure of another photo relative to the first lit one; 1 where it is unknown."""
+        own = None if self.first is None else read_exif(file).relative_exposure
+        return 1.0 if own is None or self.first is None else own / self.first
 
     def curve(self, place: int) -> Transfer:
         """The curve a photo is read with; "auto" is what its file says."""

@@ -140,6 +140,30 @@ def test_a_white_target_gives_the_irradiance(ball: Path) -> None:
     assert light.irradiance == pytest.approx(np.array([3.6, 3.2, 2.8]) / 0.8, rel=1e-3)
 
 
+def test_a_chart_gives_the_irradiance(ball: Path) -> None:
+    """Patches of reflectance R under E show R E n·l / π: both come back."""
+    greys, strength = [0.05, 0.1, 0.2, 0.4, 0.8], 2.0
+    scale = np.full((40, 200, 3), 0.01)
+    for i, grey in enumerate(greys):
+        scale[:, 40 * i : 40 * i + 40] = grey * strength * 0.8 / np.pi
+    made.write_exr(ball.parent / "scale.exr", scale)
+    chart = f'photo = "scale.exr", corners = [[20, 20], [180, 20]], reflectance = {greys}'
+    path = with_light(ball, "direction = [0, 0.6, 0.8]")
+    text = path.read_text()
+    path.write_text(f'[tone]\nchart = {{{chart}, light = "lamp", normal = [0, 0, 1]}}\n' + text)
+    capture = read_capture(path)
+    photos = LitPhotos.open(capture)
+    light = find_lights(capture, inputs.open_scan(capture), photos).by_name["lamp"]
+    assert light.irradiance == pytest.approx(np.full(3, np.pi / 0.8))
+    # a Lambertian of reflectance 0.3 under the lamp: decoded, ρ = L / (E n·l) is 0.3 / π
+    encoded = np.full((1, 1, 3), 0.3 * strength * 0.8 / np.pi)
+    radiance = photos.curve(0).decode(encoded)
+    assert radiance / (light.irradiance * 0.8) == pytest.approx(0.3 / np.pi, rel=0.02)
+    path.write_text(path.read_text().replace('light = "lamp", normal', 'light = "sun", normal'))
+    with pytest.raises(InputError, match=r"tone\.chart.*no \[\[light\]\] is named 'sun'"):
+        read_capture(path)
+
+
 def test_strengths_for_all_lights_or_none(ball: Path) -> None:
     path = ball
     text = path.read_text().replace("irradiance = [3.0, 3.0, 3.0]\n", "", 1)
