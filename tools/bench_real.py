@@ -69,6 +69,7 @@ def _samples(path: Path) -> _Case:
     from patina.core.capture import read_capture
     from patina.core.geometry import RayScene, view_surface
     from patina.core.job import inputs
+    from patina.core.job.job import drained
     from patina.core.job.lights import find_lights, refined
     from patina.core.job.photos import LitPhotos
     from patina.core.photo.transfer import Transfer
@@ -82,7 +83,7 @@ def _samples(path: Path) -> _Case:
     rays, photos = RayScene.build(scan.mesh), LitPhotos.open(capture)
     lights = find_lights(capture, scan, photos)
     if any(light.refine for light in capture.lights):
-        lights = refined(lights, capture, scan, photos, rays, basis)
+        lights = drained(refined(lights, capture, scan, photos, rays, basis))
     tables = []
     for place in range(len(capture.photos)):
         camera = inputs.camera_of(capture, scan, place)

@@ -72,6 +72,7 @@ def _mounted(light: MountedLight, reach: float) -> Movable:
 
     return Movable(
         ("right", "down", "forward", "1/beam²"), start,
-        np.append(light.offset - wide, -1e-9), np.append(light.offset + wide, 30.0),
+        np.append(light.offset - wide, -1e-9),
+        np.append(light.offset + wide, max(30.0, 4 * start[3])),
         np.array([0.1 * reach, 0.1 * reach, 0.1 * reach, 1.0]), moved,
     )  # fmt: skip

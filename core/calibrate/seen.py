@@ -22,7 +22,8 @@ DARK = 0.003  # of the bright end: below it a photo shows noise and stray light
 @dataclass(frozen=True)
 class Seen:
     """n pixels of one photo. point, normal, view: (n, 3) float64, scan frame, view surface →
-    camera; radiance: (n,) mean of the channels; weight: (n,) how much each counts."""
+    camera; radiance: (n,) mean of the channels; weight: (n,) how much each counts;
+    material: (n,) place of its material."""
 
     camera: Camera
     point: Array
@@ -30,12 +31,13 @@ class Seen:
     view: Array
     radiance: Array
     weight: Array
+    material: NDArray[np.int16]
 
     def select(self, which: NDArray) -> Seen:
         """The rows of a boolean mask or an index array."""
         return Seen(
             self.camera, self.point[which], self.normal[which], self.view[which],
-            self.radiance[which], self.weight[which],
+            self.radiance[which], self.weight[which], self.material[which],
         )  # fmt: skip
 
 
@@ -43,20 +45,24 @@ def draw_pixels(
     rays: RayScene,
     camera: Camera,
     radiance: NDArray[np.float32],
-    usable: NDArray[np.bool_],
+    material: NDArray[np.int16],
     count: int,
     rng: np.random.Generator,
 ) -> Seen:
-    """Up to ``count`` pixels of a photo: radiance (h, w, 3), usable (h, w)."""
+    """Up to ``count`` pixels of a photo: radiance (h, w, 3); material (h, w): place of each pixel's
+    material, −1 for what must not be used."""
     edge = REACH + BOX
-    rows, columns = np.indices((camera.height - 2 * edge, camera.width - 2 * edge))
-    where = rng.permutation(rows.size)[: 40 * count]  # most of a photo may be background
-    row, column = rows.ravel()[where] + edge, columns.ravel()[where] + edge
-    found: list[Seen] = []
+    inside = max(camera.height - 2 * edge, 0), max(camera.width - 2 * edge, 0)
+    pixels = inside[0] * inside[1]
+    # most of a photo may be background
+    where = rng.choice(max(pixels, 1), min(pixels, 40 * count), replace=False)
+    row, column = np.divmod(where, max(inside[1], 1))
+    row, column = row + edge, column + edge
+    found = [_calm(rays, camera, radiance, material, row[:0], column[:0])]
     drawn = 0
     for begin in range(0, len(where), 8 * count):
         part = slice(begin, begin + 8 * count)
-        found.append(_calm(rays, camera, radiance, usable, row[part], column[part]))
+        found.append(_calm(rays, camera, radiance, material, row[part], column[part]))
         drawn += len(found[-1].radiance)
         if drawn >= count:
             break
@@ -67,6 +73,7 @@ def draw_pixels(
         view=np.concatenate([s.view for s in found])[:count],
         radiance=np.concatenate([s.radiance for s in found])[:count],
         weight=np.concatenate([s.weight for s in found])[:count],
+        material=np.concatenate([s.material for s in found])[:count],
     )
 
 
@@ -74,7 +81,7 @@ def _calm(
     rays: RayScene,
     camera: Camera,
     radiance: NDArray[np.float32],
-    usable: NDArray[np.bool_],
+    material: NDArray[np.int16],
     row: NDArray[np.intp],
     column: NDArray[np.intp],
 ) -> Seen:
@@ -89,7 +96,7 @@ def _calm(
         directions = camera.rays(pixels)
         start = camera.ray_starts(pixels)
         if camera.orthographic:
-            start = start - directions * (rays.reach(start) + rays.mesh.size)
+            start = rays.just_before(start, directions)
         hits = rays.first_hits(start, np.nan_to_num(directions, nan=1.0))
         hit = (hits.face >= 0) & np.isfinite(directions).all(axis=1)
         keep[some[~hit]] = False
@@ -102,18 +109,22 @@ def _calm(
             same = np.einsum("ij,ij->i", normal, centre[some[hit]]) > CALM
             keep[some[hit][~same]] = False
     window = range(-BOX, BOX + 1)
-    light, whole = np.zeros(len(row)), np.ones(len(row), bool)
+    light, whole = np.zeros(len(row)), material[row, column] >= 0
     for down in window:
         for right in window:
             light += radiance[row + down, column + right].mean(axis=1)
-            whole &= usable[row + down, column + right]
+            whole &= material[row + down, column + right] == material[row, column]
     keep &= whole & (light > 0)
     hits = Hits(face[keep], u[keep].astype(np.float32), v[keep].astype(np.float32))
     mean = light[keep] / len(window) ** 2
-    return Seen(camera, rays.points(hits), centre[keep], -along[keep], mean, np.ones(len(mean)))
+    return Seen(
+        camera, rays.points(hits), centre[keep], -along[keep], mean, np.ones(len(mean)),
+        material[row, column][keep],
+    )  # fmt: skip
 
 
 def not_dark(seen: list[Seen]) -> list[Seen]:
     """Without what is nearly black in all photos together."""
-    bright = float(np.percentile(np.concatenate([s.radiance for s in seen]), 95))
+    together = np.concatenate([s.radiance for s in seen])
+    bright = float(np.percentile(together, 95)) if together.size else 0.0
     return [s.select(s.radiance > DARK * bright) for s in seen]

@@ -45,8 +45,8 @@ class SunEntry:
 
 @dataclass(frozen=True)
 class WhiteEntry:
-    """A white matte target in a photo. camera: label of the scan camera it was taken with, needed
-    without a normal; normal: (3,) scan frame; None: it faces the light."""
+    """A white matte target in a photo. normal: (3,) scan frame; None: it faces the light. exposure:
+    the photo's, in the unit of the lit photos' exposures."""
 
     photo: Path
     mask: Path

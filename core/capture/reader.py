@@ -56,6 +56,13 @@ def read_capture(path: Path) -> Capture:
             place,
             "irradiance" if lights[place].distant else "intensity",
         )
+    if lights and not any(known) and len({light.distant for light in lights}) > 1:
+        place = next(i for i, light in enumerate(lights) if not light.distant)
+        raise top.error(
+            "near and distant lights of unknown strength have no common scale: give irradiance and "
+            "intensity",
+            "light", place, "intensity",
+        )  # fmt: skip
     photos = tuple(
         read_photo_entry(section, {light.name for light in lights}, {m.name for m in materials})
         for section in top.tables("photo")

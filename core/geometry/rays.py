@@ -75,9 +75,13 @@ class RayScene:
             blocked[part] = np.asarray(found) >= 0
         return blocked
 
-    def reach(self, start: NDArray[np.float64]) -> float:
-        """How far the mesh's centre is from the middle of ``start`` (n, 3)."""
-        return float(np.linalg.norm(start.mean(axis=0) - self.origin))
+    def just_before(
+        self, start: NDArray[np.float64], directions: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """(n, 3) ``start`` moved along ``directions`` (n, 3) to just before the mesh: rays without
+        a camera's centre may start anywhere, and Embree's float32 wants them to start near."""
+        along = np.einsum("ij,ij->i", self.origin - start, directions) - self.mesh.size
+        return start + along[:, None] * directions
 
     def points(self, hits: Hits) -> NDArray[np.float64]:
         """(n, 3) surface points of hits (all must hit)."""

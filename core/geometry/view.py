@@ -52,7 +52,7 @@ def view_surface(rays: RayScene, camera: Camera) -> SurfaceView:
     directions = camera.rays(pixels)
     start = camera.ray_starts(pixels)
     if camera.orthographic:  # its rays come from behind all of the object
-        start = start - directions * (rays.reach(start) + rays.mesh.size)
+        start = rays.just_before(start, directions)
     blind = ~np.isfinite(directions).all(axis=1)  # corners that the lens does not reach
     directions[blind] = -directions[~blind][0] if (~blind).any() else 1.0
     hits = rays.first_hits(start, directions)

@@ -114,8 +114,13 @@ class FitJob(Job):
         photos = LitPhotos.open(capture)
         lights = find_lights(capture, scan, photos)
         if any(entry.refine for entry in capture.lights):
-            yield Step("refining the lights", 0.04)
-            lights = refined(lights, capture, scan, photos, rays, basis)
+            steps = refined(lights, capture, scan, photos, rays, basis)
+            while True:
+                try:
+                    yield Step("refining the lights", 0.03 + 0.02 * next(steps))
+                except StopIteration as end:
+                    lights = end.value
+                    break
         taken = yield from self._take_samples(scan, rays, photos, lights)
         results = []
         known = lights.known and capture.fit.absolute

@@ -133,6 +133,10 @@ def with_painted_faces(capture: Capture, scan: Scan) -> Scan:
         except PatinaError as error:
             raise capture.error(str(error), "material", places[0], key) from error
         painted = np.where(found >= 0, np.array(places, np.int32)[found], painted)
+    for place, material in enumerate(capture.materials):
+        if face_attribute(material) == PAINTED and not (painted == place).any():
+            key = "vertex_colour" if material.vertex_colour is not None else "texture_colour"
+            raise capture.error("no face of the mesh has this colour", "material", place, key)
     if (painted < 0).all():
         return scan
     attributes = {**scan.mesh.face_attributes, PAINTED: painted.astype(np.int32)}

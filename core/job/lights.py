@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..basis import Basis
-from ..calibrate.refine import refine_lights
+from ..calibrate.refine import Refined, refine_lights
 from ..calibrate.seen import Seen, draw_pixels
 from ..capture import Capture, ChartEntry, LightEntry, SphereEntry, SunEntry, WhiteEntry
 from ..errors import InputError, PatinaError
-from ..geometry import RayScene
+from ..geometry import RayScene, view_surface
 from ..light import DistantLight, Light, MountedLight, NearLight
 from ..light.sphere import light_from_sphere
 from ..light.sphere_outline import Circle
@@ -23,7 +24,7 @@ from ..light.sun_time import photo_place, photo_time
 from ..light.white import irradiance_from_white
 from ..photo import read_mask
 from ..photo.image import attributes
-from ..scan import Scan
+from ..scan import Camera, Scan
 from ..scan.scan import find_camera
 from . import inputs
 from .photos import LitPhotos
@@ -32,6 +33,7 @@ Array = NDArray[np.float64]
 
 SUN_RADIUS = np.radians(0.2666)  # mean angular radius
 LEAST_COSINE = 0.1  # of a chart with its light
+LONGEST_SUN = 120.0  # seconds that photos under one sun may be apart: half a degree
 MOST_CLIPPED = 0.02  # of a white target's pixels
 PIXELS = 1000  # of each photo, for refining
 
@@ -68,19 +70,57 @@ def find_lights(capture: Capture, scan: Scan, photos: LitPhotos) -> Lights:
 
 def refined(
     lights: Lights, capture: Capture, scan: Scan, photos: LitPhotos, rays: RayScene, basis: Basis
-) -> Lights:
-    """The lights marked ``refine`` moved to where one material explains all photos best."""
+) -> Generator[float, None, Lights]:
+    """The lights marked ``refine`` moved to where the materials explain all photos best. Yields the
+    fraction done; raises InputError where the photos show too little."""
     free = [entry.name for entry in capture.lights if entry.refine]
     rng = np.random.default_rng(0)
     seen: list[tuple[str, Seen]] = []
     for place, photo in enumerate(capture.photos):
+        yield 0.3 * place / len(capture.photos)
         lit = photos.read(place)
         camera = inputs.camera_of(capture, scan, place)
-        seen.append((photo.light, draw_pixels(rays, camera, lit.radiance, lit.usable, PIXELS, rng)))
-    found = refine_lights(lights.by_name, free, seen, rays, basis)
+        material = _materials(capture, scan, rays, camera, place)
+        material[~lit.usable] = -1
+        seen.append((photo.light, draw_pixels(rays, camera, lit.radiance, material, PIXELS, rng)))
+    steps = refine_lights(lights.by_name, free, seen, rays, basis)
+    try:
+        while True:
+            try:
+                yield 0.3 + 0.7 * next(steps)
+            except StopIteration as end:
+                found: Refined = end.value
+                break
+    except PatinaError as error:
+        first = next(i for i, entry in enumerate(capture.lights) if entry.refine)
+        raise capture.error(str(error), "light", first, "refine") from error
+    notes = [*lights.notes, *found.notes]
+    notes += [
+        f"light {entry.name!r}: its white target was read with the direction before refining"
+        for entry in capture.lights
+        if entry.refine and entry.white is not None and entry.white.normal is not None
+    ]
     return replace(
-        lights, by_name=found.lights, moved=found.moved, unexplained=(found.before, found.after)
-    )
+        lights, by_name=found.lights, moved=found.moved,
+        unexplained=(found.before, found.after), notes=tuple(notes),
+    )  # fmt: skip
+
+
+def _materials(
+    capture: Capture, scan: Scan, rays: RayScene, camera: Camera, place: int
+) -> NDArray[np.int16]:
+    """(h, w) place of each pixel's material, −1 in masked shadow and where there is none."""
+    shape = camera.height, camera.width
+    only = capture.materials[0]
+    whole = not (only.by_mesh or capture.named_by_masks(only.name) or capture.photos[place].masks)
+    if whole and len(capture.materials) == 1:
+        return np.zeros(shape, np.int16)
+    view = view_surface(rays, camera)
+    where, shadow = inputs.material_pixels(capture, scan, view, place)
+    found = np.full(shape[0] * shape[1], -1, np.int16)
+    for index, material in enumerate(capture.materials):
+        found[view.pixel[where[material.name] & ~shadow]] = index
+    return found.reshape(shape)
 
 
 def _light(
@@ -182,6 +222,7 @@ def _from_sun(capture: Capture, scan: Scan, light: LightEntry) -> tuple[Array, S
     if time is None:
         told = photo_time(tags)
         time = told.time
+        _check_times(capture, light.name, time)
         said += [f"time {time.isoformat()} from the photo's {told.source}", *told.notes]
     geo = scan.georeference
     latitude, longitude, altitude = entry.latitude, entry.longitude, entry.altitude
@@ -212,9 +253,24 @@ def _from_sun(capture: Capture, scan: Scan, light: LightEntry) -> tuple[Array, S
     return sun_in_scan(sun.enu, north, up), said
 
 
+def _check_times(capture: Capture, light: str, first: datetime) -> None:
+    """Refuse photos under one sun that were taken too long after one another."""
+    for place, photo in enumerate(capture.photos):
+        if photo.light != light:
+            continue
+        away = abs((photo_time(attributes(photo.file)).time - first).total_seconds())
+        if away > LONGEST_SUN:
+            raise InputError(
+                f"{capture.photo_name(place)} was taken {away / 60:.0f} minutes from the light's "
+                "first photo, and the sun moves a degree in four: give a [[light]] for each time"
+            )
+
+
 def _from_white(
     photos: LitPhotos, entry: WhiteEntry, direction: Array
 ) -> tuple[Array, Sequence[str]]:
+    if entry.exposure is None:
+        photos.check_comparable(entry.photo)
     lit = photos.read_other(entry.photo, entry.exposure)
     mask = read_mask(entry.mask)
     if mask.shape != lit.usable.shape:

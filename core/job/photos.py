@@ -14,16 +14,16 @@ from ..capture import Capture
 from ..errors import InputError, PatinaError
 from ..photo import read_encoded
 from ..photo.bracket import merge_bracket
-from ..photo.exif import read_exif
+from ..photo.exif import Exif, read_exif
 from ..photo.photo import read_photo
 from ..photo.transfer import Transfer
 
 
 @dataclass(frozen=True)
 class LitPhoto:
-    """radiance: (h, w, 3) float32 linear, divided by its exposure. usable: (h, w) neither clipped
-    nor, of a bracket, lost in noise. variance: (h, w, 3) of a bracket, else None. notes: how its
-    numbers were read, sentences."""
+    """radiance: (h, w, 3) float32 linear, divided by its exposure. usable: (h, w) not clipped, in a
+    bracket not in all of it. variance: (h, w, 3) of a bracket, else None. notes: how its numbers
+    were read, sentences."""
 
     radiance: NDArray[np.float32]
     usable: NDArray[np.bool_]
@@ -80,6 +80,17 @@ class LitPhotos:
             exposure = self.exposure_of(file)
         return LitPhoto(photo.radiance / np.float32(exposure), ~photo.clipped)
 
+    def check_comparable(self, file: Path) -> None:
+        """Refuse a photo whose exposure against the lit ones is not known. Raises InputError."""
+        if self.first is not None:
+            if read_exif(file).relative_exposure is None:
+                raise InputError(
+                    f"{file.name} does not say how it was exposed, the lit photos do: give its "
+                    "exposure relative to the first of them"
+                )
+        elif any(e != 1.0 for photo in self.exposures for e in photo):
+            raise InputError(f"the lit photos' exposures are given: give that of {file.name} too")
+
     def exposure_of(self, file: Path) -> float:
         """EXIF's exposure of another photo relative to the first lit one; 1 where it is unknown."""
         own = None if self.first is None else read_exif(file).relative_exposure
@@ -112,33 +123,55 @@ def _exposures(
 ) -> tuple[tuple[tuple[float, ...], ...], float | None, tuple[str, ...]]:
     """(exposures of every photo's files, EXIF's exposure that counts as 1, notes).
 
-    What the capture file gives is taken as it is. Where it gives none, EXIF is asked: the first
-    photo's exposure is 1 and the others are relative to it, so that numbers of the user's (an
-    irradiance) keep the unit of that photo's pixels.
+    What the capture file gives is taken as it is. Where it gives none at all, EXIF is asked: the
+    first photo's exposure is 1 and the others are relative to it, so that numbers of the user's (an
+    irradiance) keep the unit of that photo's pixels. The two units do not mix.
     """
-    asked = [file for photo in capture.photos if photo.exposures is None for file in photo.files]
-    told = {file: read_exif(file).relative_exposure for file in asked}
-    silent = [file for file in asked if told[file] is None]
-    notes: tuple[str, ...] = ()
-    if silent and len(silent) < len(asked):
-        place = next(i for i, p in enumerate(capture.photos) if silent[0] in p.files)
+    given = [photo.exposures is not None for photo in capture.photos]
+    asked = [(i, f) for i, p in enumerate(capture.photos) if not given[i] for f in p.files]
+    told = {file: read_exif(file) for _, file in asked}
+    silent = [(i, f) for i, f in asked if told[f].relative_exposure is None]
+    speaking = len(silent) < len(asked)
+    if speaking and any(given):
         raise capture.error(
-            f"{silent[0].name} does not say how it was exposed, other photos do: give its exposure",
+            "the exposure is given here, other photos have EXIF's, which is in another unit: give "
+            "all or none",
+            "photo", given.index(True), "exposure",
+        )  # fmt: skip
+    if speaking and silent:
+        place, file = silent[0]
+        raise capture.error(
+            f"{file.name} does not say how it was exposed ({', '.join(told[file].missing)} "
+            "missing), other photos do: give the exposure of all",
             "photo", place, "exposure",
         )  # fmt: skip
-    first = None if silent or not asked else told[asked[0]]
-    if first is not None and len({round(told[file] / first, 3) for file in asked}) > 1:  # type: ignore[operator]
-        notes = (f"exposures are EXIF's, relative to {asked[0].name}",)
-    exposures = []
-    for place, photo in enumerate(capture.photos):
-        if photo.exposures is not None:
-            exposures.append(photo.exposures)
-            continue
-        if first is None and len(photo.files) > 1:
-            raise capture.error(
-                "these exposures of one viewpoint do not say how they were exposed: give exposure "
-                "= [...], one a file",
-                "photo", place, "exposure",
-            )  # fmt: skip
-        exposures.append(tuple((told[f] or 1.0) / (first or 1.0) for f in photo.files))
-    return tuple(exposures), first, notes
+    if not speaking:
+        for place, photo in enumerate(capture.photos):
+            if photo.exposures is None and len(photo.files) > 1:
+                raise capture.error(
+                    "these exposures of one viewpoint do not say how they were exposed: give "
+                    "exposure = [...], one a file",
+                    "photo", place, "exposure",
+                )  # fmt: skip
+        return tuple(p.exposures or (1.0,) for p in capture.photos), None, ()
+    _check_flash(capture, told)
+    first = told[asked[0][1]].relative_exposure or 1.0
+    exposures = tuple(
+        tuple((told[f].relative_exposure or first) / first for f in p.files) for p in capture.photos
+    )
+    differ = len({round(e, 3) for photo in exposures for e in photo}) > 1
+    notes = (f"exposures are EXIF's, relative to {asked[0][1].name}",) if differ else ()
+    return exposures, first, notes
+
+
+def _check_flash(capture: Capture, told: dict[Path, Exif]) -> None:
+    """Refuse to divide a flash's light by shutter times: it does not depend on them."""
+    mounted = {light.name for light in capture.lights if light.mounted is not None}
+    places = [i for i, photo in enumerate(capture.photos) if photo.light in mounted]
+    times = {told[file].exposure_time for i in places for file in capture.photos[i].files}
+    if len(times) > 1:
+        raise capture.error(
+            "these photos' exposure times differ, and a flash's light does not depend on them: "
+            "give exposure for all photos (ISO / f-number² for a flash, 1 where these are equal)",
+            "photo", places[0], "exposure",
+        )  # fmt: skip

@@ -12,7 +12,7 @@ from ..capture import Capture
 from ..errors import FitError
 from ..geometry import RayScene, view_surface
 from ..job import inputs
-from ..job.job import Job, Step
+from ..job.job import Job, Step, drained
 from ..job.lights import Lights, find_lights, refined
 from ..job.photos import LitPhotos
 from ..samples import sample_photo
@@ -40,7 +40,7 @@ def standing_lights(
     """The capture's lights; those to be refined are, as if all were one material."""
     lights = find_lights(capture, scan, photos)
     if any(entry.refine for entry in capture.lights):
-        lights = refined(lights, capture, scan, photos, rays, basis)
+        lights = drained(refined(lights, capture, scan, photos, rays, basis))
     return lights
 
 

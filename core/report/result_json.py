@@ -48,6 +48,9 @@ def describe(
         },
         "capture": str(result.capture.file),
         "notes": list(result.notes),
+        "unexplained_by_lights": None
+        if result.lights.unexplained is None
+        else dict(zip(("before", "after"), result.lights.unexplained, strict=True)),
         "lights": [_light(result, light) for light in result.lights.by_name.values()],
         "materials": [_material(result, m) for m in result.materials],
         "warnings": list(notes),

@@ -111,7 +111,8 @@ def test_exif_of_a_photo_places_the_sun(ball: Path, shared: Path) -> None:
     """The drone photo's time has no zone of its own: its GPS time is used, or asked for."""
     photo = shared / "data" / "real" / "brighton_sun.jpg"
     path = with_light(ball, "sun = {north = [0, 1, 0], up = [0, 0, 1]}")
-    path.write_text(path.read_text().replace('"lit_1.exr"', f'"{photo}"\nexposure = 1.0'))
+    text = path.read_text().replace('"lit_1.exr"', f'"{photo}"')
+    path.write_text(text.replace("camera = ", "exposure = 1.0\ncamera = "))
     with pytest.raises(InputError, match=r"sun.*(zone|time)"):
         lights_of(path)
     time = 'time = "2016-06-23T16:33:00-05:00"'
@@ -192,6 +193,53 @@ def test_exif_exposures_count_from_the_first(ball: Path) -> None:
     assert photos.exposures[0] == (1.0,) and photos.exposures[1] == pytest.approx((0.25,), rel=1e-3)
     first, second = photos.read(0).radiance, photos.read(1).radiance
     assert second.mean() / first.mean() == pytest.approx(0.1500 / 0.5776 * 4, rel=0.02)
+
+
+def test_exposures_of_two_units_do_not_mix(ball: Path) -> None:
+    pixels = np.full((90, 120, 3), 128, np.uint8)
+    text = ball.read_text()
+    for i in range(1, 7):
+        write_jpeg(ball.parent / f"{i}.jpg", pixels, exposure=1 / 60)
+        text = text.replace(f'"lit_{i}.exr"', f'"{i}.jpg"')
+    ball.write_text(text.replace('file = "1.jpg"', 'file = "1.jpg"\nexposure = 1.0'))
+    with pytest.raises(InputError, match=r"photo 1\.exposure.*another unit"):
+        LitPhotos.open(read_capture(ball))
+
+
+def test_a_flash_does_not_depend_on_the_shutter(ball: Path) -> None:
+    path = with_light(ball, "mounted = [0, 0, 0]")
+    text = path.read_text()
+    for i in range(1, 7):
+        exposure = 1 / 60 if i == 1 else 1 / 125
+        pixels = np.full((90, 120, 3), 128, np.uint8)
+        write_jpeg(ball.parent / f"{i}.jpg", pixels, exposure)
+        text = text.replace(f'"lit_{i}.exr"', f'"{i}.jpg"')
+    path.write_text(text)
+    with pytest.raises(InputError, match="a flash's light does not depend"):
+        LitPhotos.open(read_capture(path))
+
+
+def test_a_colour_that_no_face_wears(ball: Path) -> None:
+    vertices, faces = made.sphere_mesh(2)
+    lines = ["ply", "format ascii 1.0", f"element vertex {len(vertices)}"]
+    lines += [f"property double {axis}" for axis in "xyz"]
+    lines += [f"property uchar {c}" for c in ("red", "green", "blue")]
+    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+    lines += [" ".join(f"{x:.9g}" for x in position) + " 10 10 250" for position in vertices]
+    lines += ["3 " + " ".join(map(str, face)) for face in faces]
+    (ball.parent / "mesh.ply").write_text("\n".join(lines) + "\n")
+    ball.write_text(ball.read_text() + '[[material]]\nname = "a"\nvertex_colour = [255, 0, 0]\n')
+    with pytest.raises(InputError, match=r"material 1\.vertex_colour.*no face"):
+        inputs.open_scan(read_capture(ball))
+
+
+def test_near_and_distant_lights_need_strengths(ball: Path) -> None:
+    text = ball.read_text().replace("irradiance = [3.0, 3.0, 3.0]\n", "")
+    first = text.index("direction")
+    end = text.index("\n", first)
+    ball.write_text(text[:first] + "position = [3, 3, 3]" + text[end:])
+    with pytest.raises(InputError, match=r"light 1\.intensity.*no common scale"):
+        read_capture(ball)
 
 
 def test_clipped_pixels_are_no_samples(ball: Path) -> None:

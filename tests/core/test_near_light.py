@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 
 from patina.core.basis import Basis
 from patina.core.capture import read_capture
+from patina.core.errors import InputError
 from patina.core.geometry import RayScene
 from patina.core.job import inputs
+from patina.core.job.job import drained
 from patina.core.job.lights import find_lights, refined
 from patina.core.job.photos import LitPhotos
 from patina.core.light import DistantLight, MountedLight, NearLight
@@ -122,7 +124,7 @@ def refined_lights(path: Path):
     photos = LitPhotos.open(capture)
     lights = find_lights(capture, scan, photos)
     rays = RayScene.build(scan.mesh)
-    return refined(lights, capture, scan, photos, rays, Basis.default())
+    return drained(refined(lights, capture, scan, photos, rays, Basis.default()))
 
 
 def test_a_flash_is_found_from_the_photos(flash_photos: Path) -> None:
@@ -140,6 +142,55 @@ def test_a_flash_is_found_from_the_photos(flash_photos: Path) -> None:
     assert after < 0.5 * before
     errors = [error for _, error in found.moved["lamp"].values()]
     assert np.isfinite(errors).all() and errors[0] < 0.15
+
+
+def seen_off(offset: np.ndarray) -> float:
+    """Degrees between where a flash is and where it was found, as the object sees it. Outwards and
+    backwards together change little, and the photos say little of it."""
+    ball = np.array([0, 0, made.DISTANCE])
+    a, b = (x - ball for x in (offset, OFFSET))
+    return float(np.degrees(np.arccos(a @ b / np.linalg.norm(a) / np.linalg.norm(b))))
+
+
+def test_a_known_intensity_does_not_pull_the_flash(flash_photos: Path) -> None:
+    """From the true place with the true strength, refining stays there."""
+    path = flash_photos.with_name("known.capture.toml")
+    path.write_text(flash_photos.read_text().replace("mounted", "refine = true\nmounted"))
+    assert seen_off(refined_lights(path).by_name["lamp"].offset) < 1.0
+
+
+def test_two_materials_are_told_apart(tmp_path: Path) -> None:
+    """Half of the sphere is another material: one for both would move the light."""
+    path = written(tmp_path, "mounted", [0, 0, 0], flash, "refine = true")
+    vertices, faces = made.sphere_mesh()
+    right = vertices[faces].mean(axis=1)[:, 0] > made.CENTRE[0]
+    made.write_ply(tmp_path / "mesh.ply", vertices, faces, face_attribute=right.astype(int))
+
+    def two(normal, light, view):
+        gloss = made.blinn(normal, light, view)
+        return np.where((normal[:, :1] > 0), gloss, 0.5 * np.ones(3))
+
+    for i, (rotation, translation) in enumerate(made.poses(6), start=1):
+        lamp = (flash(rotation, translation), INTENSITY)
+        lit = made.photo(rotation, translation, None, lamp=lamp, brdf=two)
+        made.write_exr(tmp_path / f"lit_{i}.exr", lit)
+    materials = "".join(f'[[material]]\nname = "{name}"\nfaces = "part"\n' for name in "ab")
+    path.write_text(path.read_text() + materials)
+    assert seen_off(refined_lights(path).by_name["lamp"].offset) < 1.5
+
+
+def test_too_little_to_refine_from_is_said(flash_photos: Path) -> None:
+    text = flash_photos.read_text().replace(f"intensity = {[INTENSITY] * 3}", "refine = true")
+    text = text.replace(str(OFFSET.tolist()), "[0, 0, 0]\nbeam = 5")
+    path = flash_photos.with_name("narrow.capture.toml")
+    path.write_text(text)
+    assert refined_lights(path).by_name["lamp"] is not None  # a narrow beam is a start like others
+    for i in range(1, 7):
+        made.write_exr(flash_photos.with_name(f"black_{i}.exr"), np.zeros((90, 120, 3)))
+        text = text.replace(f'"lit_{i}.exr"', f'"black_{i}.exr"')
+    path.write_text(text)
+    with pytest.raises(InputError, match=r"light 1\.refine.*0 pixels"):
+        refined_lights(path)
 
 
 def test_a_near_lamp_is_found_from_the_photos(tmp_path: Path) -> None:
