@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import tomllib
 from pathlib import Path
 
-from ..core.capture.lines import key_lines
-from ..core.capture.section import Section
+from ..core.capture.reader import read_scan_entry
 from ..core.errors import InputError, PatinaError
 from ..core.scan import Camera, Mesh
 from ..core.scan.formats import read_reconstruction
@@ -72,16 +70,6 @@ def _photos(given: list[Path]) -> list[Path]:
     return found
 
 
-def _scan_section(path: Path) -> Section:
-    """[scan] of a capture file, which may lack all that comes after localising: lights, photos."""
-    try:
-        text = path.read_text("utf-8-sig")
-        data = tomllib.loads(text)
-    except (OSError, ValueError, RecursionError) as error:  # also what is no TOML, or no UTF-8
-        raise InputError(f"is not a capture file ({error})", file=path) from error
-    return Section(data, path.resolve(), key_lines(text)).table("scan")
-
-
 def _scan(
     told: argparse.Namespace,
 ) -> tuple[tuple[Camera, ...], Mesh | None, Path, Path | None, tuple[str, ...]]:
@@ -91,10 +79,9 @@ def _scan(
         for key in ("mesh", "images", "chunk"):
             if getattr(told, key) is not None:
                 raise InputError(f"a capture file says its {key} itself", key=f"--{key}")
-        entry = _scan_section(told.scan)
-        cameras, mesh = entry.file_path("cameras"), entry.file_path("mesh")
-        images = entry.optional_file_path("images")
-        chunk, frame = entry.optional_text("chunk"), entry.optional_text("frame")
+        entry = read_scan_entry(told.scan)
+        cameras, mesh, images = entry.cameras, entry.mesh, entry.images
+        chunk, frame = entry.chunk, entry.frame
     if images is None:
         raise InputError(
             "say where the scan's own photos lie: a new photo is found by comparing it with them",

@@ -37,6 +37,7 @@ class InputError(PatinaError):
         line: int | None = None,
     ) -> None:
         self.file, self.key, self.line = file, key, line
+        self.said = " ".join(message.split())  # without where, for whoever knows better where
         where = "" if file is None else str(file) if line is None else f"{file}:{line}"
         head = ": ".join(part for part in (where, key and f"[{key}]") if part)
         super().__init__(" ".join(f"{head}: {message}".split()) if head else message)

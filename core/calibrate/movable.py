@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import PatinaError
 from ..light import DistantLight, Light, MountedLight, NearLight
 
 Array = NDArray[np.float64]
@@ -35,6 +36,11 @@ def movable(light: Light, reach: float) -> Movable:
     """
     if isinstance(light, DistantLight):
         return _direction(light)
+    if isinstance(light, MountedLight) and np.linalg.norm(light.offset) > 3 * reach:
+        raise PatinaError(
+            f"the flash is said to be {np.linalg.norm(light.offset):.3g} units from the lens, the "
+            f"surface is {reach:.3g} away: expected an offset in scan units"
+        )
     if isinstance(light, NearLight):
         near = light
         wide = np.full(3, 2 * reach)

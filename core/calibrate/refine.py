@@ -104,6 +104,11 @@ def _described(problem: _Problem, x: Array, errors: Array, before: float, after:
         pairs = zip(one.names, values, spread, strict=True)
         moved[name] = {label: (float(value), float(error)) for label, value, error in pairs}
         at += k
+    if np.isnan(errors).all():
+        notes.append(
+            "no standard errors of the refined lights: they come from leaving photos out, of one "
+            "light for three photos and more"
+        )
     if not after < before:
         notes.append("refining the lights explains the photos no better than before")
     return Refined(problem.lights(x), moved, before, after, tuple(notes))

@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..light.sun_time import parse_time
 from .entries import LightEntry, SphereEntry, SunEntry, WhiteEntry
-from .section import Section
+from .section import Section, shown
+
+LARGEST_SIDE = 131_072.0  # pixels
+LARGEST = 1e9  # scan units
 
 WAYS = ("direction", "sphere", "sun", "position", "mounted")
 
@@ -31,7 +34,7 @@ def read_light(section: Section) -> LightEntry:
     if distant:
         angle = np.radians(section.number("angle", 0.0, 0.0, 90.0)) if "angle" in section else None
     else:
-        radius = section.number("radius", 0.0, 0.0)
+        radius = section.number("radius", 0.0, 0.0, LARGEST)
     if way == "mounted" and "beam" in section:
         beam = float(np.radians(section.number("beam", 45.0, 1.0, 180.0)))
     entry = LightEntry(
@@ -77,14 +80,14 @@ def _strength(section: Section, key: str, distant: bool) -> NDArray[np.float64] 
         raise section.error("a white target gives the irradiance of a distant light only", "white")
     strength = section.vector(key, "red, green, blue")
     if strength is not None and not (strength > 0).all():
-        raise section.error(f"found {strength.tolist()}, expected positive numbers", key)
+        raise section.error(f"found {shown(strength.tolist())}, expected positive numbers", key)
     return strength
 
 
 def _sphere(section: Section) -> SphereEntry:
     photo, camera = section.file_path("photo"), section.text("camera")
     centre = section.numbers("center", 2)
-    radius = section.number("radius", 0.0, 1.0) if "radius" in section else None
+    radius = section.number("radius", 0.0, 1.0, LARGEST_SIDE) if "radius" in section else None
     mask = section.optional_file_path("mask")
     surface = section.optional_text("surface") or "chrome"
     mirror = section.number("reflectance", 0.6, 0.01, 1.0) if "reflectance" in section else None
@@ -109,11 +112,11 @@ def _sun(section: Section) -> SunEntry:
     time = section.get("time")
     if time is not None:
         if not isinstance(time, str | datetime):
-            raise section.error(f"found {time!r}, expected a time with its zone", "time")
+            raise section.error(f"found {shown(time)}, expected a time with its zone", "time")
         try:
             time = parse_time(time)
         except InputError as error:
-            raise section.error(str(error), "time") from error
+            raise section.error(error.said, "time") from error
     entry = SunEntry(
         latitude=optional("latitude", -90.0, 90.0),
         longitude=optional("longitude", -180.0, 360.0),

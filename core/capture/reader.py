@@ -29,15 +29,8 @@ LONGEST_LINE = 10_000
 
 def read_capture(path: Path) -> Capture:
     """The capture in a file. Raises InputError naming the key and the line."""
-    text = _text(path)
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"is not valid TOML ({error})", file=path) from error
-    except (ValueError, RecursionError) as error:  # a number or a nest beyond all bounds
-        raise InputError(f"is not a capture file ({error})", file=path) from error
-    lines = key_lines(text)
-    top = Section(data, path.resolve(), lines)
+    top = open_capture(path)
+    lines = top.lines
 
     scan = _scan(top.table("scan"))
     tone = read_tone(top.table("tone"))
@@ -83,6 +76,23 @@ def read_capture(path: Path) -> Capture:
         fit=fit,
         lines=lines,
     )
+
+
+def open_capture(path: Path) -> Section:
+    """The whole file as a table to be read key by key. Raises InputError."""
+    text = _text(path)
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"is not valid TOML ({error})", file=path) from error
+    except (ValueError, RecursionError) as error:  # a number or a nest beyond all bounds
+        raise InputError(f"is not a capture file ({error})", file=path) from error
+    return Section(data, path.resolve(), key_lines(text))
+
+
+def read_scan_entry(path: Path) -> ScanEntry:
+    """[scan] of a file that may lack all that comes after: lights, photos. Raises InputError."""
+    return _scan(open_capture(path).table("scan"))
 
 
 def _charted(
@@ -219,7 +229,7 @@ def _fit(section: Section) -> FitOptions:
             curvature=curvature if curvature > 0 else None,  # 0 switches the test off
             monotonicity=section.flag("monotonicity", paper.monotonicity),
             highest_intensity=section.flag("highest_intensity", paper.highest_intensity),
-            eta=section.number("eta", paper.eta, 0.0),
+            eta=section.number("eta", paper.eta, 0.0, 1e9),
             seed=section.integer("seed", paper.seed, 0),
         ),
         held_out=section.flag("held_out", True),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,7 @@ class Section:
         """A text that must be there."""
         value = self.get(name, required=True)
         if not isinstance(value, str) or not value:
-            raise self.error(f"found {value!r}, expected a text", name)
+            raise self.error(f"found {shown(value)}, expected a text", name)
         return value
 
     def optional_text(self, name: str) -> str | None:
@@ -59,7 +60,7 @@ class Section:
     def path_of(self, value: Any, name: str) -> Path:
         """The same, of one value of the key ``name``."""
         if not isinstance(value, str) or not value:
-            raise self.error(f"found {value!r}, expected a text", name)
+            raise self.error(f"found {shown(value)}, expected a text", name)
         path = Path(value)
         path = path if path.is_absolute() else self.file.parent / path
         try:
@@ -81,7 +82,7 @@ class Section:
         if value is None:
             return default
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.error(f"found {value!r}, expected a number", name)
+            raise self.error(f"found {shown(value)}, expected a number", name)
         if isinstance(value, int) and abs(value) > 1e300:  # no float holds it
             raise self.error(f"expected a number from {low:g} to {high:g}", name)
         if not (math.isfinite(value) and low <= value <= high):
@@ -93,7 +94,9 @@ class Section:
         if value is None:
             return default
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            raise self.error(f"found {value!r}, expected a whole number from {low} up", name)
+            raise self.error(
+                f"found {shown(value)}, expected a whole number from {low} to {high}", name
+            )
         return value
 
     def flag(self, name: str, default: bool) -> bool:
@@ -101,7 +104,7 @@ class Section:
         if value is None:
             return default
         if not isinstance(value, bool):
-            raise self.error(f"found {value!r}, expected true or false", name)
+            raise self.error(f"found {shown(value)}, expected true or false", name)
         return value
 
     def vector(self, name: str, parts: str = "x, y, z") -> NDArray[np.float64] | None:
@@ -116,7 +119,7 @@ class Section:
             and all(abs(x) <= LARGEST for x in value)  # also refuses NaN
         )
         if not good:
-            found = str(value) if len(str(value)) < 100 else "something else"
+            found = shown(value)
             raise self.error(f"found {found}, expected three numbers [{parts}]", name)
         return np.array(value, np.float64)
 
@@ -152,7 +155,7 @@ class Section:
         if value is None:
             value = {}
         if not isinstance(value, dict):
-            raise self.error(f"found {value!r}, expected a table", name)
+            raise self.error(f"found {shown(value)}, expected a table", name)
         return Section(value, self.file, self.lines, (*self.path, name))
 
     def tables(self, name: str) -> Iterator[Section]:
@@ -176,6 +179,15 @@ def _finite(values: list[Any]) -> bool:
     return all(
         isinstance(x, int | float) and not isinstance(x, bool) and abs(x) <= LARGEST for x in values
     )
+
+
+def shown(value: Any) -> str:
+    """A value for a message: short, whatever it is (Python refuses to write huge numbers)."""
+    try:
+        text = str(value) if isinstance(value, date) else repr(value)
+    except ValueError:
+        return "a number too large"
+    return text if len(text) < 100 else f"{text[:60]} …"
 
 
 def shortened(path: Path) -> str:

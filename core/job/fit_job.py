@@ -28,6 +28,7 @@ from .lights import Lights, find_lights, refined
 from .photos import LitPhotos
 from .warnings import black_photos, material_warnings, trust_warnings
 
+MANY_CLIPPED = 1e-3  # of a photo's lit pixels
 LEAST_RHO, LARGEST_RHO = 1e-6, 1e4  # 1/sr: black velvet has 1e-3, mirrors' peaks 1e4
 
 
@@ -134,7 +135,7 @@ class FitJob(Job):
             lights=lights,
             notes=(
                 *scan.notes,
-                *(f"{n} photos: {said}" for said, n in taken.notes.items()),
+                *(f"{n} photo{'s' * (n > 1)}: {said}" for said, n in taken.notes.items()),
                 *photos.notes,
                 *lights.notes,
                 *inputs.size_notes(capture, scan),
@@ -167,7 +168,14 @@ class FitJob(Job):
             where, in_shadow = inputs.material_pixels(capture, scan, view, place)
             trusted = trusted_pixels(view, lighting, capture.fit.margins) & ~in_shadow
             lit = photos.read(place)
-            trusted &= lit.usable.ravel()[view.pixel]
+            usable = lit.usable.ravel()[view.pixel]
+            clipped = int((trusted & ~usable).sum())
+            if clipped > MANY_CLIPPED * trusted.sum():
+                taken.notes[
+                    "lit pixels are clipped and left out: highlights are missing; expose less, or "
+                    "take a bracket"
+                ] += 1
+            trusted &= usable
             taken.notes.update(lit.notes)
             for index, material in enumerate(capture.materials):
                 pixels = where[material.name]
@@ -196,7 +204,7 @@ class FitJob(Job):
         try:
             fit = fit_paper(table, basis, capture.fit.paper)
         except FitError as error:
-            raise capture.error(str(error), "material", index, "name") from error
+            raise capture.error(str(error), *self._entry(index)) from error
         left_out = []
         unseen = photos_to_hold_out(table) if capture.fit.held_out else []
         for done, photo in enumerate(unseen):
@@ -254,7 +262,12 @@ class FitJob(Job):
             if seen_by[light.name] and lit_by[light.name] == 0:
                 raise self.capture.error(
                     f"the light {light.name!r} stands behind everything its photos see: no pixel "
-                    "is lit; direction points from the surface TO the light, in the scan's frame",
+                    "is lit; "
+                    + (
+                        "direction points from the surface TO the light, in the scan's frame"
+                        if light.distant
+                        else "expected its place outside the object, in scan units"
+                    ),
                     "light", place, _way(light),
                 )  # fmt: skip
 
@@ -267,9 +280,7 @@ class FitJob(Job):
                     f"the typical reflectance of {name!r} is {level:.3g} / sr, which no surface "
                     "has: check that light directions point from the surface TO the light, that "
                     "the photos are linear and not black, exposure and irradiance",
-                    "material",
-                    index,
-                    "name",
+                    *self._entry(index),
                 )
             return
         painted = self.capture.named_by_masks(name)
@@ -278,4 +289,9 @@ class FitJob(Job):
             if painted and marked == 0
             else f"none of the {marked} pixels of {name!r} is lit and away from shadow edges"
         )
-        raise self.capture.error(found, "material", index, "name")
+        raise self.capture.error(found, *self._entry(index))
+
+    def _entry(self, index: int) -> tuple[str | int, ...]:
+        """The key to speak of a material: its own, or the photos' where the file names none."""
+        own = ("material", index, "name")
+        return own if own in self.capture.lines else ("photo", 0, "file")

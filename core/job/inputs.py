@@ -32,7 +32,9 @@ def open_scan(capture: Capture) -> Scan:
         named = (error.key or "").removeprefix("scan.")
         key = named if named in ("frame", "chunk") else "cameras"
         if error.file is not None:
-            key = {said.mesh: "mesh", said.extra: "extra"}.get(Path(error.file), key)
+            at_fault = Path(error.file)
+            key = "mesh" if at_fault == said.mesh != said.cameras else key
+            key = "extra" if at_fault == said.extra else key
         raise capture.error(str(error), "scan", key) from error
     return with_painted_faces(capture, scan)
 

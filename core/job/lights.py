@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 
 SUN_RADIUS = np.radians(0.2666)  # mean angular radius
 LEAST_COSINE = 0.1  # of a chart with its light
+WORST_SPHERE = 3.0  # degrees of standard error that are no direction any more
 LONGEST_SUN = 120.0  # seconds that photos under one sun may be apart: half a degree
 MOST_CLIPPED = 0.02  # of a white target's pixels
 PIXELS = 1000  # of each photo, for refining
@@ -159,7 +160,9 @@ def _light(
             strength, more = _from_white(photos, entry.white, direction)
             said = [*said, *more]
     except PatinaError as error:
-        raise capture.error(str(error), "light", place, key) from error
+        said_where = isinstance(error, InputError) and error.file is None
+        message = error.said if said_where and isinstance(error, InputError) else str(error)
+        raise capture.error(message, "light", place, key) from error
     notes += [f"light {entry.name!r}: {sentence}" for sentence in said]
     return DistantLight(entry.name, direction, strength, radius)
 
@@ -183,8 +186,16 @@ def _from_sphere(
         outline = Circle((float(entry.centre[0]), float(entry.centre[1])), entry.radius)
     surface: Literal["chrome", "glossy"] = "glossy" if entry.surface == "glossy" else "chrome"
     found = light_from_sphere(lit.radiance, camera, outline, surface=surface)
+    spread = float(np.degrees(found.uncertainty))
+    if spread > WORST_SPHERE:
+        raise InputError(
+            f"the sphere gives the direction to ± {spread:.1f}° only: is all of it in the photo, "
+            "is its outline right? Give center and radius, or a mask"
+        )
+    main = found.highlights[0]
     said = [
-        f"direction from the sphere, ± {np.degrees(found.uncertainty):.2f}°",
+        f"direction from the sphere, ± {spread:.2f}°; its highlight at ({main.pixel[0]:.1f}, "
+        f"{main.pixel[1]:.1f}) is {2 * np.degrees(main.angular_radius):.2f}° wide",
         *found.notes,
     ]
     if entry.reflectance is None:
@@ -285,4 +296,10 @@ def _from_white(
     found = irradiance_from_white(
         lit.radiance, None, mask & lit.usable, entry.reflectance, normal, direction
     )
-    return found.irradiance, found.notes
+    numbers = ", ".join(
+        f"{e:.4g} ± {s:.2g}" for e, s in zip(found.irradiance, found.standard_error, strict=True)
+    )
+    said = [f"irradiance from the white target: {numbers}", *found.notes]
+    if entry.normal is None:
+        said.append("the white target is taken to face the light")
+    return found.irradiance, said

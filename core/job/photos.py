@@ -71,11 +71,18 @@ class LitPhotos:
             )
         except InputError as error:
             raise self.capture.error(str(error), "photo", place, "file") from error
-        return LitPhoto(merged.radiance, merged.valid, merged.variance, merged.warnings)
+        said = (f"{len(photo.files)} exposures merged", *merged.warnings)
+        return LitPhoto(merged.radiance, merged.valid, merged.variance, said)
 
     def read_other(self, file: Path, exposure: float | None = None) -> LitPhoto:
         """A photo of a sphere or a white target, in the same unit. Raises InputError."""
-        photo = read_photo(file, self._curve(None))
+        own = {photo.transfer for photo in self.capture.photos}
+        if len(own) > 1:
+            raise InputError(
+                f"the photos have different transfer curves, which is {file.name}'s? Give one for "
+                "all, [tone] transfer"
+            )
+        photo = read_photo(file, self._curve(own.pop()))
         if exposure is None:
             exposure = self.exposure_of(file)
         return LitPhoto(photo.radiance / np.float32(exposure), ~photo.clipped)

@@ -63,6 +63,14 @@ WRONG = {
         ["mounted = [0, 0, 0]",
          'white = {photo = "lit_1.exr", mask = "lit_1.exr", reflectance = 0.9}'], "distant light",
     ),
+    "a sphere beyond all": (
+        ['sphere = {photo = "lit_1.exr", camera = "view_01", center = [6, 4], radius = 1e300}'],
+        "expected a number from 1 to 131072",
+    ),
+    "a number Python will not write": (
+        [f"direction = [0x{'f' * 5000}, 0, 0]"], "a number too large|three numbers",
+    ),
+    "a text that is none": (["direction = [0, 0, 1]", f"refine = 0x{'f' * 5000}"], "too large"),
     "refine": (["direction = [0, 0, 1]", "refine = 1"], "true or false"),
 }  # fmt: skip
 
@@ -163,6 +171,18 @@ def test_a_chart_gives_the_irradiance(ball: Path) -> None:
     path.write_text(path.read_text().replace('light = "lamp", normal', 'light = "sun", normal'))
     with pytest.raises(InputError, match=r"tone\.chart.*no \[\[light\]\] is named 'sun'"):
         read_capture(path)
+
+
+def test_a_white_target_is_read_with_the_photos_curve(ball: Path) -> None:
+    """A 16-bit PNG of linear numbers says nothing of its own: the photos' transfer holds for it."""
+    folder = ball.parent
+    write_png16(folder / "white.png", np.full((60, 80, 3), 0.5))
+    made.write_png(folder / "mask.png", np.full((60, 80), 255))
+    target = 'white = {photo = "white.png", mask = "mask.png", reflectance = 0.9}'
+    path = with_light(ball, "direction = [0, 0, 1]", target)
+    path.write_text(path.read_text().replace("camera = ", 'transfer = "linear"\ncamera = '))
+    light = lights_of(path).by_name["lamp"]
+    assert light.irradiance == pytest.approx(np.full(3, np.pi * 0.5 / 0.9), rel=1e-3)
 
 
 def test_strengths_for_all_lights_or_none(ball: Path) -> None:
@@ -301,6 +321,16 @@ def test_photos_that_were_localised_later(ball: Path) -> None:
     (ball.parent / "later.cameras.json").write_text(json.dumps(extra))
     with pytest.raises(PatinaError, match=r"scan\.extra.*already"):
         inputs.open_scan(later)
+
+
+def write_png16(path: Path, pixels: np.ndarray) -> None:
+    import OpenImageIO as oiio
+
+    data = np.round(np.clip(pixels, 0, 1) * 65535).astype(np.uint16)
+    out = oiio.ImageOutput.create(str(path))
+    assert out.open(str(path), oiio.ImageSpec(data.shape[1], data.shape[0], 3, "uint16"))
+    out.write_image(data)
+    out.close()
 
 
 def write_jpeg(path: Path, pixels: np.ndarray, exposure: float) -> None:

@@ -195,7 +195,7 @@ def test_photos_of_no_light(tmp_path: Path, damage: str) -> None:
     factor = {"black": 0.0, "negative": -1.0, "far too bright": 1e9}[damage]
     for photo in path.parent.glob("*.exr"):
         made.write_exr(photo, read_radiance(photo) * factor)
-    with pytest.raises(PatinaError, match=r"material 1\.name.*typical reflectance"):
+    with pytest.raises(PatinaError, match=r"photo 1\.file.*typical reflectance"):
         FitJob(read_capture(path)).drain()
 
 
