@@ -24,6 +24,10 @@ CICP_PRIMARIES = {
     9: (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290),
     12: (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290),
 }
+ASSUMED = (
+    "16-bit without a statement of its curve: taken as sRGB; if the numbers are linear, say "
+    'transfer = "linear"'
+)
 EDITS = (
     "Exposure2012", "Contrast2012", "Highlights2012", "Shadows2012", "Whites2012", "Blacks2012",
     "Texture", "Clarity2012", "Dehaze", "Vibrance", "Saturation", "VignetteAmount",
@@ -71,10 +75,7 @@ def _by_kind(image: OpenImage, spec: oiio.ImageSpec) -> Declared:
     if stated is not None:
         return Declared(stated.transfer, stated.matrix, stated.reason, notes + stated.notes)
     if spec.format.basetype == oiio.UINT16:
-        notes += (
-            "16-bit without a statement of its curve: taken as sRGB; if the numbers are linear, "
-            'say transfer = "linear"',
-        )
+        notes += (ASSUMED,)
     return Declared(SRGB, None, "the file does not say; the sRGB curve is assumed", notes)
 
 

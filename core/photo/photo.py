@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .clipping import black, clipped
 from .container import KIND_OF, RAW, READ
-from .declared import Declared, declared
+from .declared import ASSUMED, Declared, declared
 from .image import OpenImage, open_image
 from .raw import DEMOSAIC, develop
 from .transfer import Transfer
@@ -85,7 +85,8 @@ def _decode(image: OpenImage, transfer: Transfer, saturation: float | None) -> P
     spec = image.file.spec(part)
     says = declared(image, part)
     if transfer.curves:
-        says = Declared(transfer, says.matrix, "it was asked for", says.notes)
+        notes = tuple(note for note in says.notes if note != ASSUMED)
+        says = Declared(transfer, says.matrix, "it was asked for", notes)
     table, top = _table(image, spec, says.transfer)
     shape = spec.height, spec.width
     light = np.empty((*shape, 3), np.float32)

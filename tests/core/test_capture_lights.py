@@ -14,7 +14,9 @@ from patina.core.job import FitJob, inputs
 from patina.core.job.lights import find_lights
 from patina.core.job.photos import LitPhotos
 from patina.core.light import DistantLight
+from patina.core.photo.photo import read_photo
 from tests import make_capture as made
+from tests import make_photos
 from tests.sampled import sampled
 
 
@@ -176,13 +178,18 @@ def test_a_chart_gives_the_irradiance(ball: Path) -> None:
 def test_a_white_target_is_read_with_the_photos_curve(ball: Path) -> None:
     """A 16-bit PNG of linear numbers says nothing of its own: the photos' transfer holds for it."""
     folder = ball.parent
-    write_png16(folder / "white.png", np.full((60, 80, 3), 0.5))
+    make_photos.write_png(folder / "white.png", np.full((60, 80, 3), 32768, np.uint16))
     made.write_png(folder / "mask.png", np.full((60, 80), 255))
     target = 'white = {photo = "white.png", mask = "mask.png", reflectance = 0.9}'
     path = with_light(ball, "direction = [0, 0, 1]", target)
     path.write_text(path.read_text().replace("camera = ", 'transfer = "linear"\ncamera = '))
-    light = lights_of(path).by_name["lamp"]
+    found = lights_of(path)
+    light = found.by_name["lamp"]
     assert light.irradiance == pytest.approx(np.full(3, np.pi * 0.5 / 0.9), rel=1e-3)
+    assert not any("sRGB" in note for note in found.notes)
+    photo = read_photo(folder / "white.png", "linear")
+    assert not any("assumed" in note or "taken as sRGB" in note for note in photo.info.notes)
+    assert any("taken as sRGB" in note for note in read_photo(folder / "white.png").info.notes)
 
 
 def test_strengths_for_all_lights_or_none(ball: Path) -> None:
@@ -321,16 +328,6 @@ def test_photos_that_were_localised_later(ball: Path) -> None:
     (ball.parent / "later.cameras.json").write_text(json.dumps(extra))
     with pytest.raises(PatinaError, match=r"scan\.extra.*already"):
         inputs.open_scan(later)
-
-
-def write_png16(path: Path, pixels: np.ndarray) -> None:
-    import OpenImageIO as oiio
-
-    data = np.round(np.clip(pixels, 0, 1) * 65535).astype(np.uint16)
-    out = oiio.ImageOutput.create(str(path))
-    assert out.open(str(path), oiio.ImageSpec(data.shape[1], data.shape[0], 3, "uint16"))
-    out.write_image(data)
-    out.close()
 
 
 def write_jpeg(path: Path, pixels: np.ndarray, exposure: float) -> None:
