@@ -138,7 +138,7 @@ def _by_consensus(picture: Array, camera: Camera, sphere: Sphere, search: float)
     found = []
     spaced = max(1, round(APART * radius / step))
     for _ in range(CONES):
-        i, j, k = np.unravel_index(int(np.argmax(score)), score.shape)
+        i, j, k = (int(n) for n in np.unravel_index(int(np.argmax(score)), score.shape))
         if not score[i, j, k] > 0:
             break
         shift = (shifts[i] / radius, shifts[j] / radius, widths[k] / radius)

@@ -74,11 +74,11 @@ def _build(folder: Path, far: np.ndarray, known: bool = True) -> Built:
     for i, name in enumerate(("sun", "ball", "lamp", "flash"), start=1):
         photos = photos.replace(f'"lamp{i}"', f'"{name}"')
     body = TEXT % tuple(float(x) for x in AT + far)
-    if not known:
-        keys = ("white", "irradiance", "intensity")
-        body = "\n".join(x for x in body.splitlines() if not x.startswith(keys))
     path.write_text(f"{head}{body}\n\n{photos}")
     capture = read_capture(path)
+    if not known:  # a file may not mix near and distant lights so, for want of a common scale
+        bare = (replace(light, strength=None, white=None) for light in capture.lights)
+        capture = replace(capture, lights=tuple(bare))
     scan = inputs.open_scan(capture)
     moved = [
         replace(c, pose=replace(c.pose, translation=c.pose.translation - c.pose.rotation @ far))
