@@ -7,19 +7,17 @@ from pathlib import Path
 import bpy
 
 from ..core.capture import read_capture
-from ..core.errors import InputError, PatinaError
+from ..core.errors import InputError
 from ..core.job import FitJob
 from ..scene.apply import apply_result
 from ..scene.face_slots import with_painted_slots
 from ..scene.lights import with_dragged_lamps
-from ..scene.running import Running, running, tell
+from ..scene.running import tell
 from ..scene.shadow_images import with_shadow_images
-from .report_errors import refuse
-
-TICK = 0.01
+from .stepped import Stepped
 
 
-class PATINA_OT_fit(bpy.types.Operator):
+class PATINA_OT_fit(Stepped, bpy.types.Operator):
     """Measure the materials: sample every lit photo and fit a BRDF to each material"""
 
     bl_idname = "patina.fit"
@@ -31,52 +29,7 @@ class PATINA_OT_fit(bpy.types.Operator):
         if not context.scene.patina.capture:
             cls.poll_message_set("Import a capture first: it says which photos to measure")
             return False
-        if running(context.scene) is not None:
-            cls.poll_message_set("A fit is running; ESC stops it")
-            return False
-        return True
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        try:
-            self._start(context)
-            self._job.drain()
-            self._finish(context)
-        except PatinaError as error:
-            return refuse(self, error)
-        return {"FINISHED"}
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        try:
-            self._start(context)
-        except PatinaError as error:
-            return refuse(self, error)
-        self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if event.type == "ESC":
-            self._stop(context)
-            self.report({"WARNING"}, "Fit cancelled; nothing was changed")
-            return {"CANCELLED"}
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        try:
-            if self._job.step():
-                self._show()
-                return {"RUNNING_MODAL"}
-            self._stop(context)
-            self._finish(context)
-        except PatinaError as error:
-            self._stop(context)
-            return refuse(self, error)
-        except BaseException:
-            self._stop(context)
-            raise
-        return {"FINISHED"}
-
-    def cancel(self, context: bpy.types.Context) -> None:
-        self._stop(context)
+        return cls.idle(context)
 
     def _start(self, context: bpy.types.Context) -> None:
         path = Path(bpy.path.abspath(context.scene.patina.capture))
@@ -86,17 +39,8 @@ class PATINA_OT_fit(bpy.types.Operator):
         if dragged:
             self.report({"INFO"}, f"lights as their lamps stand now: {', '.join(dragged)}")
         capture, prepare = with_painted_slots(with_shadow_images(capture), context.scene)
-        self._job, self._timer = FitJob(capture, prepare=prepare), None
+        self._job = FitJob(capture, prepare=prepare)
         self._scene = context.scene.name  # by name: a reference does not survive undo
-
-    def _show(self) -> None:
-        tell(Running(self._scene, self._job.now.stage, self._job.now.fraction))
-
-    def _stop(self, context: bpy.types.Context) -> None:
-        if self._timer is not None:
-            context.window_manager.event_timer_remove(self._timer)
-            self._timer = None
-        tell(None)
 
     def _finish(self, context: bpy.types.Context) -> None:
         result = self._job.result

@@ -15,103 +15,48 @@ from ..core.masks.proposal_job import ProposalJob
 from ..core.masks.write_masks import MasksJob, Wanted, material_names
 from ..scene.face_slots import show_proposal
 from ..scene.lights import with_dragged_lamps
-from ..scene.running import Running, running, tell
+from ..scene.running import tell
 from ..scene.shadow_images import (
     masks_folder,
     shadow_images,
     show_shadow_masks,
     with_shadow_images,
 )
-from .report_errors import refuse
-
-TICK = 0.01
+from .stepped import Stepped
 
 
-class _Stepped:
-    """A job that scripts drain and the window steps. Subclasses say which, and what then."""
-
-    _timer: bpy.types.Timer | None = None
+class _OfCapture(Stepped):
+    """Work on the capture in the scene. Subclasses say which job, and what then."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not context.scene.patina.capture:
             cls.poll_message_set("Import a capture first")
             return False
-        if running(context.scene) is not None:
-            cls.poll_message_set("Something is running; ESC stops it")
-            return False
-        return True
+        return cls.idle(context)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        try:
-            self._begin(context)
-            self._job.drain()
-            self._finish(bpy.data.scenes[self._scene])
-        except PatinaError as error:
-            return refuse(self, error)
-        finally:
-            self._stop(context)
-        return {"FINISHED"}
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        try:
-            self._begin(context)
-        except PatinaError as error:
-            self._stop(context)
-            return refuse(self, error)
-        self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if event.type == "ESC":
-            self._stop(context)
-            self.report({"WARNING"}, "Cancelled; nothing was changed")
-            return {"CANCELLED"}
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        try:
-            if self._job.step():
-                tell(Running(self._scene, self._job.now.stage, self._job.now.fraction))
-                return {"RUNNING_MODAL"}
-            scene = bpy.data.scenes.get(self._scene)
-            if scene is not None:
-                self._finish(scene)
-        except PatinaError as error:
-            self._stop(context)
-            return refuse(self, error)
-        except BaseException:
-            self._stop(context)
-            raise
-        self._stop(context)
-        return {"FINISHED"}
-
-    def cancel(self, context: bpy.types.Context) -> None:
-        self._stop(context)
-
-    def _begin(self, context: bpy.types.Context) -> None:
+    def _start(self, context: bpy.types.Context) -> None:
         path = Path(bpy.path.abspath(context.scene.patina.capture))
         if not path.is_file():
             raise InputError("is gone; import the capture again from where it is now", file=path)
         capture, _ = with_dragged_lamps(read_capture(path), context.scene)
         self._capture = str(capture.file)
         self._scene = context.scene.name  # by name: a reference does not survive undo
-        self._job = self._start(context.scene, capture)
+        self._job = self._job_of(context.scene, capture)
 
-    def _stop(self, context: bpy.types.Context) -> None:
-        if self._timer is not None:
-            context.window_manager.event_timer_remove(self._timer)
-            self._timer = None
-        tell(None)
+    def _finish(self, context: bpy.types.Context) -> None:
+        scene = bpy.data.scenes.get(self._scene)
+        if scene is not None:
+            self._take(scene)
 
-    def _start(self, scene: bpy.types.Scene, capture: Capture) -> Job:
+    def _job_of(self, scene: bpy.types.Scene, capture: Capture) -> Job:
         raise NotImplementedError
 
-    def _finish(self, scene: bpy.types.Scene) -> None:
+    def _take(self, scene: bpy.types.Scene) -> None:
         raise NotImplementedError
 
 
-class PATINA_OT_propose_materials(_Stepped, bpy.types.Operator):
+class PATINA_OT_propose_materials(_OfCapture, bpy.types.Operator):
     """Divide the mesh into materials that look different in the photos, as slots to repaint"""
 
     bl_idname = "patina.propose_materials"
@@ -125,13 +70,13 @@ class PATINA_OT_propose_materials(_Stepped, bpy.types.Operator):
         max=MOST_MATERIALS,
     )
 
-    def _start(self, scene: bpy.types.Scene, capture: Capture) -> Job:
+    def _job_of(self, scene: bpy.types.Scene, capture: Capture) -> Job:
         mesh = scene.patina.mesh
         if mesh is None or mesh.type != "MESH" or mesh.name not in scene.objects:
             raise PatinaError("the scanned mesh is not in this scene: import the capture again")
         return ProposalJob(with_shadow_images(capture), self.count or None)
 
-    def _finish(self, scene: bpy.types.Scene) -> None:
+    def _take(self, scene: bpy.types.Scene) -> None:
         found = self._job.result.proposal
         names = material_names(found.count)
         show_proposal(scene.patina.mesh, self._capture, found.labels, found.confidence, names)
@@ -141,7 +86,7 @@ class PATINA_OT_propose_materials(_Stepped, bpy.types.Operator):
             self.report({"INFO"}, f"{found.count} materials; repaint them in Edit Mode")
 
 
-class PATINA_OT_shadow_masks(_Stepped, bpy.types.Operator):
+class PATINA_OT_shadow_masks(_OfCapture, bpy.types.Operator):
     """Compute where each photo's light is blocked, as images to paint on: white is left out"""
 
     bl_idname = "patina.shadow_masks"
@@ -156,14 +101,14 @@ class PATINA_OT_shadow_masks(_Stepped, bpy.types.Operator):
 
     _staging = None
 
-    def _start(self, scene: bpy.types.Scene, capture: Capture) -> Job:
+    def _job_of(self, scene: bpy.types.Scene, capture: Capture) -> Job:
         if shadow_images(self._capture) and not self.replace:
             raise PatinaError("there are shadow masks already: choose Replace to lose them")
         self._out = check_out(masks_folder(capture.file))
         self._staging = staged_folder(self._out)
         return MasksJob(capture, Wanted(), self._staging.__enter__(), self._out)
 
-    def _finish(self, scene: bpy.types.Scene) -> None:
+    def _take(self, scene: bpy.types.Scene) -> None:
         staging, self._staging = self._staging, None
         staging.__exit__(None, None, None)  # moves the files into place
         files = [self._out / name for name in self._job.result.shadows]

@@ -7,25 +7,25 @@ from pathlib import Path
 import bpy
 
 from ..commands.staging import check_out, staged_folder
-from ..core.errors import InputError, PatinaError
+from ..core.errors import InputError
 from ..core.scan.readers.colmap import read_colmap
 from ..core.solve import SolveJob
 from ..core.solve.solution import MODEL
 from ..core.solve.solve import LENSES
 from ..scene.folders import rectified_folder
-from ..scene.running import Running, running, tell
 from ..scene.scan_collection import create_reconstruction
-from .report_errors import refuse
-
-TICK = 0.1
+from .stepped import Stepped
 
 
-class PATINA_OT_solve_photos(bpy.types.Operator):
+class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
     """Find the cameras of a folder of photos, and points of the surface they show"""
 
     bl_idname = "patina.solve_photos"
     bl_label = "Solve Photos"
     bl_options = {"REGISTER", "UNDO"}
+
+    TICK = 0.1
+    CANCELLED = "Solving cancelled; nothing was written"
 
     directory: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Photos",
@@ -52,65 +52,24 @@ class PATINA_OT_solve_photos(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if running(context.scene) is not None:
-            cls.poll_message_set("Something is running; ESC stops it")
-            return False
-        return True
+        return cls.idle(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if getattr(self, "_picked", False):  # in the file browser: go on in steps
             told = {name: getattr(self, name) for name in ("directory", "out", "lens", "threads")}
             return bpy.ops.patina.solve_photos("INVOKE_DEFAULT", **told)
-        try:
-            self._start(context)
-            self._job.drain()
-            self._finish()
-        except PatinaError as error:
-            return refuse(self, error)
-        return {"FINISHED"}
+        return super().execute(context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not self.directory:
             self._picked = True
             context.window_manager.fileselect_add(self)
             return {"RUNNING_MODAL"}
-        try:
-            self._start(context)
-        except PatinaError as error:
-            return refuse(self, error)
-        self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if event.type == "ESC":
-            self._stop(context)
-            self.report({"WARNING"}, "Solving cancelled; nothing was written")
-            return {"CANCELLED"}
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        try:
-            if self._job.step():
-                tell(Running(self._scene, self._job.now.stage, self._job.now.fraction))
-                return {"RUNNING_MODAL"}
-            self._stop(context)
-            self._finish()
-        except PatinaError as error:
-            self._stop(context)
-            return refuse(self, error)
-        except BaseException:
-            self._stop(context)
-            raise
-        return {"FINISHED"}
-
-    def cancel(self, context: bpy.types.Context) -> None:
-        if hasattr(self, "_job"):
-            self._stop(context)
+        return super().invoke(context, event)
 
     def _start(self, context: bpy.types.Context) -> None:
         if not self.directory:
             raise InputError("say which folder the photos lie in", key="directory")
-        self._timer = None
         self._photos = Path(bpy.path.abspath(self.directory)).resolve()
         beside = self._photos.with_name(f"{self._photos.name} solved")
         self._out = check_out(Path(bpy.path.abspath(self.out)) if self.out else beside)
@@ -118,13 +77,11 @@ class PATINA_OT_solve_photos(bpy.types.Operator):
         self._scene = context.scene.name  # by name: a reference does not survive undo
 
     def _stop(self, context: bpy.types.Context) -> None:
-        self._job.cancel()
-        if self._timer is not None:
-            context.window_manager.event_timer_remove(self._timer)
-            self._timer = None
-        tell(None)
+        if self._job is not None:
+            self._job.cancel()
+        super()._stop(context)
 
-    def _finish(self) -> None:
+    def _finish(self, context: bpy.types.Context) -> None:
         solution = self._job.solution
         with staged_folder(self._out) as folder:
             capture = solution.write(folder, self._out, self._photos)

@@ -1,0 +1,92 @@
+"""Long work from the window: scripts drain the job, the window steps it on a timer, ESC cancels."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ..core.errors import PatinaError
+from ..core.job import Job
+from ..scene.running import Running, running, tell
+from .report_errors import refuse
+
+
+class Stepped:
+    """Subclasses set self._job and self._scene in _start, and take the result in _finish."""
+
+    TICK = 0.01
+    CANCELLED = "Cancelled; nothing was changed"
+
+    _timer: Any = None
+    _job: Job | None = None
+    _scene: str = ""  # by name: a reference does not survive undo
+
+    @classmethod
+    def idle(cls, context: bpy.types.Context) -> bool:
+        """False, with a reason, while something else runs."""
+        if running(context.scene) is not None:
+            cls.poll_message_set("Something is running; ESC stops it")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """All of it at once."""
+        try:
+            self._start(context)
+            self._job.drain()
+            self._finish(context)
+        except PatinaError as error:
+            return refuse(self, error)
+        finally:
+            self._stop(context)
+        return {"FINISHED"}
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Begin, and go on by modal()."""
+        try:
+            self._start(context)
+        except PatinaError as error:
+            self._stop(context)
+            return refuse(self, error)
+        self._timer = context.window_manager.event_timer_add(self.TICK, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """One step a tick."""
+        if event.type == "ESC":
+            self._stop(context)
+            self.report({"WARNING"}, self.CANCELLED)
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        try:
+            if self._job.step():
+                tell(Running(self._scene, self._job.now.stage, self._job.now.fraction))
+                return {"RUNNING_MODAL"}
+            self._finish(context)
+        except PatinaError as error:
+            self._stop(context)
+            return refuse(self, error)
+        except BaseException:
+            self._stop(context)
+            raise
+        self._stop(context)
+        return {"FINISHED"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Blender ends the operator (the window closes)."""
+        self._stop(context)
+
+    def _start(self, context: bpy.types.Context) -> None:
+        raise NotImplementedError
+
+    def _finish(self, context: bpy.types.Context) -> None:
+        raise NotImplementedError
+
+    def _stop(self, context: bpy.types.Context) -> None:
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+        tell(None)
