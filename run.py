@@ -18,6 +18,7 @@ COMMANDS = {
     "test": ("tools.checks:main", "ruff, mypy and pytest; with --blender also in Blender"),
     "build": ("tools.build:main", "the extension's zips, one per platform, into dist/"),
     "pictures": ("tools.make_pictures", "the pictures of docs/images, made anew"),
+    "experiments": ("tools.experiments", "the paper's experiment, docs/experiments.md anew"),
     "bench": ("tools.bench_main", "the measurements behind the figures in docs/"),
 }
 """Command → what runs and what it does: MODULE:FUNCTION is called here with the arguments, a

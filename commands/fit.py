@@ -10,9 +10,11 @@ from pathlib import Path
 
 from ..core.brdf import merl_file
 from ..core.capture import read_capture
+from ..core.fit.measured_result import MeasuredResult
 from ..core.job import CaptureResult, FitJob, Stage
 from ..core.job.job import Step, peak_memory
 from ..core.report import result_json, write_report
+from ..core.report.figures import reach
 from .progress import Progress
 from .staging import check_out, staged_folder
 
@@ -22,17 +24,20 @@ HELP = "fit every material of a capture and write them"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("capture", type=Path, help="the capture file (*.capture.toml)")
     parser.add_argument("--out", type=Path, required=True, help="folder for the results")
+    parser.add_argument(
+        "--threads", type=int, metavar="N", help="look at the photos on N threads (default: cores)"
+    )
 
 
 def run(arguments: argparse.Namespace) -> None:
-    fit_to_folder(arguments.capture, arguments.out)
+    fit_to_folder(arguments.capture, arguments.out, arguments.threads)
 
 
-def fit_to_folder(capture_file: Path, out: Path) -> CaptureResult:
+def fit_to_folder(capture_file: Path, out: Path, threads: int | None = None) -> CaptureResult:
     """Fit a capture and leave result.json, NAME.binary, scene.blend and report/ in ``out``."""
     out = check_out(out)
     progress = Progress(share=0.85)
-    job = FitJob(read_capture(capture_file))
+    job = FitJob(read_capture(capture_file), threads=threads)
     job.drain(progress)
     result = job.result
     if result is None:  # pragma: no cover - drain raises or finishes
@@ -73,6 +78,8 @@ def _tell(out: Path, result: CaptureResult) -> None:
             f"{100 * material.held_out.error:.0f} % (relative RMS)"
         )  # fmt: skip
         print(f"{material.name}: {material.samples:,} samples{unseen}")
+        if isinstance(material.fit, MeasuredResult):
+            print(f"  90 % interval: {reach(material.spread)}")
         for warning in material.warnings:
             print(f"  note: {warning}")
     for note in result.notes:

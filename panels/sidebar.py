@@ -78,6 +78,9 @@ class PATINA_PT_fit(_Stage, bpy.types.Panel):
             held = material.get("held_out")
             if held:
                 box.label(text=f"Predicts unseen photos to {100 * held['typical']:.0f} %")
+            known = material["uncertainty"].get("interval_90")
+            if known:
+                box.label(text=f"Reflectance known to ± {100 * known['median']:.0f} %")
             box.label(text=f"{material['samples']['used']:,} samples")
             for warning in material["warnings"]:
                 _wrapped(box, warning, "ERROR")

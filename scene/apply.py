@@ -24,13 +24,15 @@ def apply_result(
 ) -> list[str]:
     """Make the materials, put them on the scanned mesh where it is in the scene, and keep the
     description. Returns notes for the user. A material of an earlier fit is replaced."""
-    atlas = None if materials.osl_missing() else osl_files.ensure_components(result.basis)
+    with_osl = materials.osl_missing() is None
     capture = str(result.capture.file)
     notes: list[str] = []
     made = []
     for fitted in result.materials:
         old = next((m for m in measured_materials() if _is(m, fitted.name, capture)), None)
-        new = materials.create_material(fitted.name, fitted.fit.brdf, fitted.principled, atlas)
+        brdf = fitted.fit.brdf
+        files = osl_files.ensure_files(brdf) if with_osl else None
+        new = materials.create_material(fitted.name, brdf, fitted.principled, files)
         new[MEASURED], new[CAPTURE] = fitted.name, capture
         if old is not None:
             name = old.name
@@ -43,6 +45,7 @@ def apply_result(
                 f"because {new[materials.REASON_PROPERTY]}"
             )
         made.append(new)
+    osl_files.drop_unused()
     mesh = scene.patina.mesh
     if mesh is None or mesh.type != "MESH" or mesh.name not in scene.objects:
         notes.append("the scanned mesh is not in this scene: materials were made, not assigned")

@@ -44,13 +44,13 @@ def write_blend(
 ) -> list[str]:
     """A capture with the fitted materials on its mesh; returns notes for the user."""
     _imported(path, result.capture, result.scan, result.lights)
-    _save(path, final)  # the components' EXR goes beside a saved file
+    _save(path, final)  # the shader's EXRs go beside a saved file
     notes = apply_result(bpy.context.scene, result, stages)
     for material in measured_materials():
         for node in osl_files.script_nodes(material):
-            socket = node.inputs[osl_files.SOCKET]
-            moved = final.absolute().parent / Path(socket.default_value).name
-            socket.default_value = moved.as_posix()
+            for socket in osl_files.file_sockets(node):
+                moved = final.absolute().parent / Path(socket.default_value).name
+                socket.default_value = moved.as_posix()
     _save(path, final)
     return notes
 

@@ -12,7 +12,7 @@ import importlib.util
 import logging
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,17 +20,19 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..core.appearance import osl_source
+from ..core.appearance import osl_atlas, osl_source
 from ..core.appearance.principled import Principled
 from ..core.appearance.principled_fit import PrincipledFit
 from ..core.basis import Basis, PrincipalBRDF
 from ..core.errors import PatinaError
 from .lamps import update_lamps
-from .osl_files import FILE_PROPERTY, pack
+from .osl_files import PROPERTIES, pack
 
 log = logging.getLogger(__name__)
 
 REASON_PROPERTY = "patina_without_osl"  # on the material: why it has no OSL branch
+COEFFICIENTS = "patina_coefficients"  # on the material: all of them, R, then G, then B
+BASIS = "patina_basis"  # on the material: the version of the basis they are in
 SOCKET_TYPES = {
     "string": "NodeSocketString",
     "float": "NodeSocketFloat",
@@ -63,11 +65,11 @@ def osl_missing() -> str | None:
 
 
 def create_material(
-    name: str, brdf: PrincipalBRDF, principled: PrincipledFit, components_exr: Path | None
+    name: str, brdf: PrincipalBRDF, principled: PrincipledFit, files: Mapping[str, Path] | None
 ) -> bpy.types.Material:
     """A material of both kinds; without OSL only the portable one, and the material says why.
 
-    components_exr: the atlas of the basis (osl_files.ensure_components); None without OSL.
+    files: the shader's EXRs by socket (osl_files.ensure_files); None without OSL.
     """
     material = bpy.data.materials.new(name)
     if material.node_tree is None:
@@ -78,20 +80,23 @@ def create_material(
     seen = principled.principled  # in Solid mode
     material.diffuse_color = (*(float(c) for c in np.clip(seen.base_color, 0, 1)), 1.0)
     material.metallic, material.roughness = seen.metallic, seen.roughness
+    material[COEFFICIENTS] = np.asarray(brdf.coefficients, float).ravel().tolist()
+    material[BASIS] = brdf.basis.version
     reason = osl_missing()
-    if components_exr is None:
-        reason = reason or "the EXR of the components was not written"
+    if files is None:
+        reason = reason or "the shader's EXRs were not written"
     elif reason is None:
         try:
-            text = osl_text(brdf.basis, brdf.coefficients.shape[1])
-            _osl_branch(tree, text, brdf, principled.principled, components_exr)
+            text = osl_text(brdf.basis, osl_atlas.traits(brdf.coefficients.shape[1]))
+            _osl_branch(tree, text, brdf, principled.principled, files)
         except OslError as error:
             reason = str(error)
-    if reason is not None or components_exr is None:
+    if reason is not None or files is None:
         material[REASON_PROPERTY] = reason
         return material
-    material[FILE_PROPERTY] = components_exr.name
-    pack(components_exr)
+    for socket, path in files.items():
+        material[PROPERTIES[socket]] = path.name
+        pack(path)
     # lamps evaluated in the shader leave it as emission; the mesh is no lamp to aim at
     material.cycles.emission_sampling = "NONE"
     bpy.context.view_layer.update()  # lamps just made have no world matrix yet
@@ -116,7 +121,7 @@ class CompiledText:
 
 
 def osl_text(basis: Basis, count: int) -> CompiledText:
-    """The shader for ``count`` coefficients, compiled; one Text serves all materials alike."""
+    """The shader with ``count`` coefficients as inputs, compiled; one Text serves all materials."""
     source = osl_source.source(basis, count)
     name = f"patina_brdf_{count}.osl"
     text = bpy.data.texts.get(name)
@@ -166,7 +171,7 @@ def _osl_branch(
     compiled: CompiledText,
     brdf: PrincipalBRDF,
     principled: Principled,
-    components_exr: Path,
+    files: Mapping[str, Path],
 ) -> None:
     frame = _frame(tree, "Measured: Cycles with OSL on the CPU", (0, 420))
     node = tree.nodes.new("ShaderNodeScript")
@@ -177,16 +182,18 @@ def _osl_branch(
     with _no_compiling():
         node.mode, node.script = "INTERNAL", compiled.text
     node.bytecode, node.bytecode_hash = compiled.bytecode, compiled.digest
-    ensure_sockets(node, brdf.coefficients.shape[1])
+    count = osl_atlas.traits(brdf.coefficients.shape[1])
+    ensure_sockets(node, count)
     sockets = {socket.identifier: socket for socket in node.inputs}
-    sockets["components"].default_value = components_exr.resolve().as_posix()
+    for name, path in files.items():
+        sockets[name].default_value = path.resolve().as_posix()
     lobe = principled.roughness
     if principled.coat_weight > 0.05:
         lobe = min(lobe, principled.coat_roughness)
     # directions are drawn from a lobe somewhat wider than the fit's: measured tails are long
     sockets["lobe_roughness"].default_value = float(min(1.1 * lobe, 1.0))
     sockets["lobe_share"].default_value = 0.5
-    for i, rgb in enumerate(np.asarray(brdf.coefficients).T):
+    for i, rgb in enumerate(np.asarray(brdf.coefficients).T[:count]):
         socket = sockets[osl_source.coefficient_name(i)]
         socket.default_value = tuple(float(v) for v in rgb)
     output = tree.nodes.new("ShaderNodeOutputMaterial")

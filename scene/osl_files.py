@@ -1,39 +1,66 @@
-"""The EXR of the components: where it lies, and how it comes back when the .blend has moved.
+"""The shader's EXRs: where they lie, and how they come back when the .blend has moved.
 
-OSL reads pictures by their path, so the file must exist on disk: beside a saved .blend, else in the
-extension's own folder. A packed copy travels inside the .blend (an Image data-block that a fake
-user keeps) and is written out again on load where the path no longer leads to it.
+OSL reads pictures by their path, so the files must exist on disk: beside a saved .blend, else in
+the extension's own folder. Packed copies travel inside the .blend (Image data-blocks that a fake
+user keeps) and are written out again on load where the path no longer leads to them.
 """
 
 from __future__ import annotations
 
 import logging
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ..core.appearance import osl_atlas
-from ..core.basis import Basis
+from ..core.appearance.osl_source import COMPONENTS, REMAINDER
+from ..core.basis import PrincipalBRDF
 from .folders import blend_folder
 
 log = logging.getLogger(__name__)
 
-SOCKET = "components"
-FILE_PROPERTY = "patina_components"  # on the material: the atlas' file name
+SOCKET = COMPONENTS
+FILE_PROPERTY = "patina_components"  # on the material: the name of its components' file
+PROPERTIES = {COMPONENTS: FILE_PROPERTY, REMAINDER: "patina_remainder"}  # socket → property
 
 
-def ensure_components(basis: Basis) -> Path:
-    """The atlas of a basis: on disk where this .blend expects it, and packed into the .blend."""
-    name = osl_atlas.file_name(basis)
+def ensure_files(brdf: PrincipalBRDF) -> dict[str, Path]:
+    """Socket → EXR of a BRDF: on disk where this .blend expects them, and packed into it."""
+    return {
+        COMPONENTS: _ensure(
+            osl_atlas.components_name(brdf.basis),
+            lambda path: osl_atlas.write_components(path, brdf.basis),
+        ),
+        REMAINDER: _ensure(
+            osl_atlas.remainder_name(brdf), lambda path: osl_atlas.write_remainder(path, brdf)
+        ),
+    }
+
+
+def _ensure(name: str, write: Callable[[Path], object]) -> Path:
     path = blend_folder() / name
     if not path.is_file():
         packed = bpy.data.images.get(name)
         if packed is None or not _write_packed(packed, path):
-            osl_atlas.write(path, basis)
+            write(path)
     pack(path)
     return path
+
+
+def file_sockets(node: bpy.types.Node) -> list[bpy.types.NodeSocket]:
+    """The inputs of a Patina shader that name a file."""
+    return [socket for socket in node.inputs if socket.identifier in PROPERTIES]
+
+
+def drop_unused() -> None:
+    """Forget the packed remainders of materials that are gone; files on disk stay."""
+    needed = {m.get(PROPERTIES[REMAINDER]) for m in bpy.data.materials}
+    for image in [i for i in bpy.data.images if i.name.startswith(osl_atlas.REMAINDER_PREFIX)]:
+        if image.name not in needed and image.users <= int(image.use_fake_user):
+            bpy.data.images.remove(image)
 
 
 def pack(path: Path) -> bpy.types.Image:
@@ -52,27 +79,37 @@ def pack(path: Path) -> bpy.types.Image:
 
 
 def restore() -> list[str]:
-    """Point every Patina material at its atlas, writing packed ones out where they are missing.
+    """Point every Patina material at its files, writing packed ones out where they are missing.
 
-    Returns the names of materials whose atlas is neither on disk nor in the .blend.
+    Returns the names of materials with a file that is neither on disk nor in the .blend.
     """
     missing = []
     for material in bpy.data.materials:
-        name = material.get(FILE_PROPERTY)
-        if not name or material.library is not None:
+        if material.get(FILE_PROPERTY) is None or material.library is not None:
             continue
-        for node in script_nodes(material):
-            if os.path.isfile(node.inputs[SOCKET].default_value):
-                continue
-            path = blend_folder() / name
-            image = bpy.data.images.get(name)
-            if path.is_file() or (image is not None and _write_packed(image, path)):
-                node.inputs[SOCKET].default_value = path.as_posix()
-            else:
-                missing.append(material.name)
+        found = [
+            _restored(socket, material.get(PROPERTIES[socket.identifier]))
+            for node in script_nodes(material)
+            for socket in file_sockets(node)
+        ]
+        if not all(found):
+            missing.append(material.name)
     for name in missing:
-        log.warning("%s: the EXR of its components is gone; make the material again", name)
+        log.warning("%s: an EXR of its shader is gone; make the material again", name)
     return missing
+
+
+def _restored(socket: bpy.types.NodeSocket, name: str | None) -> bool:
+    """True where the socket names a file that is there, now or again."""
+    if os.path.isfile(socket.default_value):
+        return True
+    if not name:
+        return False
+    path, image = blend_folder() / name, bpy.data.images.get(name)
+    if path.is_file() or (image is not None and _write_packed(image, path)):
+        socket.default_value = path.as_posix()
+        return True
+    return False
 
 
 def script_nodes(material: bpy.types.Material) -> list[bpy.types.Node]:
@@ -108,12 +145,13 @@ def _after_load(*_: object) -> None:
 
 @persistent
 def _after_save(*_: object) -> None:
-    """A first save gives the .blend a folder: the atlas follows it there."""
+    """A first save gives the .blend a folder: the files follow it there."""
     for material in bpy.data.materials:
-        name = material.get(FILE_PROPERTY)
-        image = bpy.data.images.get(name) if name else None
-        if image is not None and not (blend_folder() / name).is_file():
-            _write_packed(image, blend_folder() / name)
+        for key in PROPERTIES.values():
+            name = material.get(key)
+            image = bpy.data.images.get(name) if name else None
+            if image is not None and not (blend_folder() / name).is_file():
+                _write_packed(image, blend_folder() / name)
 
 
 def register() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from .common import ROOT
 from .package import load_patina
 
-BENCHES = ("basis", "sampling", "fit", "light", "real", "solve")
+BENCHES = ("basis", "sampling", "fit", "light", "real", "solve", "speed")
 
 
 def main() -> int:
@@ -22,6 +22,10 @@ def main() -> int:
     unknown = [name for name in told.names if name not in BENCHES]
     if unknown:
         parser.error(f"no measurement is called {unknown[0]!r}; there are {', '.join(BENCHES)}")
+    if told.names == ["speed"]:  # it makes its own
+        load_patina()
+        importlib.import_module(".bench_speed", __package__).run(Path())
+        return 0
     data = Path(os.environ.get("PATINA_SHARED", ROOT.parent / "shared")) / "data"
     if not data.is_dir():
         print(f"bench: the reference data is not here ({data.name}/ of ../shared)", file=sys.stderr)

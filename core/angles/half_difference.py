@@ -14,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .vectors import cross, dot, length
+
 Array = NDArray[np.floating]
 POLE = 1e-9  # sin θh below it is 0
 
@@ -35,25 +37,32 @@ def fold_phi_d(phi_d: Array) -> Array:
 def half_difference(normal: Array, light: Array, view: Array) -> Angles:
     """Angles of unit vectors (..., 3) that point AWAY from the surface, in any common frame.
 
-    Exact at the poles: atan2 of cross and dot products, never acos. Where θh = 0 the azimuth of
-    the half vector is undefined, and φd is 90°, the value that treats light and view alike: the
-    angles of a pair of vectors do not depend on the frame they are given in. Where θd = 0, φd is 0.
+    Exact at the poles, in float32 too: atan2 of cross and dot products, never acos. Where θh = 0
+    the azimuth of the half vector is undefined, and φd is 90°, the value that treats light and view
+    alike: the angles of a pair of vectors do not depend on the frame they are given in. Where
+    θd = 0, φd is 0.
+
+    With H = l + v and its length H, the binormal b of n and H and the tangent t = b × H:
+    l·b = n·(v × l)/|n × H| and l·t = H (n·v − n·l)/(2 |n × H|). Neither frame is needed.
     """
     half = light + view
-    length = np.linalg.norm(half, axis=-1, keepdims=True)
-    # light = -view has no half vector; no surface sees it, but the arithmetic must stay finite
-    half = np.where(length > 1e-12, half / np.maximum(length, 1e-12), normal)
-    binormal = np.cross(normal, half)
-    sin_h = np.linalg.norm(binormal, axis=-1)
-    theta_h = np.arctan2(sin_h, _dot(normal, half))
-    binormal = np.where(
-        sin_h[..., None] > POLE, binormal / np.maximum(sin_h, 1e-9)[..., None], _perpendicular(half)
-    )
-    tangent = np.cross(binormal, half)
-    d_x, d_y = _dot(light, tangent), _dot(light, binormal)
-    theta_d = np.arctan2(np.hypot(d_x, d_y), _dot(light, half))
-    phi_d = np.where(sin_h > POLE, np.arctan2(d_y, d_x), np.pi / 2)
-    return Angles(theta_h, theta_d, fold_phi_d(phi_d))
+    size = length(half[..., 0], half[..., 1], half[..., 2])
+    sin_h = length(*cross(normal, half))
+    theta_h = np.arctan2(sin_h, dot(normal, half))
+    apart = light - view
+    theta_d = np.arctan2(length(apart[..., 0], apart[..., 1], apart[..., 2]), size)
+    vx, vy, vz = cross(view, light)
+    d_y = normal[..., 0] * vx
+    d_y += normal[..., 1] * vy
+    d_y += normal[..., 2] * vz
+    d_x = dot(normal, view)
+    d_x -= dot(normal, light)
+    d_x *= 0.5 * size
+    phi_d = np.arctan2(d_y, d_x)
+    pi = phi_d.dtype.type(np.pi)
+    phi_d = np.where(phi_d < 0, phi_d + pi, phi_d)
+    phi_d = np.where(phi_d < pi, phi_d, phi_d.dtype.type(0))
+    return Angles(theta_h, theta_d, np.where(sin_h > POLE * size, phi_d, pi / 2))
 
 
 def light_view(theta_h: Array, theta_d: Array, phi_d: Array) -> tuple[Array, Array]:
@@ -64,7 +73,7 @@ def light_view(theta_h: Array, theta_d: Array, phi_d: Array) -> tuple[Array, Arr
     # difference vector along the tangent (ch, 0, -sh) and the binormal (0, 1, 0) of the half vector
     d_x, d_y = sd * np.cos(phi_d), sd * np.sin(phi_d)
     light = np.stack([d_x * ch, d_y, -d_x * sh], axis=-1) + cd[..., None] * half
-    view = 2.0 * _dot(light, half)[..., None] * half - light
+    view = 2.0 * dot(light, half)[..., None] * half - light
     return light, view
 
 
@@ -73,15 +82,3 @@ def cosines(theta_h: Array, theta_d: Array, phi_d: Array) -> tuple[Array, Array]
     base = np.cos(theta_h) * np.cos(theta_d)
     lean = np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)
     return base - lean, base + lean
-
-
-def _dot(a: Array, b: Array) -> Array:
-    return np.einsum("...i,...i->...", a, b)
-
-
-def _perpendicular(a: Array) -> Array:
-    """Some unit vector perpendicular to each unit vector (Duff et al. 2017, first tangent)."""
-    x, y, z = a[..., 0], a[..., 1], a[..., 2]
-    sign = np.where(z >= 0, 1.0, -1.0)
-    c = -1.0 / (sign + z)
-    return np.stack([1.0 + sign * x * x * c, sign * x * y * c, -sign * x], axis=-1)

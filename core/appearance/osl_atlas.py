@@ -1,74 +1,110 @@
-"""The components of a basis as one picture, so that a shader can look them up.
+"""A BRDF as two pictures, so that a shader can look it up.
 
-Every azimuth φd of the grid is a block of (θh across, θd down) with a border one texel wide that
-repeats its edge; blocks of all φd stand side by side, and rows of blocks hold four numbers each in
-R, G, B, A. A bilinear lookup in two neighbouring blocks, blended, is exactly AngleGrid's trilinear
-interpolation. Slots: 0 and 1 are the two halves of µ + ln(ref + ε), the components follow.
+Every azimuth φd of the basis' grid is a block of (θh across, θd down) with a border one texel wide
+that repeats its edge; blocks of all φd stand side by side. A bilinear lookup in two neighbouring
+blocks, blended, is exactly AngleGrid's trilinear interpolation. That is linear in
+ln(ρ·cosMap + ε), so the sum over a hundred components may be done at the nodes, once.
 
-Half floats: the centre, split into a rounded value and its remainder, keeps 21 bits, the components
-keep 11. What that does to ρ is asserted in tests/core/test_osl_atlas.py.
+- The components' picture, one a basis: the first TRAITS components, whose coefficients are the
+  shader's inputs. Rows of blocks hold four of them each in R, G, B, A, as half floats.
+- The remainder's picture, one a material: what is left of the logarithm, R, G and B, as floats. It
+  is taken from the half floats themselves: their rounding costs nothing at the measured
+  coefficients.
 """
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..basis import AngleGrid, Basis
+from ..basis import AngleGrid, Basis, PrincipalBRDF
 from ..errors import InputError
 from ..photo import write_exr
 
-CENTRE_SLOTS = 2
+TRAITS = 8
 BORDER = 1
+COMPONENTS_PREFIX, REMAINDER_PREFIX = "patina_components_", "patina_brdf_"
+
+
+def traits(count: int) -> int:
+    """How many of a BRDF's ``count`` coefficients are inputs of its shader."""
+    return min(count, TRAITS)
 
 
 def groups(count: int) -> int:
-    """Rows of blocks that the centre and ``count`` components take, four slots a row."""
-    return -(-(CENTRE_SLOTS + count) // 4)
+    """Rows of blocks that ``count`` components take, four a row."""
+    return -(-count // 4)
 
 
-def size(grid: AngleGrid, count: int) -> tuple[int, int]:
-    """(width, height) of the atlas in texels."""
-    return grid.n_p * (grid.n_h + 2 * BORDER), groups(count) * (grid.n_d + 2 * BORDER)
+def size(grid: AngleGrid, rows: int) -> tuple[int, int]:
+    """(width, height) in texels of a picture of so many rows of blocks."""
+    return grid.n_p * (grid.n_h + 2 * BORDER), rows * (grid.n_d + 2 * BORDER)
 
 
-def texels(basis: Basis, count: int | None = None) -> NDArray[np.float16]:
-    """(height, width, 4) float16, row 0 on top."""
-    k = basis.count if count is None else min(count, basis.count)
-    centre = (basis.mean + basis.log_reference).astype(np.float32)
-    high = centre.astype(np.float16)
-    low = (centre - high.astype(np.float32)).astype(np.float16)
-    slots = np.zeros((4 * groups(k), *basis.grid.shape), np.float16)
-    slots[0], slots[1] = high, low
-    slots[CENTRE_SLOTS : CENTRE_SLOTS + k] = basis.components[:k]
+def component_texels(basis: Basis) -> NDArray[np.float16]:
+    """(height, width, 4) float16, row 0 on top: the first components."""
+    count = traits(basis.count)
+    slots = np.zeros((4 * groups(count), *basis.grid.shape), np.float16)
+    slots[:count] = basis.components[:count]
+    return _blocks(slots, 4)
+
+
+def remainder_texels(brdf: PrincipalBRDF) -> NDArray[np.float32]:
+    """(height, width, 3) float32: ln(ρ·cosMap + ε) less what the first components bring to it."""
+    count = traits(brdf.coefficients.shape[1])
+    first = brdf.basis.components[:count].astype(np.float16).reshape(count, -1).astype(np.float64)
+    left = brdf.log_table.values.T - brdf.coefficients[:, :count] @ first
+    return _blocks(left.astype(np.float32).reshape(3, *brdf.basis.grid.shape), 3)
+
+
+def _blocks(slots: NDArray, channels: int) -> NDArray:
+    """(slots, n_h, n_d, n_p) → texels, ``channels`` slots a row of blocks."""
     pad = [(0, 0), (BORDER, BORDER), (BORDER, BORDER), (0, 0)]
     bordered = np.pad(slots, pad, mode="edge")  # (slot, h, d, p)
     n_h, n_d, n_p = bordered.shape[1:]
-    rows = bordered.reshape(-1, 4, n_h, n_d, n_p).transpose(0, 3, 4, 2, 1)  # (group, d, p, h, 4)
-    return np.ascontiguousarray(rows.reshape(-1, n_p * n_h, 4))
+    rows = bordered.reshape(-1, channels, n_h, n_d, n_p).transpose(0, 3, 4, 2, 1)
+    return np.ascontiguousarray(rows.reshape(-1, n_p * n_h, channels))
 
 
-def write(path: Path, basis: Basis, count: int | None = None) -> Path:
-    """Write the atlas as an EXR of half floats; the file appears whole or not at all."""
+def write_components(path: Path, basis: Basis) -> Path:
+    """Write the components' picture; the file appears whole or not at all."""
+    return _write(path, component_texels(basis), half=True)
+
+
+def write_remainder(path: Path, brdf: PrincipalBRDF) -> Path:
+    """Write the remainder's picture; the file appears whole or not at all."""
+    return _write(path, remainder_texels(brdf), half=False)
+
+
+def _write(path: Path, pixels: NDArray, half: bool) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"cannot be written ({error.strerror})", file=path) from error
-    write_exr(path, texels(basis, count), half=True)
+    write_exr(path, pixels, half=half)
     return path
 
 
-def file_name(basis: Basis) -> str:
+def components_name(basis: Basis) -> str:
     """One file serves every material of a basis."""
-    return f"patina_components_{basis.version}.exr"
+    return f"{COMPONENTS_PREFIX}{basis.version}.exr"
+
+
+def remainder_name(brdf: PrincipalBRDF) -> str:
+    """A name of its own for every BRDF: renderers keep what they have read by its name."""
+    digest = hashlib.sha256(brdf.basis.version.encode())
+    digest.update(np.ascontiguousarray(brdf.coefficients, np.float64).tobytes())
+    return f"{REMAINDER_PREFIX}{digest.hexdigest()[:12]}.exr"
 
 
 def lookup(
     atlas: NDArray[np.floating], grid: AngleGrid, u: NDArray[np.floating], group: int
 ) -> NDArray[np.floating]:
-    """(n, 4): what the shader reads at fractional nodes u (n, 3) = (θh, θd, φd); for the tests."""
+    """(n, channels): what the shader reads at fractional nodes u (n, 3) = (θh, θd, φd); for the
+    tests."""
     block_h, block_d = grid.n_h + 2 * BORDER, grid.n_d + 2 * BORDER
     p0 = np.minimum(np.floor(u[:, 2]).astype(int), grid.n_p - 1)
     blend = (u[:, 2] - p0)[:, None]

@@ -1,4 +1,4 @@
-"""The OSL source for a number of coefficients, and the list of its inputs."""
+"""The OSL source for a number of coefficients as inputs, and the list of all inputs."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from . import osl_atlas
 
 TEMPLATE = Path(__file__).parents[2] / "assets" / "osl" / "patina_brdf.osl"
 LAMPS = 8
+COMPONENTS, REMAINDER = "components", "remainder"  # inputs that name a picture
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,8 @@ def lamp_inputs() -> list[Input]:
 def inputs(count: int) -> list[Input]:
     """All inputs in the order of the shader's parameters."""
     return [
-        Input("components", "Components", "string", ""),
+        Input(COMPONENTS, "Components", "string", ""),
+        Input(REMAINDER, "Remainder", "string", ""),
         Input("shading_normal", "Normal", "vector", (0.0, 0.0, 0.0)),
         Input("scale", "Reflectance Scale", "float", 1.0),
         Input("lobe_roughness", "Sampling Roughness", "float", 0.3),
@@ -63,7 +65,7 @@ def inputs(count: int) -> list[Input]:
 
 
 def source(basis: Basis, count: int) -> str:
-    """OSL text that evaluates ``count`` components of an atlas holding all of the basis."""
+    """OSL text with the coefficients of the first ``count`` components as inputs."""
     words = {
         "COMPONENTS": str(count),
         "LAMPS": str(LAMPS),
@@ -73,7 +75,7 @@ def source(basis: Basis, count: int) -> str:
         "KNEE": repr(float(basis.grid.knee)),
         "BORDER": str(osl_atlas.BORDER),
         "GROUPS": str(osl_atlas.groups(count)),
-        "HEIGHT_GROUPS": str(osl_atlas.groups(basis.count)),
+        "HEIGHT_GROUPS": str(osl_atlas.groups(osl_atlas.traits(basis.count))),
         "EPSILON": repr(EPSILON),
         "COEFFICIENT_INPUTS": _parameters(coefficient_inputs(count)),
         "LAMP_INPUTS": _parameters(lamp_inputs()),

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from ..angles import Angles
 from ..brdf import TabulatedBRDF
 from . import mapping
 from .grid import AngleGrid
+
+if TYPE_CHECKING:
+    from .log_table import LogTable
 
 CHUNK = 1 << 17
 Progress = Callable[[str, float], None]
@@ -31,6 +35,8 @@ class Basis:
     explained: fraction of variance of every component, also those not stored.
     columns: number of training observations (300 for the 100 MERL materials).
     provenance: what it was computed from, by which command, under which licence.
+    training: (columns, k), row i the coefficients of training column i, R, G and B of a material
+    one after the other; None where they are not known.
     """
 
     grid: AngleGrid
@@ -40,6 +46,7 @@ class Basis:
     explained: NDArray[np.float64]
     columns: int
     provenance: str
+    training: NDArray[np.float64] | None = None
 
     @staticmethod
     def default() -> Basis:
@@ -75,7 +82,7 @@ class Basis:
         return digest.hexdigest()[:12]
 
     @cached_property
-    def _nodes(self) -> NDArray[np.float32]:
+    def nodes(self) -> NDArray[np.float32]:
         """(grid.size, 1 + k): µ + ln(ref + ε), then the components; one row a node."""
         centre = (self.mean + self.log_reference).reshape(1, -1)
         flat = self.components.reshape(self.count, -1)
@@ -86,7 +93,7 @@ class Basis:
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """(centre (n,), Q̂ (n, count)) at n directions: ln(ρ·cosMap + ε) = centre + Q̂ c."""
         k = self.count if count is None else min(count, self.count)
-        values = self.grid.interpolate(self._nodes[:, : 1 + k], angles)
+        values = self.grid.interpolate(self.nodes[:, : 1 + k], angles)
         return values[:, 0], values[:, 1:]
 
     def mapped(self, rho: NDArray[np.floating], angles: Angles) -> NDArray[np.floating]:
@@ -138,9 +145,19 @@ class PrincipalBRDF:
     basis: Basis
     coefficients: NDArray[np.float64]
 
+    @cached_property
+    def log_table(self) -> LogTable:
+        """The same BRDF with its components summed at the nodes: evaluating costs no more for a
+        hundred components than for one."""
+        from .log_table import LogTable  # log_table needs Basis: imported late
+
+        return LogTable.of(self.basis, self.coefficients)
+
     def evaluate(self, angles: Angles) -> NDArray[np.float32]:
         """ρ (..., 3) in 1/sr at half/difference angles (radians) of any shape."""
-        return self.basis.evaluate(self.coefficients, angles)
+        each = np.broadcast_arrays(*angles)
+        found = self.log_table.evaluate(Angles(*(np.ravel(a) for a in each)))
+        return found.reshape(*each[0].shape, found.shape[1])
 
     def table(self) -> TabulatedBRDF:
         """The BRDF at the MERL cells' centres."""

@@ -1,7 +1,8 @@
 """Build the embedded basis: ``python run.py headless build-basis NBRDF.npz`` writes assets/basis.
 
 Input: the neural encodings of the 100 MERL materials by Sztrajman et al. 2021 (MIT licence), which
-are not part of this repository. Only the mean, the reference and the components are kept.
+are not part of this repository. Only the mean, the reference, the components and the encodings'
+coefficients are kept.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from .training import BLOCK, DEFAULT_COUNT, train
 PROVENANCE = (
     "Mean, reference and principal components (Nielsen's log mapping) of the neural encodings of "
     "the 100 MERL materials by Sztrajman, Rainer, Ritschel, Weyrich 2021 (asztr/Neural-BRDF, MIT "
-    "licence). Computed by core/basis/build_default.py. Contains no MERL data."
+    "licence), and the encodings' own coefficients. Computed by core/basis/build_default.py. "
+    "Contains no MERL data."
 )
 
 

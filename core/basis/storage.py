@@ -1,13 +1,16 @@
-"""A basis on disk: fixed-point numbers, differenced along θh and φd, deflated.
+"""A basis on disk: fixed-point numbers, differenced along θh and φd, split into bytes, deflated.
 
 A step of 0.01 in a scaled component is 0.0006 in log reflectance for a coefficient of typical size
-(training coefficients have variance 1/300): far below the interpolation error.
+(training coefficients have variance 1/300). The first components keep it, the many faint ones have
+twice that: 0.003 log-relative RMS for all hundred, far below the interpolation error (0.008).
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,59 +19,103 @@ from ..errors import UNREADABLE_NPZ, InputError
 from .basis import Basis
 from .grid import AngleGrid
 
-COMPONENT_STEP = 0.01
+COMPONENT_STEP, FAINT_STEP = 0.01, 0.02
+FINE = 10  # components with the finer step
 LOG_STEP = 0.0005
-FORMAT = 1
+TRAINING_STEP = 1e-4  # of the training coefficients, whose deviation is 0.06
+FORMAT = 2
+
+Steps = Sequence[float] | NDArray[np.floating]
 
 
 def save(path: Path, basis: Basis) -> None:
     """Write a basis as .npz; the file appears whole or not at all."""
     partial = path.with_name(path.name + ".part")
+    steps = np.where(np.arange(basis.count) < FINE, COMPONENT_STEP, FAINT_STEP)
+    arrays: dict[str, NDArray[Any]] = {
+        "format": np.array(FORMAT, np.int32),
+        "grid": np.array([*basis.grid.shape, basis.grid.knee]),
+        "mean": _encode(basis.mean[None], [LOG_STEP]),
+        "log_reference": _encode(basis.log_reference[None], [LOG_STEP]),
+        "components": _encode(basis.components, steps),
+        "steps": steps,
+        "explained": basis.explained.astype(np.float32),
+        "columns": np.array(basis.columns, np.int32),
+        "provenance": np.array(basis.provenance),
+    }
+    if basis.training is not None:
+        fixed = np.round(basis.training / TRAINING_STEP).astype(np.int32)
+        arrays["training"] = fixed
     with open(partial, "wb") as file:
-        np.savez_compressed(
-            file,
-            format=np.int32(FORMAT),
-            grid=np.array([*basis.grid.shape, basis.grid.knee]),
-            mean=_encode(basis.mean[None], LOG_STEP),
-            log_reference=_encode(basis.log_reference[None], LOG_STEP),
-            components=_encode(basis.components, COMPONENT_STEP),
-            explained=basis.explained.astype(np.float32),
-            columns=np.int32(basis.columns),
-            provenance=np.array(basis.provenance),
-        )
+        np.savez_compressed(file, **arrays)
     os.replace(partial, path)
 
 
 def load(path: Path) -> Basis:
-    """Read a basis written by :func:`save`. Raises InputError for anything else."""
+    """Read a basis written by :func:`save`, also by earlier versions (which kept no training
+    coefficients). Raises InputError for anything else."""
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
-            if int(data["format"]) != FORMAT:
-                raise InputError(
-                    f"basis format {int(data['format'])}, expected {FORMAT}", file=path
-                )
+            version = int(data["format"])
+            if version not in (1, FORMAT):
+                raise InputError(f"basis format {version}, expected {FORMAT}", file=path)
             n_h, n_d, n_p, knee = (float(x) for x in data["grid"])
-            return Basis(
-                grid=AngleGrid(int(n_h), int(n_d), int(n_p), knee),
-                mean=_decode(data["mean"], LOG_STEP)[0],
-                log_reference=_decode(data["log_reference"], LOG_STEP)[0],
-                components=_decode(data["components"], COMPONENT_STEP),
+            components = data["components"]
+            grid = AngleGrid(int(n_h), int(n_d), int(n_p), knee)
+            decode = _decode if version == FORMAT else _decode_whole
+            steps = data["steps"] if version == FORMAT else [COMPONENT_STEP] * len(components)
+            basis = Basis(
+                grid=grid,
+                mean=decode(data["mean"], [LOG_STEP])[0],
+                log_reference=decode(data["log_reference"], [LOG_STEP])[0],
+                components=decode(components, steps),
                 explained=data["explained"].astype(np.float64),
                 columns=int(data["columns"]),
                 provenance=str(data["provenance"]),
+                training=data["training"] * TRAINING_STEP if "training" in data else None,
             )
     except UNREADABLE_NPZ as error:
         raise InputError(f"not a Patina basis ({error})", file=path) from error
+    if (
+        basis.mean.shape != grid.shape
+        or basis.log_reference.shape != grid.shape
+        or basis.components.shape[1:] != grid.shape
+        or (basis.training is not None and basis.training.shape != (basis.columns, basis.count))
+    ):
+        raise InputError("not a Patina basis (arrays that do not fit its grid)", file=path)
+    return basis
 
 
-def _encode(values: NDArray[np.floating], step: float) -> NDArray[np.int16]:
-    """(c, n_h, n_d, n_p) → int16 second differences (they wrap; decoding wraps back)."""
-    fixed = np.round(values / step).astype(np.int64)
+def _encode(values: NDArray[np.floating], steps: Steps) -> NDArray[np.uint8]:
+    """(c, n_h, n_d, n_p) → (2, c, n_h, n_d, n_p): low and high bytes of second differences modulo
+    2¹⁶, small ones of either sign as small numbers. Apart, the bytes deflate to a sixth less."""
+    fixed = np.round(values / np.reshape(steps, (-1, 1, 1, 1))).astype(np.int64)
     if np.abs(fixed).max() > 32767:
         raise ValueError("values exceed the range of the fixed-point step")
-    return np.diff(np.diff(fixed, axis=1, prepend=0), axis=3, prepend=0).astype(np.int16)
+    second = np.diff(np.diff(fixed, axis=1, prepend=0), axis=3, prepend=0).astype(np.int16)
+    folded = ((second << 1) ^ (second >> 15)).view(np.uint16)
+    return np.stack([(folded & 255).astype(np.uint8), (folded >> 8).astype(np.uint8)])
 
 
-def _decode(encoded: NDArray[np.int16], step: float) -> NDArray[np.float32]:
-    summed = np.cumsum(encoded, axis=3, dtype=np.int16)
-    return np.cumsum(summed, axis=1, dtype=np.int16).astype(np.float32) * np.float32(step)
+def _decode(encoded: NDArray[np.uint8], steps: Steps) -> NDArray[np.float32]:
+    if encoded.dtype != np.uint8 or encoded.ndim != 5 or len(encoded) != 2:
+        raise ValueError("arrays of another kind")
+    out = np.empty(encoded.shape[1:], np.float32)
+    for i, (low, high, step) in enumerate(zip(*encoded, steps, strict=True)):
+        folded = low | (high.astype(np.uint16) << 8)
+        second = (folded >> 1).view(np.int16) ^ -(folded & 1).view(np.int16)
+        out[i] = _summed(second, step)
+    return out
+
+
+def _decode_whole(encoded: NDArray[np.int16], steps: Steps) -> NDArray[np.float32]:
+    """Of format 1: second differences, not split."""
+    if encoded.dtype != np.int16 or encoded.ndim != 4:
+        raise ValueError("arrays of another kind")
+    return np.stack([_summed(e, step) for e, step in zip(encoded, steps, strict=True)])
+
+
+def _summed(second: NDArray[np.int16], step: float) -> NDArray[np.float32]:
+    """(n_h, n_d, n_p) from second differences; sums wrap as the differences did."""
+    summed = np.cumsum(second, axis=2, dtype=np.int16)
+    return np.cumsum(summed, axis=0, dtype=np.int16).astype(np.float32) * np.float32(step)

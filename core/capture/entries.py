@@ -154,10 +154,13 @@ class MaterialEntry:
 
 @dataclass(frozen=True)
 class FitOptions:
-    """[fit]: what is too close to trust, and the estimator's settings. absolute: False where the
-    lights' irradiance is known only relative to each other."""
+    """[fit]: what is too close to trust, and the estimator's settings. method: "measured" or
+    "paper"; absolute: False where the lights' irradiance is known only relative to each other;
+    unused: keys that were given and that the method does not read."""
 
+    method: str = "measured"
     absolute: bool = True
     margins: Margins = field(default_factory=Margins)
     paper: PaperSettings = field(default_factory=PaperSettings)
     held_out: bool = True
+    unused: tuple[str, ...] = ()

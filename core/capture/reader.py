@@ -14,7 +14,7 @@ from .light_section import read_light
 from .lines import key_lines
 from .model import SHADOW_MASK, Capture, ScanEntry
 from .photo_section import read_photo_entry, read_tone
-from .section import Section
+from .section import Section, shown
 
 WINDOWS_DEVICES = {
     "CON",
@@ -23,6 +23,10 @@ WINDOWS_DEVICES = {
     "NUL",
     *(f"{n}{i}" for n in ("COM", "LPT") for i in range(10)),
 }
+METHODS = ("measured", "paper")  # the first is the default
+PAPER_KEYS = (
+    "samples", "trials", "subset", "curvature", "monotonicity", "highest_intensity", "eta", "seed",
+)  # fmt: skip
 LARGEST_FILE = 1_000_000  # bytes; a capture of a thousand photos has a tenth of it
 LONGEST_LINE = 10_000
 
@@ -209,12 +213,17 @@ def _refuse_doubles(top: Section, materials: tuple[MaterialEntry, ...], masked: 
 
 def _fit(section: Section) -> FitOptions:
     margins, paper = Margins(), PaperSettings()
+    method = section.optional_text("method") or METHODS[0]
+    if method not in METHODS:
+        known = " or ".join(f"{m!r}" for m in METHODS)
+        raise section.error(f"found {shown(method)}, expected {known}", "method")
     curvature = section.number("curvature", paper.curvature or 0.0, low=0.0)
     samples = section.integer("samples", paper.samples, 1, 40)
     subset = section.integer("subset", paper.subset, 10, 1_000_000)
     if subset < 2 * samples:
         raise section.error(f"found {subset}, expected at least twice the samples", "subset")
     options = FitOptions(
+        method=method,
         absolute=section.flag("absolute", True),
         margins=Margins(
             silhouette=section.integer("silhouette_margin", margins.silhouette, 0, 100),
@@ -233,6 +242,7 @@ def _fit(section: Section) -> FitOptions:
             seed=section.integer("seed", paper.seed, 0),
         ),
         held_out=section.flag("held_out", True),
+        unused=() if method == "paper" else tuple(k for k in PAPER_KEYS if k in section),
     )
     section.close()
     return options

@@ -1,4 +1,4 @@
-"""How well a fit predicts a photo it has not seen: leave one photo out, refit, predict it."""
+"""How well a fit predicts a photo it has not seen: leave one photo out, fit, predict it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..basis import Basis
+from ..basis import Basis, PrincipalBRDF
 from ..errors import FitError
 from ..predict import predict_radiance
 from ..samples import SampleTable
@@ -48,14 +48,19 @@ def photos_to_hold_out(table: SampleTable) -> list[int]:
 def leave_out(
     table: SampleTable, photo: int, basis: Basis, settings: PaperSettings
 ) -> LeftOut | None:
-    """Fit without a photo and predict it; None where the rest is too little to fit."""
-    out = table.photo == photo
+    """The paper's fit without a photo, predicting it; None where the rest is too little to fit."""
+    rest = table.select(table.photo != photo)
     try:
-        fit = fit_paper(table.select(~out), basis, replace(settings, seed=settings.seed + 1))
+        fit = fit_paper(rest, basis, replace(settings, seed=settings.seed + 1))
     except FitError:
         return None
-    held = table.select(out)
-    difference = predict_radiance(basis, fit.brdf.coefficients, held) - held.radiance
+    return predicted(table, photo, fit.brdf)
+
+
+def predicted(table: SampleTable, photo: int, brdf: PrincipalBRDF) -> LeftOut:
+    """How well a BRDF that was found without a photo predicts it, at the scan's own normals."""
+    held = table.select(table.photo == photo)
+    difference = predict_radiance(brdf, held) - held.radiance
     level = held.radiance.mean(axis=1)
     bright = level > DARK * np.median(level)
     return LeftOut(

@@ -15,8 +15,12 @@ def mean_curvature(normals: NDArray[np.floating]) -> NDArray[np.float32]:
     (Vergne et al. 2009, "Light warping for enhanced surface depiction"; the paper, section 3.2).
     """
     facing = np.where(normals[..., 2] > 1e-3, normals[..., 2], np.nan)
-    g_x, g_y = -normals[..., 0] / facing, -normals[..., 1] / facing
-    curvature = np.full(normals.shape[:2], np.nan, np.float32)
+    return slope_curvature(-normals[..., 0] / facing, -normals[..., 1] / facing)
+
+
+def slope_curvature(g_x: NDArray[np.floating], g_y: NDArray[np.floating]) -> NDArray[np.float32]:
+    """The same from the depth's gradient, (h, w) each: x right, y down, NaN for no surface."""
+    curvature = np.full(g_x.shape, np.nan, np.float32)
     curvature[1:-1, 1:-1] = 0.25 * (
         (g_x[1:-1, 2:] - g_x[1:-1, :-2]) + (g_y[2:, 1:-1] - g_y[:-2, 1:-1])
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, generate_binary_structure
 
 # A surface seen at 85° recedes 11 pixel footprints a pixel; more is a jump to another surface
 STEEPEST_SLOPE = 12.0
@@ -16,19 +15,17 @@ def silhouette(depth: NDArray[np.floating], footprint: NDArray[np.floating]) -> 
     depth: (h, w) along the ray, NaN where nothing is hit; footprint: (h, w) a pixel's width there.
     """
     edge = np.zeros(depth.shape, bool)
-    for axis in (0, 1):
-        near = depth[:-1] if axis == 0 else depth[:, :-1]
-        far = depth[1:] if axis == 0 else depth[:, 1:]
-        width = footprint[:-1] if axis == 0 else footprint[:, :-1]
+    seen = ~np.isnan(depth)
+    reach = STEEPEST_SLOPE * footprint
+    for one, other in (
+        ((slice(None, -1), slice(None)), (slice(1, None), slice(None))),
+        ((slice(None), slice(None, -1)), (slice(None), slice(1, None))),
+    ):
         with np.errstate(invalid="ignore"):
-            jump = np.abs(far - near) > STEEPEST_SLOPE * width
-        jump |= np.isnan(near) != np.isnan(far)
-        if axis == 0:
-            edge[:-1] |= jump
-            edge[1:] |= jump
-        else:
-            edge[:, :-1] |= jump
-            edge[:, 1:] |= jump
+            jump = np.abs(depth[other] - depth[one]) > reach[one]
+        jump |= seen[one] != seen[other]
+        edge[one] |= jump
+        edge[other] |= jump
     return edge
 
 
@@ -53,6 +50,15 @@ def inside(part: NDArray[np.bool_], seen: NDArray[np.bool_], margin: int) -> NDA
 
 def widen(edge: NDArray[np.bool_], pixels: int) -> NDArray[np.bool_]:
     """Everything within ``pixels`` of an edge pixel (diamonds and squares in turn: near a disc)."""
+    if not edge.any():
+        return edge
     for step in range(pixels):
-        edge = binary_dilation(edge, generate_binary_structure(2, 1 + step % 2))
+        wider = edge.copy()
+        wider[1:] |= edge[:-1]
+        wider[:-1] |= edge[1:]
+        # a diamond is a cross; a square is the column's run of three, widened along the row
+        along = wider.copy() if step % 2 else edge
+        wider[:, 1:] |= along[:, :-1]
+        wider[:, :-1] |= along[:, 1:]
+        edge = wider
     return edge

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -10,18 +11,21 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
+from ..angles.vectors import length
 from ..scan import Mesh
+from .cover import Cover
 
 CHUNK = 1 << 20  # rays at once: 24 M rays with their results would take over 2 GB
 
 
 class Hits(NamedTuple):
     """Where rays meet the mesh first. face: (n,) int32, -1 for none; u, v: (n,) float32 weights of
-    the face's second and third vertex."""
+    the face's second and third vertex; distance: (n,) float32 along the ray, scan units."""
 
     face: NDArray[np.int32]
     u: NDArray[np.float32]
     v: NDArray[np.float32]
+    distance: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
@@ -39,37 +43,47 @@ class RayScene:
         scene = EmbreeScene()
         triangles = (mesh.vertices - origin).astype(np.float32)[mesh.faces]
         TriangleMesh(scene, np.ascontiguousarray(triangles))
-        return cls(mesh, origin, scene)
+        del triangles
+        one = np.zeros((1, 3), np.float32)
+        scene.run(one, one + 1)  # builds the tree here, not in the first of several threads
+        made = cls(mesh, origin, scene)
+        _ = made._vertex_table, made._corners, made.cover
+        return made
 
-    def first_hits(self, start: NDArray[np.float64], directions: NDArray[np.float64]) -> Hits:
+    def first_hits(self, start: NDArray[np.float64], directions: NDArray[np.floating]) -> Hits:
         """First hits of rays along ``directions`` (n, 3) from one point ``start`` (3,), or from a
         point each (n, 3)."""
         n = len(directions)
         face = np.empty(n, np.int32)
-        u, v = np.empty(n, np.float32), np.empty(n, np.float32)
+        u, v, distance = (np.empty(n, np.float32) for _ in range(3))
         local = (start - self.origin).astype(np.float32)
         for begin in range(0, n, CHUNK):
             part = slice(begin, min(begin + CHUNK, n))
-            along = np.ascontiguousarray(directions[part], np.float32)
+            along = np.asarray(directions[part], np.float32)
             begins = np.broadcast_to(local if local.ndim == 1 else local[part], along.shape)
-            found = self.scene.run(np.ascontiguousarray(begins), along, output=True)
+            found = self.scene.run(begins, along, output=True)
             face[part], u[part], v[part] = found["primID"], found["u"], found["v"]
-        return Hits(face, u, v)
+            distance[part] = found["tfar"]
+        return Hits(face, u, v, distance)
 
     def occluded(
         self,
         points: NDArray[np.float64],
-        directions: NDArray[np.float64],
-        limits: NDArray[np.float64] | None = None,
+        directions: NDArray[np.floating],
+        limits: NDArray[np.floating] | None = None,
+        lift: NDArray[np.floating] | None = None,
     ) -> NDArray[np.bool_]:
-        """(n,) whether anything lies from ``points`` (n, 3) along unit ``directions``, (3,) or
-        (n, 3), nearer than ``limits`` (n,) where given."""
+        """(n,) whether anything lies from ``points`` (n, 3), moved by ``lift`` (n, 3) where given,
+        along unit ``directions``, (3,) or (n, 3), nearer than ``limits`` (n,) where given."""
         blocked = np.empty(len(points), bool)
+        same = directions.ndim == 1 or (len(directions) > 0 and directions.strides[0] == 0)
+        one = np.array(directions if directions.ndim == 1 else directions[:1], np.float32)
         for begin in range(0, len(points), CHUNK):
             part = slice(begin, begin + CHUNK)
-            start = np.ascontiguousarray(points[part] - self.origin, np.float32)
-            one = directions if directions.ndim == 1 else directions[part]
-            along = np.ascontiguousarray(np.broadcast_to(one, start.shape), np.float32)
+            start = (points[part] - self.origin).astype(np.float32)
+            if lift is not None:
+                start += lift[part]
+            along = one.reshape(1, 3) if same else np.asarray(directions[part], np.float32)
             far = None if limits is None else np.ascontiguousarray(limits[part], np.float32)
             found = self.scene.run(start, along, far, query="OCCLUDED")
             blocked[part] = np.asarray(found) >= 0
@@ -91,6 +105,44 @@ class RayScene:
         """(n, 3) unit smooth normals at hits (all must hit)."""
         normals = self._blend(self.mesh.vertex_normals, hits)
         return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+
+    def surface(self, hits: Hits) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """((3, n) points relative to ``origin``, (3, n) unit smooth normals) at hits (all must
+        hit), in float32: what points() and normals() say in a fifth of the time."""
+        table, corners = self._vertex_table, self._corners
+        second, third = hits.u, hits.v
+        first = np.float32(1.0) - second - third
+        out = np.empty((6, len(hits.face)), np.float32)
+        for k, weight in enumerate((first, second, third)):
+            vertex = corners[k].take(hits.face)
+            for row in range(6):
+                value = table[row].take(vertex)
+                value *= weight
+                if k == 0:
+                    out[row] = value
+                else:
+                    out[row] += value
+        normal = out[3:]
+        normal /= np.maximum(length(*normal), np.float32(1e-12))
+        return out[:3], normal
+
+    @cached_property
+    def cover(self) -> Cover:
+        """Where the mesh is, coarsely."""
+        return Cover.of(self.mesh)
+
+    @cached_property
+    def _vertex_table(self) -> NDArray[np.float32]:
+        """(6, v) components of the vertices relative to ``origin``, and of their normals."""
+        table = np.empty((6, len(self.mesh.vertices)), np.float32)
+        table[:3] = (self.mesh.vertices - self.origin).T
+        table[3:] = self.mesh.vertex_normals.T
+        return table
+
+    @cached_property
+    def _corners(self) -> NDArray[np.int32]:
+        """(3, f) the faces' first, second and third vertices."""
+        return np.ascontiguousarray(self.mesh.faces.T)
 
     def _blend(self, per_vertex: NDArray[np.float64], hits: Hits) -> NDArray[np.float64]:
         a, b, c = (per_vertex[self.mesh.faces[hits.face, k]] for k in range(3))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,32 +13,34 @@ from ..appearance.principled_fit import PrincipledFit, fit_principled
 from ..basis import Basis
 from ..capture import Capture, LightEntry
 from ..errors import FitError
-from ..fit import PaperFit, fit_paper
-from ..fit.held_out import HeldOut, leave_out, photos_to_hold_out, summarise
-from ..fit.spread import Spread, candidate_spread
-from ..geometry import RayScene, edges, view_surface
-from ..samples import SampleTable, sample_photo
+from ..fit import PaperFit
+from ..fit.held_out import HeldOut
+from ..fit.measured_result import MeasuredResult
+from ..fit.spread import Spread
+from ..geometry import RayScene
+from ..samples import SampleSink, SampleTable
 from ..samples.face_votes import FaceVotes
 from ..samples.level import at_typical_level
-from ..samples.take import light_surface, trusted_pixels
 from ..scan import Scan
 from . import inputs
+from .estimators import Estimate, estimate
 from .job import Job, Step
 from .lights import Lights, find_lights, refined
 from .photos import LitPhotos
+from .sampling import Taken, take_samples
 from .warnings import black_photos, material_warnings, trust_warnings
 
-MANY_CLIPPED = 1e-3  # of a photo's lit pixels
 LEAST_RHO, LARGEST_RHO = 1e-6, 1e4  # 1/sr: black velvet has 1e-3, mirrors' peaks 1e4
 
 
 @dataclass(frozen=True)
 class MaterialResult:
-    """One fitted material. samples: number used; per_photo: samples of every photo; scale: what
-    the photos' reflectance was multiplied by, 1 where the irradiance is known."""
+    """One fitted material. fit: by the capture's method; samples: number taken; per_photo: samples
+    of every photo; scale: what the photos' reflectance was multiplied by, 1 where the irradiance is
+    known."""
 
     name: str
-    fit: PaperFit
+    fit: PaperFit | MeasuredResult
     samples: int
     per_photo: tuple[int, ...]
     held_out: HeldOut | None
@@ -65,17 +67,6 @@ class CaptureResult:
     face_material: NDArray[np.int32]
 
 
-@dataclass(frozen=True)
-class _Taken:
-    """Samples of every material, photo by photo; surface pixels its masks mark; faces' votes;
-    what was noted while reading, and of how many photos."""
-
-    tables: dict[str, list[SampleTable]]
-    marked: dict[str, int]
-    votes: FaceVotes
-    notes: Counter[str]
-
-
 def _way(entry: LightEntry) -> str:
     """The key that says where a light is."""
     ways = ("sphere", "sun", "position", "mounted")
@@ -85,7 +76,8 @@ def _way(entry: LightEntry) -> str:
 class FitJob(Job):
     """Fit every material of a capture; ``result`` is there when the job is done.
 
-    prepare: what is done to the scan once it is read (face attributes that no file has).
+    prepare: what is done to the scan once it is read (face attributes that no file has). threads:
+    how many look at the photos (None: one a core); the result does not depend on it.
     """
 
     def __init__(
@@ -93,8 +85,10 @@ class FitJob(Job):
         capture: Capture,
         basis: Basis | None = None,
         prepare: Callable[[Scan], Scan] | None = None,
+        threads: int | None = None,
     ) -> None:
         super().__init__()
+        self.threads = threads
         self.capture = capture
         self.basis = basis
         self.prepare = prepare
@@ -138,6 +132,7 @@ class FitJob(Job):
                 *(f"{n} photo{'s' * (n > 1)}: {said}" for said, n in taken.notes.items()),
                 *photos.notes,
                 *lights.notes,
+                *inputs.unused_settings(capture),
                 *inputs.size_notes(capture, scan),
             ),
             rays=rays,
@@ -148,103 +143,76 @@ class FitJob(Job):
 
     def _take_samples(
         self, scan: Scan, rays: RayScene, photos: LitPhotos, lights: Lights
-    ) -> Generator[Step, None, _Taken]:
-        capture = self.capture
-        taken = _Taken(
-            tables={m.name: [] for m in capture.materials},
-            marked={m.name: 0 for m in capture.materials},
-            votes=FaceVotes.empty(len(scan.mesh.faces), len(capture.materials)),
-            notes=Counter(),
-        )
-        lit_by = {light.name: 0 for light in capture.lights}
-        seen_by = {light.name: 0 for light in capture.lights}
-        for place, photo in enumerate(capture.photos):
-            yield Step("sampling the photos", 0.05 + 0.35 * place / len(capture.photos))
-            camera = inputs.camera_of(capture, scan, place)
-            view = view_surface(rays, camera)
-            lighting = light_surface(rays, view, lights.of(capture, place), camera)
-            seen_by[photo.light] += len(view.pixel)
-            lit_by[photo.light] += int((~lighting.shadowed).sum())
-            where, in_shadow = inputs.material_pixels(capture, scan, view, place)
-            trusted = trusted_pixels(view, lighting, capture.fit.margins) & ~in_shadow
-            lit = photos.read(place)
-            usable = lit.usable.ravel()[view.pixel]
-            clipped = int((trusted & ~usable).sum())
-            if clipped > MANY_CLIPPED * trusted.sum():
-                taken.notes[
-                    "lit pixels are clipped and left out: highlights are missing; expose less, or "
-                    "take a bracket"
-                ] += 1
-            trusted &= usable
-            taken.notes.update(lit.notes)
-            for index, material in enumerate(capture.materials):
-                pixels = where[material.name]
-                taken.marked[material.name] += int(pixels.sum())
-                taken.votes.add(index, view.face[pixels])
-                part = view.image(pixels, fill=0).astype(bool)
-                inner = edges.inside(part, view.seen, capture.fit.margins.mask)
-                keep = trusted & inner.ravel()[view.pixel]
-                taken.tables[material.name].append(sample_photo(view, lighting, lit.radiance, keep))
-        self._check_light(seen_by, lit_by)
+    ) -> Generator[Step, None, Taken]:
+        """Step through the photos; every material's sinks get its samples as they come."""
+        sinks = {material.name: self.sinks(material.name) for material in self.capture.materials}
+        steps = take_samples(self.capture, scan, rays, photos, lights, sinks, self.threads)
+        while True:
+            try:
+                yield Step("sampling the photos", 0.05 + 0.35 * next(steps))
+            except StopIteration as end:
+                taken: Taken = end.value
+                break
+        self._check_light(taken)
         return taken
 
+    def sinks(self, material: str) -> Sequence[SampleSink]:
+        """Who wants all samples of a material, beside the reservoir that the paper's fit reads."""
+        return ()
+
     def _fit_material(
-        self, index: int, taken: _Taken, basis: Basis, known: bool
+        self, index: int, taken: Taken, basis: Basis, known: bool
     ) -> Generator[Step, None, MaterialResult]:
         capture = self.capture
         name = capture.materials[index].name
         share = 0.55 / len(capture.materials)
         start = 0.4 + share * index
         yield Step(f"fitting {name}", start)
-        table = SampleTable.join(taken.tables.pop(name))
+        table = taken.kept.pop(name).table()
         self._check_samples(index, table, taken.marked[name], known)
         scale = 1.0
         if not known:
             table, scale = at_typical_level(table, basis)
-        try:
-            fit = fit_paper(table, basis, capture.fit.paper)
-        except FitError as error:
-            raise capture.error(str(error), *self._entry(index)) from error
-        left_out = []
-        unseen = photos_to_hold_out(table) if capture.fit.held_out else []
-        for done, photo in enumerate(unseen):
-            yield Step(
-                f"predicting unseen photos of {name}",
-                start + share * (0.3 + 0.5 * done / len(unseen)),
-            )
-            left_out.append(leave_out(table, photo, basis, capture.fit.paper))
+        found = yield from self._estimate(index, table, basis, start, 0.8 * share)
         yield Step(f"Principled material of {name}", start + 0.8 * share)
-        principled = fit_principled(fit.brdf.evaluate)
-        held = summarise([part for part in left_out if part is not None])
-        spread = candidate_spread(basis, fit.candidates)
-        warnings = material_warnings(table, fit, known)
-        warnings += trust_warnings(held, spread, capture)
+        principled = fit_principled(found.fit.brdf.evaluate)
+        warnings = material_warnings(table, found.fit, known)
+        warnings += trust_warnings(found, capture)
         warnings += tuple(
             f"{capture.photo_name(photo)} is black where its light should reach: is this the "
             "camera it was taken with, and this its light?"
             for photo in black_photos(table)
         )
-        if None in left_out:
-            lost = [
-                capture.photo_name(photo)
-                for photo, part in zip(unseen, left_out, strict=True)
-                if part is None
-            ]
-            warnings += (f"without {', '.join(lost)} too little is left to fit",)
+        warnings += found.notes
         if principled.clipped:
             warnings += ("brighter than any base colour: the Principled material is too dark",)
         return MaterialResult(
             name=name,
-            fit=fit,
-            samples=len(table),
-            per_photo=tuple(np.bincount(table.photo, minlength=len(capture.photos)).tolist()),
-            held_out=held,
-            spread=spread,
+            fit=found.fit,
+            samples=int(taken.counts[name].sum()),
+            per_photo=tuple(taken.counts[name].tolist()),
+            held_out=found.held_out,
+            spread=found.spread,
             principled=principled,
             scale=scale,
             irradiance_known=known,
             warnings=warnings,
         )
+
+    def _estimate(
+        self, index: int, table: SampleTable, basis: Basis, start: float, share: float
+    ) -> Generator[Step, None, Estimate]:
+        """The fit itself, which takes the part ``share`` of the job from ``start`` on."""
+        steps = estimate(table, basis, self.capture, self.capture.materials[index].name)
+        while True:
+            try:
+                stage, done = next(steps)
+            except StopIteration as end:
+                found: Estimate = end.value
+                return found
+            except FitError as error:
+                raise self.capture.error(str(error), *self._entry(index)) from error
+            yield Step(stage, start + share * done)
 
     def _face_material(self, scan: Scan, votes: FaceVotes) -> NDArray[np.int32]:
         """What masks say, and over it what the mesh says where a material is given by its faces."""
@@ -255,7 +223,11 @@ class FitJob(Job):
                 found[scan.mesh.face_attributes[attribute] == index] = index
         return found
 
-    def _check_light(self, seen_by: dict[str, int], lit_by: dict[str, int]) -> None:
+    def _check_light(self, taken: Taken) -> None:
+        seen_by, lit_by = (Counter[str](), Counter[str]())
+        for place, photo in enumerate(self.capture.photos):
+            seen_by[photo.light] += int(taken.seen[place])
+            lit_by[photo.light] += int(taken.lit[place])
         if not any(seen_by.values()):
             raise self.capture.error("no lit photo shows any of the mesh", "scan", "mesh")
         for place, light in enumerate(self.capture.lights):

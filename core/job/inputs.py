@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -100,6 +101,16 @@ def size_notes(capture: Capture, scan: Scan) -> tuple[str, ...]:
     )
 
 
+def unused_settings(capture: Capture) -> tuple[str, ...]:
+    """A sentence where [fit] gives settings of a method that is not used."""
+    if not capture.fit.unused:
+        return ()
+    return (
+        f"[fit] {', '.join(capture.fit.unused)} changed nothing: what the paper's method takes; "
+        'method = "paper" uses it',
+    )
+
+
 def face_attribute(material: MaterialEntry) -> str | None:
     """The mesh's face attribute that says where a material is, None for one by masks."""
     if material.vertex_colour is not None or material.texture_colour is not None:
@@ -164,12 +175,22 @@ def _textured(
     return found
 
 
+def photo_masks(capture: Capture, place: int) -> dict[str, NDArray[np.bool_]]:
+    """{name: (h, w) where it is white} of one photo's masks. Raises InputError."""
+    return {name: _mask(capture, place, name) for name in capture.photos[place].masks}
+
+
 def material_pixels(
-    capture: Capture, scan: Scan, view: SurfaceView, place: int
+    capture: Capture,
+    scan: Scan,
+    view: SurfaceView,
+    place: int,
+    read: Mapping[str, NDArray[np.bool_]] | None = None,
 ) -> tuple[dict[str, NDArray[np.bool_]], NDArray[np.bool_]]:
-    """({material: (n,) its pixels}, (n,) pixels in the shadow mask) of one photo's SurfaceView."""
-    photo = capture.photos[place]
-    masks = {name: _mask(capture, place, name).ravel()[view.pixel] for name in photo.masks}
+    """({material: (n,) its pixels}, (n,) pixels in the shadow mask) of one photo's SurfaceView.
+    read: what photo_masks gave, where it is asked for more than once."""
+    whole = photo_masks(capture, place) if read is None else read
+    masks = {name: mask.ravel().take(view.pixel) for name, mask in whole.items()}
     shadow = masks.pop(SHADOW_MASK, np.zeros(len(view.pixel), bool))
     found = {}
     for index, material in enumerate(capture.materials):

@@ -61,7 +61,7 @@ class LitPhotos:
                 one = read_photo(photo.files[0], curve, photo.saturation)
                 radiance = one.radiance
                 if self.exposures[place][0] != 1.0:
-                    radiance = radiance / np.float32(self.exposures[place][0])
+                    radiance /= np.float32(self.exposures[place][0])
                 told = () if one.info.levels is None else (one.info.sentence,)
                 return LitPhoto(radiance, ~one.clipped, notes=(*told, *one.info.notes))
             merged = merge_bracket(

@@ -6,21 +6,25 @@ import numpy as np
 
 from ..capture import Capture
 from ..fit import PaperFit
-from ..fit.held_out import HeldOut
-from ..fit.spread import Spread
+from ..fit.measured_result import NINETY, MeasuredResult
 from ..samples import SampleTable
+from .estimators import Estimate
 
 FEW_AT_PEAK = 200  # samples within 5° of the half vector
 POOR = 0.2  # typical held-out error, and spread of the trials, that deserve a word
 ODD_PHOTO = 5.0  # times the median held-out error of the photos
+ODD_GAIN = 0.1  # of a photo against the others
+BAD_NORMALS = 5.0  # degrees along each tangent
 BLACK, TOO_MANY_BLACK = 0.002, 0.1  # of the bright end; fraction of a photo's samples
 
 
-def material_warnings(table: SampleTable, fit: PaperFit, irradiance_known: bool) -> tuple[str, ...]:
+def material_warnings(
+    table: SampleTable, fit: PaperFit | MeasuredResult, irradiance_known: bool
+) -> tuple[str, ...]:
     """What an artist should know about this material before trusting it."""
     found = list(fit.warnings)
     near_peak = int((table.theta_h < np.radians(5)).sum())
-    if near_peak < 200:
+    if near_peak < FEW_AT_PEAK:
         found.append(
             f"only {near_peak} samples lie within 5° of the highlight: its height is a guess; "
             "add a photo that shows the highlight"
@@ -36,27 +40,51 @@ def material_warnings(table: SampleTable, fit: PaperFit, irradiance_known: bool)
     return tuple(found)
 
 
-def trust_warnings(held: HeldOut | None, spread: Spread, capture: Capture) -> tuple[str, ...]:
+def trust_warnings(found: Estimate, capture: Capture) -> tuple[str, ...]:
     """Where the fit itself says that it is poor, or that one photo does not belong."""
-    found = []
+    held, spread, said = found.held_out, found.spread, []
     if held is not None and held.typical > POOR:
-        found.append(
+        said.append(
             "poor: the typical pixel of a photo it has not seen is off by "
             f"{100 * held.typical:.0f} %"
         )
-    if spread.median > POOR:
-        found.append(
+    if isinstance(found.fit, MeasuredResult):
+        said += _doubts(found.fit, spread.median, capture)
+    elif spread.median > POOR:
+        said.append(
             f"unstable: other random pixels give another material (± {100 * spread.median:.0f} %)"
         )
     if held is not None and len(held.per_photo) > 2:
         usual = float(np.median(list(held.per_photo.values())))
-        found += [
+        said += [
             f"{capture.photo_name(photo)} is predicted {error / usual:.0f} times worse than the "
             "others: check its camera, light and exposure, or it shows an angle that they do not"
             for photo, error in held.per_photo.items()
             if error > ODD_PHOTO * usual
         ]
-    return tuple(found)
+    return tuple(said)
+
+
+def _doubts(fit: MeasuredResult, deviation: float, capture: Capture) -> list[str]:
+    """What the measured fit knows of its own input."""
+    said = [
+        f"{capture.photo_name(photo)} is {abs(100 * (gain - 1)):.0f} % "
+        f"{'brighter' if gain > 1 else 'darker'} than the other photos say: check its exposure "
+        "and its light's irradiance"
+        for photo, gain in fit.odd_gains(ODD_GAIN).items()
+    ]
+    if fit.normal_deviation > BAD_NORMALS:
+        said.append(
+            f"the mesh's normals are off by {fit.normal_deviation:.0f}°: check that mesh and "
+            "cameras belong together, or make a finer mesh"
+        )
+    if deviation > POOR:
+        off = 100 * np.expm1(NINETY * deviation)
+        said.append(
+            f"unsure: for half of all directions the reflectance is known to ± {off:.0f} % at "
+            "best (90 % band); photos under more angles would tell"
+        )
+    return said
 
 
 def black_photos(table: SampleTable) -> list[int]:

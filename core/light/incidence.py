@@ -25,7 +25,15 @@ class Incidence:
     def select(self, which: NDArray) -> Incidence:
         """The rows of a boolean mask or an index array."""
         distance = None if self.distance is None else self.distance[which]
-        return Incidence(self.towards[which], self.irradiance[which], distance)
+        return Incidence(_rows(self.towards, which), _rows(self.irradiance, which), distance)
+
+
+def _rows(values: Array, which: NDArray) -> Array:
+    """Rows of (n, 3); of one row that stands for all (a distant light's) it stays one."""
+    if values.strides[0] == 0 and len(values):
+        count = int(np.count_nonzero(which)) if which.dtype == bool else len(which)
+        return np.broadcast_to(values[0], (count, values.shape[1]))
+    return values[which]
 
 
 class Light(Protocol):

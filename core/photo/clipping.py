@@ -11,9 +11,17 @@ NEAR = 0.99  # of the top: demosaicing, sharpening and lossy compression blur th
 def clipped(encoded: NDArray, top: float) -> NDArray[np.bool_]:
     """(h, w) where any channel of (h, w, c) is within 1 % of ``top``, the encoding's largest
     number (255, 65535, 1.0, or the saturation in linear units)."""
-    return np.asarray(encoded.max(axis=2) >= NEAR * top)
+    return _extreme(np.maximum, encoded) >= NEAR * top
 
 
 def black(encoded: NDArray) -> NDArray[np.bool_]:
     """(h, w) where any channel of (h, w, c) is at or below 0: what it was is not known."""
-    return np.asarray(encoded.min(axis=2) <= 0)
+    return _extreme(np.minimum, encoded) <= 0
+
+
+def _extreme(which: np.ufunc, encoded: NDArray) -> NDArray:
+    """(h, w) over the channels: channel by channel, which is much faster than along them."""
+    found = encoded[:, :, 0]
+    for channel in range(1, encoded.shape[2]):
+        found = which(found, encoded[:, :, channel])
+    return np.asarray(found)

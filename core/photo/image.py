@@ -85,7 +85,7 @@ class OpenImage:
             if block is None:
                 raise InputError(f"not a whole image ({_reason(self.file)})", file=self.path)
             block = block.reshape(end - top, spec.width, last - first)
-            yield top, block[:, :, wanted]
+            yield top, block if wanted == list(range(last - first)) else block[:, :, wanted]
 
 
 @contextmanager

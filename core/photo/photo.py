@@ -99,7 +99,8 @@ def _decode(image: OpenImage, transfer: Transfer, saturation: float | None) -> P
             bright[rows], dark[rows] = clipped(block, top), black(block)
         else:
             light[rows] = block
-            broken += int((~np.isfinite(light[rows])).any(axis=2).sum())
+            if not np.isfinite(light[rows]).all():
+                broken += int((~np.isfinite(light[rows])).any(axis=2).sum())
             if not says.transfer.is_linear:
                 light[rows] = says.transfer.decode(light[rows])
             if image.container.scale != (1.0, 1.0, 1.0):

@@ -6,18 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import Angles
-from ..basis import Basis
+from ..basis import Basis, PrincipalBRDF
 from ..samples import SampleTable
 
 CHUNK = 1 << 16
 
 
-def predict_radiance(
-    basis: Basis, coefficients: NDArray[np.floating], table: SampleTable
-) -> NDArray[np.float32]:
-    """(n, 3) radiance of every sample's pixel for one BRDF, coefficients (3, k)."""
-    rho = basis.evaluate(coefficients, table.angles)
-    return rho * table.irradiance * table.cos_i[:, None]
+def predict_radiance(brdf: PrincipalBRDF, table: SampleTable) -> NDArray[np.float32]:
+    """(n, 3) radiance of every sample's pixel for one BRDF."""
+    return brdf.evaluate(table.angles) * table.irradiance * table.cos_i[:, None]
 
 
 def similarity_sums(

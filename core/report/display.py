@@ -61,9 +61,14 @@ def shrink(pixels: NDArray[np.floating], longest: int) -> NDArray[np.floating]:
     factor = max(1, -(-max(pixels.shape[:2]) // longest))
     if factor == 1:
         return pixels
-    h, w = (n // factor * factor for n in pixels.shape[:2])
-    blocks = pixels[:h, :w].reshape(h // factor, factor, w // factor, factor, -1)
-    known = np.isfinite(blocks)
-    total = np.where(known, blocks, 0).sum(axis=(1, 3))
-    count = known.sum(axis=(1, 3))
-    return np.where(count > factor**2 / 2, total / np.maximum(count, 1), np.nan)
+    rows, columns = (n // factor for n in pixels.shape[:2])
+    out = np.empty((rows, columns, *pixels.shape[2:]), np.float64)
+    for row in range(rows):  # a photo's worth of intermediate numbers is too much
+        line = pixels[row * factor : (row + 1) * factor, : columns * factor]
+        blocks = line.reshape(factor, columns, factor, -1)
+        known = np.isfinite(blocks)
+        total = np.where(known, blocks, 0).sum(axis=(0, 2), dtype=np.float64)
+        count = known.sum(axis=(0, 2))
+        mean = np.where(count > factor**2 / 2, total / np.maximum(count, 1), np.nan)
+        out[row] = mean.reshape(out[row].shape)
+    return out

@@ -17,10 +17,12 @@ STEP = np.radians(0.5)
 
 @dataclass(frozen=True)
 class Curve:
-    """One BRDF to draw. evaluate(angles) -> ρ (n, 3); dash: an SVG dash pattern."""
+    """One BRDF to draw. evaluate(angles) -> ρ (n, 3); interval(angles) -> (low, high) (n, 3), to be
+    shaded; dash: an SVG dash pattern."""
 
     label: str
     evaluate: Callable[[Angles], NDArray[np.floating]]
+    interval: Callable[[Angles], tuple[NDArray[np.floating], NDArray[np.floating]]] | None = None
     dash: str = ""
 
 
@@ -60,12 +62,13 @@ def polar_chart(curves: Sequence[Curve], incidence_degrees: float) -> str:
         f'<line x1="{centre - RADIUS}" y1="{CENTRE_Y}" x2="{centre + RADIUS}" y2="{CENTRE_Y}" '
         'stroke="#99a"/>'
     )
+    for curve in curves:
+        if curve.interval is not None:
+            parts += _shaded(curve.interval(angles), theta_o, ring)
     for curve, value in zip(curves, values, strict=True):
         radius = RADIUS * np.cbrt(value / ring)
         for channel in range(3):
-            xs = centre + radius[:, channel] * np.sin(theta_o)
-            ys = CENTRE_Y - radius[:, channel] * np.cos(theta_o)
-            path = " ".join(f"{x:.1f},{y:.1f}" for x, y in zip(xs, ys, strict=True))
+            path = _points(radius[:, channel], theta_o)
             dash = f' stroke-dasharray="{curve.dash}"' if curve.dash else ""
             parts.append(
                 f'<polyline points="{path}" fill="none" stroke="{COLOURS[channel]}" '
@@ -80,6 +83,26 @@ def polar_chart(curves: Sequence[Curve], incidence_degrees: float) -> str:
         "radius ∛ρ, rings in 1/sr</text></svg>"
     )
     return "".join(parts)
+
+
+def _points(radius: NDArray, theta_o: NDArray[np.floating]) -> str:
+    xs = WIDTH / 2 + radius * np.sin(theta_o)
+    ys = CENTRE_Y - radius * np.cos(theta_o)
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in zip(xs, ys, strict=True))
+
+
+def _shaded(
+    interval: tuple[NDArray[np.floating], NDArray[np.floating]],
+    theta_o: NDArray[np.floating],
+    ring: float,
+) -> list[str]:
+    """Between low and high, as far as the chart reaches."""
+    low, high = (RADIUS * np.cbrt(np.clip(x / ring, 0.0, 1.0)) for x in interval)
+    return [
+        f'<polygon points="{_points(low[:, c], theta_o)} {_points(high[::-1, c], theta_o[::-1])}" '
+        f'fill="{COLOURS[c]}" fill-opacity="0.15"/>'
+        for c in range(3)
+    ]
 
 
 def _round_up(x: float) -> float:

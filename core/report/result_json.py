@@ -11,11 +11,20 @@ from typing import Any
 
 import numpy as np
 
+from ..fit import PaperFit
+from ..fit.measured_result import MeasuredResult
+from ..fit.spread import Spread
 from ..job import CaptureResult, MaterialResult, Stage, inputs
 from ..light import Light
+from .figures import half_width, told_gains
 
 MANIFEST = Path(__file__).parents[2] / "blender_manifest.toml"
-FORMAT = 1
+FORMAT = 2
+PAPER_UNCERTAINTY = "std of ln(rho cosMap + 0.001) between trials; not calibrated"
+MEASURED_UNCERTAINTY = (
+    "std of ln(rho cosMap + 0.001) that the photos leave; interval_90: nine times in ten the truth "
+    "is off by less than this fraction"
+)
 
 
 def program_version() -> str:
@@ -81,22 +90,67 @@ def _light(result: CaptureResult, light: Light) -> dict[str, Any]:
 
 
 def _material(result: CaptureResult, material: MaterialResult) -> dict[str, Any]:
-    fit, held, photos = material.fit, material.held_out, result.capture.photos
-    width = {i: inputs.camera_of(result.capture, result.scan, i).width for i in range(len(photos))}
-    chosen = fit.chosen
-    names = [result.capture.photo_name(place) for place in range(len(photos))]
-    principled = material.principled
+    fit, held, principled = material.fit, material.held_out, material.principled
+    names = [result.capture.photo_name(place) for place in range(len(result.capture.photos))]
+    if isinstance(fit, MeasuredResult):
+        own, measure = _measured(fit, names), MEASURED_UNCERTAINTY
+    else:
+        own, measure = _paper(result, fit, names), PAPER_UNCERTAINTY
     return {
         "name": material.name,
-        "estimator": "paper",
+        "estimator": "measured" if isinstance(fit, MeasuredResult) else "paper",
         "coefficients": fit.brdf.coefficients.tolist(),
         "scale_known": material.irradiance_known,
         "scale": material.scale,
         "samples": {
             "used": material.samples,
-            "on_calm_surface": fit.reliable,
+            **({} if isinstance(fit, MeasuredResult) else {"on_calm_surface": fit.reliable}),
             "per_photo": dict(zip(names, material.per_photo, strict=True)),
         },
+        **own,
+        "held_out": None
+        if held is None
+        else {
+            "measure": "relative RMS error of lit pixels, each photo predicted from the others",
+            "error": held.error,
+            "typical": held.typical,
+            "per_photo": {names[i]: e for i, e in held.per_photo.items()},
+        },
+        "uncertainty": {
+            "measure": measure,
+            "median": material.spread.median,
+            "percentile_90": material.spread.percentile_90,
+            "at_highlight": material.spread.at_highlight,
+            **(_interval(material.spread) if isinstance(fit, MeasuredResult) else {}),
+        },
+        "principled": {
+            **{k: _plain(v) for k, v in vars(principled.principled).items()},
+            "cube_root_error": principled.error,
+            "lambertian_cube_root_error": principled.diffuse_error,
+        },
+        "warnings": list(material.warnings),
+    }
+
+
+def _measured(fit: MeasuredResult, names: Sequence[str]) -> dict[str, Any]:
+    return {
+        "normal_deviation": fit.normal_deviation,
+        "gains": {names[photo]: gain for photo, gain in sorted(told_gains(fit).items())},
+        "unseen_directions": fit.anchoring,
+    }
+
+
+def _interval(spread: Spread) -> dict[str, Any]:
+    return {"interval_90": {key: half_width(value) for key, value in vars(spread).items()}}
+
+
+def _paper(result: CaptureResult, fit: PaperFit, names: Sequence[str]) -> dict[str, Any]:
+    chosen = fit.chosen
+    width = {
+        photo: inputs.camera_of(result.capture, result.scan, photo).width
+        for photo in np.unique(chosen.photo).tolist()
+    }
+    return {
         "chosen": [
             {
                 "photo": names[int(chosen.photo[i])],
@@ -113,26 +167,6 @@ def _material(result: CaptureResult, material: MaterialResult) -> dict[str, Any]
         ],
         "condition_number": fit.condition,
         "cosine_similarity": fit.similarity.tolist(),
-        "held_out": None
-        if held is None
-        else {
-            "measure": "relative RMS error of lit pixels, each photo predicted from the others",
-            "error": held.error,
-            "typical": held.typical,
-            "per_photo": {names[i]: e for i, e in held.per_photo.items()},
-        },
-        "uncertainty": {
-            "measure": "std of ln(rho cosMap + 0.001) between trials; not calibrated",
-            "median": material.spread.median,
-            "percentile_90": material.spread.percentile_90,
-            "at_highlight": material.spread.at_highlight,
-        },
-        "principled": {
-            **{k: _plain(v) for k, v in vars(principled.principled).items()},
-            "cube_root_error": principled.error,
-            "lambertian_cube_root_error": principled.diffuse_error,
-        },
-        "warnings": list(material.warnings),
     }
 
 

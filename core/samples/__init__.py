@@ -1,6 +1,8 @@
 """One table of reflectance samples: who saw what, under which angles, how reliable."""
 
+from .reservoir import SampleReservoir
+from .sink import SampleSink
 from .table import SampleTable
 from .take import Margins, sample_photo
 
-__all__ = ["Margins", "SampleTable", "sample_photo"]
+__all__ = ["Margins", "SampleReservoir", "SampleSink", "SampleTable", "sample_photo"]

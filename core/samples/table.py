@@ -20,7 +20,8 @@ class SampleTable:
     cos_i, cos_o: (n,) float32. rho: (n, 3) float32, L / (E · cos θi), 1/sr.
     radiance: (n, 3) float32, the photo's units. irradiance: (n, 3) float32 at normal incidence.
     light: (n, 3) float32 unit direction surface → light, scan frame.
-    normal, view: (n, 3) float32 unit, scan frame. curvature: (n,) float32, 1/pixel, NaN unknown.
+    point: (n, 3) float64, where on the surface; normal, view: (n, 3) float32 unit; scan frame.
+    curvature: (n,) float32, 1/pixel, NaN unknown.
     """
 
     photo: NDArray[np.int16]
@@ -32,6 +33,7 @@ class SampleTable:
     cos_o: NDArray[np.float32]
     rho: NDArray[np.float32]
     radiance: NDArray[np.float32]
+    point: NDArray[np.float64]
     normal: NDArray[np.float32]
     view: NDArray[np.float32]
     curvature: NDArray[np.float32]
@@ -65,11 +67,29 @@ class SampleTable:
         return SampleTable(photo=photo, **rows)
 
     @staticmethod
-    def prepend(one: SampleTable, rest: SampleTable) -> SampleTable:
-        """Both tables speak of the same photos."""
+    def concatenate(tables: Sequence[SampleTable]) -> SampleTable:
+        """Tables that speak of the same photos, one after the other (at least one)."""
+        if len(tables) == 1:
+            return tables[0]
         return SampleTable(
             **{
-                f.name: np.concatenate([getattr(one, f.name), getattr(rest, f.name)])
+                f.name: np.concatenate([getattr(t, f.name) for t in tables])
                 for f in fields(SampleTable)
             }
         )
+
+    @staticmethod
+    def empty() -> SampleTable:
+        """No samples at all."""
+        flat, vectors = np.zeros(0, np.float32), np.zeros((0, 3), np.float32)
+        return SampleTable(
+            photo=np.zeros(0, np.int16), pixel=np.zeros(0, np.int32),
+            theta_h=flat, theta_d=flat, phi_d=flat, cos_i=flat, cos_o=flat,
+            rho=vectors, radiance=vectors, point=np.zeros((0, 3)), normal=vectors, view=vectors,
+            curvature=flat, light=vectors, irradiance=vectors,
+        )  # fmt: skip
+
+    @staticmethod
+    def prepend(one: SampleTable, rest: SampleTable) -> SampleTable:
+        """Both tables speak of the same photos."""
+        return SampleTable.concatenate([one, rest])

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import half_difference
+from ..angles.vectors import dot
 from ..geometry import RayScene, SurfaceView, edges
 from ..geometry.view import cast_shadow
 from ..light import Incidence, Light
@@ -29,42 +30,57 @@ class Margins:
 
 @dataclass(frozen=True)
 class Lighting:
-    """How light falls on a SurfaceView: incidence at every pixel's point; cos_i (n,) signed;
-    shadowed (n,) attached or cast."""
+    """How light falls on a SurfaceView: incidence at every pixel's point; cos_i (n,) signed,
+    float32; shadowed (n,) attached or cast."""
 
     incidence: Incidence
-    cos_i: NDArray[np.float64]
+    cos_i: NDArray[np.float32]
     shadowed: NDArray[np.bool_]
 
 
 def light_surface(rays: RayScene, view: SurfaceView, light: Light, camera: Camera) -> Lighting:
     """Light, irradiance cosine and shadow at every pixel's point, in the camera's photo."""
     incidence = light.incidence(view.point, camera)
-    cos_i = np.einsum("ij,ij->i", view.normal, incidence.towards)
+    cos_i = dot(_single(view.normal), _single(incidence.towards))
     shadowed = cos_i <= 0
     facing = np.flatnonzero(~shadowed)
     some = incidence.select(facing)
     shadowed[facing] = cast_shadow(
-        rays, view.point[facing], view.normal[facing], some.towards, some.distance
+        rays, _kept(view.point, facing), _kept(view.normal, facing), some.towards, some.distance
     )
     return Lighting(incidence, cos_i, shadowed)
 
 
+def halo(margins: Margins) -> int:
+    """Rows around a window that its margins, outlines and curvature look at."""
+    return max(1, margins.silhouette, margins.shadow, margins.mask)
+
+
 def trusted_pixels(view: SurfaceView, lighting: Lighting, margins: Margins) -> NDArray[np.bool_]:
     """(n,) lit pixels away from outlines, shadow edges and grazing angles."""
-    cos_o = np.einsum("ij,ij->i", view.normal, view.view)
-    lit = view.image(~lighting.shadowed, fill=0).astype(bool)
+    cos_o = dot(view.normal, view.view)
     near = np.zeros(view.shape, bool)
     if margins.silhouette > 0:
         near = edges.widen(view.silhouette, margins.silhouette - 1)
     if margins.shadow > 0:
+        lit = view.image(~lighting.shadowed, fill=0)
         near = near | edges.widen(edges.shadow_edge(lit, view.seen), margins.shadow - 1)
     return (
         ~lighting.shadowed
         & (lighting.cos_i > margins.cosine)
         & (cos_o > margins.cosine)
-        & ~near.ravel()[view.pixel]
+        & ~view.at(near)
     )
+
+
+def inner_pixels(
+    view: SurfaceView, pixels: NDArray[np.bool_], margins: Margins
+) -> NDArray[np.bool_]:
+    """(n,) of the pixels (n,) of a mask those away from its borders with other surface."""
+    if margins.mask <= 0 or pixels.all():
+        return pixels
+    part = view.image(pixels, fill=0)
+    return view.at(edges.inside(part, view.seen, margins.mask))
 
 
 def sample_photo(
@@ -72,29 +88,55 @@ def sample_photo(
     lighting: Lighting,
     radiance: NDArray[np.float32],
     keep: NDArray[np.bool_],
+    photo: int = 0,
 ) -> SampleTable:
     """ρ = L / (E · n·l) for the pixels of ``view`` marked in ``keep`` (n,).
 
-    radiance: (h, w, 3) linear, in the units of the light's irradiance / sr.
+    radiance: (h, w, 3) of the whole photo, linear, in the units of the light's irradiance / sr.
+    photo: the number that the table says.
     """
-    normal, towards = view.normal[keep], view.view[keep]
-    incidence = lighting.incidence.select(keep)
-    angles = half_difference(normal, incidence.towards, towards)
-    seen = radiance.reshape(-1, 3)[view.pixel[keep]]
-    cos_i = lighting.cos_i[keep]
+    rows = np.flatnonzero(keep)
+    normal, towards = (_kept(_single(v), rows) for v in (view.normal, view.view))
+    incidence = lighting.incidence.select(rows)
+    light, irradiance = _single(incidence.towards), _single(incidence.irradiance)
+    angles = half_difference(normal, light, towards)
+    cos_i = lighting.cos_i.take(rows)
+    pixel = view.pixel.take(rows)
+    seen = radiance.reshape(-1, 3).take(pixel, axis=0)
+    rho = np.empty_like(seen)
+    for channel in range(3):
+        rho[:, channel] = seen[:, channel] / (irradiance[:, channel] * cos_i)
+    n = len(rows)
     return SampleTable(
-        photo=np.zeros(len(seen), np.int16),
-        pixel=view.pixel[keep],
-        theta_h=angles.theta_h.astype(np.float32),
-        theta_d=angles.theta_d.astype(np.float32),
-        phi_d=angles.phi_d.astype(np.float32),
-        cos_i=cos_i.astype(np.float32),
-        cos_o=np.einsum("ij,ij->i", normal, towards).astype(np.float32),
-        rho=(seen / (incidence.irradiance * cos_i[:, None])).astype(np.float32),
-        radiance=seen.astype(np.float32),
-        normal=normal.astype(np.float32),
-        view=towards.astype(np.float32),
-        curvature=view.curvature[keep],
-        light=incidence.towards.astype(np.float32),
-        irradiance=incidence.irradiance.astype(np.float32),
+        photo=np.full(n, photo, np.int16),
+        pixel=pixel,
+        theta_h=angles.theta_h,
+        theta_d=angles.theta_d,
+        phi_d=angles.phi_d,
+        cos_i=cos_i,
+        cos_o=dot(normal, towards),
+        rho=rho,
+        radiance=seen,
+        point=_kept(view.point, rows),
+        normal=normal,
+        view=towards,
+        curvature=view.curvature.take(rows),
+        light=np.broadcast_to(light, (n, 3)),
+        irradiance=np.broadcast_to(irradiance, (n, 3)),
     )
+
+
+def _single(values: NDArray[np.floating]) -> NDArray[np.float32]:
+    """(n, 3) in float32; (1, 3) where one row stands for all."""
+    if len(values) and values.strides[0] == 0:
+        values = values[:1]
+    return values.astype(np.float32, copy=False)
+
+
+def _kept(values: NDArray[np.floating], rows: NDArray[np.intp]) -> NDArray[np.floating]:
+    """(m, 3) rows, their components side by side in memory: three long rows are read faster than
+    many of three."""
+    out = np.empty((3, len(rows)), values.dtype)
+    for axis in range(3):
+        out[axis] = values[:, axis].take(rows)
+    return out.T

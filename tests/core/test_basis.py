@@ -46,7 +46,7 @@ def basis() -> Basis:
 
 
 def test_default_is_small_and_rich(basis: Basis, root: Path) -> None:
-    assert basis.count >= 25 and basis.columns == 300
+    assert basis.count == 100 and basis.columns == 300
     assert (root / "assets" / "basis" / "nbrdf_basis.npz").stat().st_size < 4e6
     explained = basis.explained.cumsum()
     for k, share in ((1, 0.590), (2, 0.863), (3, 0.943), (5, 0.981), (10, 0.993), (20, 0.998)):
@@ -134,6 +134,57 @@ def test_components_by_gram_equal_those_by_svd() -> None:
     scaled = x.T @ w
     assert np.allclose(np.linalg.norm(scaled, axis=0), singular[:4])
     assert np.allclose(explained, singular**2 / (singular**2).sum())
+
+
+def test_training_coefficients_are_those_of_the_materials(basis: Basis, shared: Path) -> None:
+    """Row 3m + c is channel c of material m: its projection, found without the stored numbers."""
+    names, weights = nbrdf.load(shared / "data" / "brdf" / "nbrdf_merl.npz")
+    assert basis.training is not None and basis.training.shape == (300, 100)
+    assert np.allclose(basis.training.var(axis=0), 1 / 300, rtol=0.01)
+    edges = merl_grid.node_angles(0.0)
+    seen = np.flatnonzero(merl_grid.visible(merl_grid.node_angles(0.5)))
+    some = np.random.default_rng(0).choice(seen, 12_000, replace=False)
+    angles = Angles(*(a.ravel()[some] for a in edges))
+    for name in ("alum-bronze", "pink-felt"):
+        m = names.index(name)
+        found = basis.project(nbrdf.evaluate(weights[m], angles), angles, 20)
+        stored = basis.training[3 * m : 3 * m + 3, :20]
+        assert np.sqrt(np.mean((found - stored) ** 2)) < 0.1 * np.sqrt(np.mean(stored**2))
+
+
+def test_a_file_of_the_first_format_still_loads(basis: Basis, tmp_path: Path) -> None:
+    """int16 second differences, no training coefficients; written here by hand."""
+
+    def encoded(values: np.ndarray, step: float) -> np.ndarray:
+        fixed = np.round(values / step).astype(np.int64)
+        return np.diff(np.diff(fixed, axis=1, prepend=0), axis=3, prepend=0).astype(np.int16)
+
+    path = tmp_path / "old.npz"
+    np.savez(
+        path,
+        format=np.int32(1),
+        grid=np.array([*basis.grid.shape, basis.grid.knee]),
+        mean=encoded(basis.mean[None], 0.0005),
+        log_reference=encoded(basis.log_reference[None], 0.0005),
+        components=encoded(basis.components[:3], 0.01),
+        explained=basis.explained,
+        columns=np.int32(300),
+        provenance=np.array("by hand"),
+    )
+    old = storage.load(path)
+    assert old.count == 3 and old.training is None
+    assert np.allclose(old.components, basis.components[:3], atol=1e-4)
+    assert np.allclose(old.mean, basis.mean, atol=1e-5)
+
+
+def test_many_components_cost_no_more_to_evaluate(basis: Basis) -> None:
+    """The table of sums is the BRDF itself, not an approximation."""
+    c = np.random.default_rng(4).normal(0, 0.058, (3, 100))
+    rng = np.random.default_rng(5)
+    angles = Angles(*(rng.uniform(0, top, (40, 5)) for top in (1.2, 1.0, np.pi)))
+    one_by_one, summed = basis.evaluate(c, angles), PrincipalBRDF(basis, c).evaluate(angles)
+    assert summed.shape == (40, 5, 3)
+    assert np.allclose(summed, one_by_one, rtol=1e-4, atol=1e-7)
 
 
 def test_storage_round_trip_and_refusal(basis: Basis, tmp_path: Path) -> None:

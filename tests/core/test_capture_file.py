@@ -10,7 +10,7 @@ import pytest
 
 from patina.core.capture import read_capture
 from patina.core.errors import InputError, PatinaError
-from patina.core.job import FitJob
+from patina.core.job import FitJob, inputs
 from tests import make_capture as made
 
 
@@ -195,3 +195,27 @@ def test_a_good_capture_is_read_whole(ball: Path) -> None:
     assert capture.fit.paper.samples == 6 and capture.fit.paper.curvature == 0.2
     with pytest.raises(InputError):
         read_capture(ball.with_name("nothing.toml"))
+
+
+def test_the_method_is_ours_unless_the_papers_is_asked_for(tmp_path: Path) -> None:
+    path = made.make_capture(tmp_path / "ball", photos=1)
+    plain = read_capture(path).fit
+    assert plain.method == "measured" and plain.unused == ()
+    text = path.read_text()
+    path.write_text(text + '\n[fit]\nmethod = "paper"\ntrials = 3\n')
+    asked = read_capture(path).fit
+    assert asked.method == "paper" and asked.paper.trials == 3 and asked.unused == ()
+    path.write_text(text + '\n[fit]\nmethod = "papers"\n')
+    with pytest.raises(InputError, match=r"fit\.method.*'papers'.*'measured' or 'paper'"):
+        read_capture(path)
+
+
+def test_settings_of_the_other_method_are_told(tmp_path: Path) -> None:
+    """They change nothing, and a user who set them should know."""
+    path = made.make_capture(
+        tmp_path / "ball", photos=1, extra="[fit]\neta = 10\nsamples = 8\nshadow_margin = 2"
+    )
+    capture = read_capture(path)
+    assert capture.fit.unused == ("samples", "eta")
+    (said,) = inputs.unused_settings(capture)
+    assert "samples, eta" in said and 'method = "paper"' in said

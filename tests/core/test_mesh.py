@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from patina.core.angles import Angles
 from patina.core.capture import read_capture
 from patina.core.job import FitJob
 from patina.core.scan.mesh import read_mesh
@@ -82,7 +83,7 @@ def test_materials_by_face_attribute(tmp_path: Path) -> None:
     assert (job.result.face_material == upper).all()
     assert lower.samples > 1000 and higher.samples > 1000
     for material, brightest in ((lower, 0), (higher, 2)):
-        body = material.fit.chosen.rho[np.argmax(material.fit.chosen.theta_h)]
+        body = material.fit.brdf.evaluate(Angles(*np.radians([[50.0], [20.0], [90.0]])))[0]
         assert int(np.argmax(body)) == brightest
 
 

@@ -1,15 +1,17 @@
-"""The atlas that OSL reads: same interpolation as the basis, and what half floats cost."""
+"""The pictures that OSL reads: the BRDF itself, by the same interpolation as the basis'."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from patina.core.angles import Angles, cosines
 from patina.core.appearance import osl_atlas, osl_source
-from patina.core.basis import Basis, mapping
+from patina.core.basis import Basis, PrincipalBRDF, mapping
 
-COUNT = 20
+COUNT = 8
 
 
 @pytest.fixture(scope="module")
@@ -26,9 +28,9 @@ def angles() -> Angles:
     return Angles(*(np.concatenate([a[kept], e]) for a, e in zip(drawn, edges, strict=True)))
 
 
-def _through_atlas(atlas, basis: Basis, angles: Angles, coefficients) -> np.ndarray:
-    """ρ as the shader computes it, from the texels."""
-    grid = basis.grid
+def _through_pictures(brdf: PrincipalBRDF, angles: Angles, coefficients) -> np.ndarray:
+    """ρ as the shader computes it from the texels of ``brdf``, with these as its inputs."""
+    grid = brdf.basis.grid
     half_pi = np.pi / 2
     u = np.stack(
         [
@@ -38,39 +40,62 @@ def _through_atlas(atlas, basis: Basis, angles: Angles, coefficients) -> np.ndar
         ],
         axis=-1,
     )
-    rows = osl_atlas.groups(coefficients.shape[1])
-    slots = np.concatenate([osl_atlas.lookup(atlas, grid, u, g) for g in range(rows)], axis=1)
-    k = coefficients.shape[1]
-    logarithm = slots[:, :2].sum(axis=1)[:, None] + slots[:, 2 : 2 + k] @ coefficients.T
+    atlas, remainder = osl_atlas.component_texels(brdf.basis), osl_atlas.remainder_texels(brdf)
+    k = osl_atlas.traits(coefficients.shape[1])
+    rows = range(osl_atlas.groups(k))
+    slots = np.concatenate([osl_atlas.lookup(atlas, grid, u, g) for g in rows], axis=1)
+    logarithm = osl_atlas.lookup(remainder, grid, u, 0) + slots[:, :k] @ coefficients[:, :k].T
     return mapping.unlog_weighted(logarithm, mapping.cos_map(angles))
 
 
-def test_half_floats_cost_less_than_a_thousandth(angles):
+def _relative(read: np.ndarray, exact: np.ndarray, angles: Angles) -> np.ndarray:
+    weight = mapping.cos_map(angles)[:, None]
+    return np.abs(read - exact) * weight / (exact * weight + mapping.EPSILON)
+
+
+@pytest.mark.parametrize("count", [5, 6, 20, 100])
+def test_the_shader_reads_the_brdf_itself(angles: Angles, count: int) -> None:
     basis = Basis.default()
-    rng = np.random.default_rng(2)
-    atlas = osl_atlas.texels(basis)
-    assert atlas.shape == (*osl_atlas.size(basis.grid, basis.count)[::-1], 4)
-    assert np.isfinite(atlas).all()
-    for count in (5, COUNT):
-        c = rng.normal(0, np.sqrt(basis.coefficient_variance), (3, count))
-        exact = basis.evaluate(c, angles).astype(float)
-        read = _through_atlas(atlas, basis, angles, c)
-        error = np.abs(read - exact) * mapping.cos_map(angles)[:, None]
-        scale = exact * mapping.cos_map(angles)[:, None] + mapping.EPSILON
-        relative = error / scale
-        assert np.sqrt(np.mean(relative**2)) < 3e-4
-        assert relative.max() < 3e-3
+    c = np.random.default_rng(2).normal(0, np.sqrt(basis.coefficient_variance), (3, count))
+    # component by component, at every direction: no table of sums in between
+    exact = basis.evaluate(c, angles).astype(float)
+    error = _relative(_through_pictures(PrincipalBRDF(basis, c), angles, c), exact, angles)
+    assert error.max() < 1e-4
 
 
-def test_the_file_is_small_and_holds_what_was_written(tmp_path):
+def test_moving_a_coefficient_is_another_member_of_the_basis(angles: Angles) -> None:
+    """An artist's change goes through half floats: a thousandth, not more."""
+    basis = Basis.default()
+    c = np.random.default_rng(3).normal(0, np.sqrt(basis.coefficient_variance), (3, 60))
+    moved = c.copy()
+    moved[:, :8] += np.random.default_rng(4).normal(0, 0.06, (3, 8))
+    exact = basis.evaluate(moved, angles).astype(float)
+    error = _relative(_through_pictures(PrincipalBRDF(basis, c), angles, moved), exact, angles)
+    assert np.sqrt(np.mean(error**2)) < 5e-4 and error.max() < 5e-3
+
+
+def test_the_files_are_small_and_hold_what_was_written(tmp_path: Path) -> None:
     import OpenImageIO as oiio
 
     basis = Basis.default()
-    path = osl_atlas.write(tmp_path / osl_atlas.file_name(basis), basis)
-    assert path.stat().st_size < 8e6
+    brdf = PrincipalBRDF(basis, np.random.default_rng(5).normal(0, 0.06, (3, 100)))
+    path = osl_atlas.write_components(tmp_path / osl_atlas.components_name(basis), basis)
+    assert path.stat().st_size < 2e6
     pixels = oiio.ImageBuf(str(path)).get_pixels(oiio.HALF)
-    np.testing.assert_array_equal(pixels, osl_atlas.texels(basis))
+    np.testing.assert_array_equal(pixels, osl_atlas.component_texels(basis))
+    path = osl_atlas.write_remainder(tmp_path / osl_atlas.remainder_name(brdf), brdf)
+    assert path.stat().st_size < 2e6
+    pixels = oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT)
+    np.testing.assert_array_equal(pixels, osl_atlas.remainder_texels(brdf))
     assert not list(tmp_path.glob("*.part*"))
+
+
+def test_every_brdf_has_a_file_of_its_own() -> None:
+    basis = Basis.default()
+    c = np.random.default_rng(6).normal(0, 0.06, (3, 10))
+    name = osl_atlas.remainder_name(PrincipalBRDF(basis, c))
+    assert name == osl_atlas.remainder_name(PrincipalBRDF(basis, c.copy()))
+    assert name != osl_atlas.remainder_name(PrincipalBRDF(basis, c + 1e-9))
 
 
 def test_source_has_every_input_and_no_word_left():

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from patina.core.angles import Angles
 from patina.core.brdf import TabulatedBRDF, metrics
 from patina.core.capture import read_capture
 from patina.core.job import CaptureResult, FitJob
@@ -43,19 +45,49 @@ def test_the_page_shows_every_picture_it_names(result: CaptureResult, tmp_path: 
     assert read_encoded(tmp_path / "report" / "photo_00_predicted.png").mean() > 0.05
 
 
-def test_result_json_says_what_design_asks(result: CaptureResult, job: FitJob) -> None:
+def test_result_json_says_what_was_measured(result: CaptureResult, job: FitJob) -> None:
     said = json.loads(json.dumps(result_json.describe(result, job.stages)))
     material = said["materials"][0]
-    assert np.array(material["coefficients"]).shape == (3, 6)
+    assert material["estimator"] == "measured" and "chosen" not in material
+    coefficients = np.array(material["coefficients"])
+    assert coefficients.shape == (3, result.basis.count)
     assert material["samples"]["used"] == sum(material["samples"]["per_photo"].values()) > 1000
-    assert len(material["chosen"]) == 6 and set(material["held_out"]["per_photo"]) == {
-        f"lit_{i}.exr" for i in (1, 2, 3)
-    }
-    for chosen in material["chosen"]:
-        assert 0 <= chosen["pixel"][0] < made.WIDTH and 0 <= chosen["pixel"][1] < made.HEIGHT
+    photos = {f"lit_{i}.exr" for i in (1, 2, 3)}
+    assert set(material["held_out"]["per_photo"]) == photos >= set(material["gains"])
+    assert 0 < material["normal_deviation"] < 3
+    doubt = material["uncertainty"]
+    for key, value in doubt["interval_90"].items():
+        assert value == pytest.approx(np.exp(1.645 * doubt[key]) - 1, rel=1e-3) and value > 0
     assert {s["name"] for s in said["stages"]} >= {"reading the scan", "sampling the photos"}
     assert all(s["seconds"] >= 0 for s in said["stages"])
     assert said["basis"]["version"] == result.basis.version
+    assert said["basis"]["components"] == result.basis.count
+
+
+def test_the_papers_result_says_which_pixels_it_chose(tmp_path: Path) -> None:
+    path = made.make_capture(
+        tmp_path / "ball", photos=3, extra='[fit]\nmethod = "paper"\ntrials = 2'
+    )
+    job = FitJob(read_capture(path))
+    job.drain()
+    assert job.result is not None
+    said = json.loads(json.dumps(result_json.describe(job.result, job.stages)))
+    material = said["materials"][0]
+    assert material["estimator"] == "paper" and np.array(material["coefficients"]).shape == (3, 6)
+    assert len(material["chosen"]) == 6 and len(material["cosine_similarity"]) == 2
+    for chosen in material["chosen"]:
+        assert 0 <= chosen["pixel"][0] < made.WIDTH and 0 <= chosen["pixel"][1] < made.HEIGHT
+    assert "interval_90" not in material["uncertainty"] and "gains" not in material
+    list(write_report(tmp_path / "report", job.result))
+    page = (tmp_path / "report" / "index.html").read_text()
+    assert "6 chosen" in page and "Shaded" not in page
+
+
+def test_the_page_says_how_sure_it_is(result: CaptureResult, tmp_path: Path) -> None:
+    list(write_report(tmp_path / "report", result))
+    page = (tmp_path / "report" / "index.html").read_text()
+    assert page.count("<polygon") == 9  # three charts, three channels
+    assert "90 % interval" in page and "every one of them used" in page
 
 
 def test_difference_picture_has_the_sign_of_the_difference() -> None:
@@ -80,6 +112,22 @@ def test_polar_chart_is_wellformed_and_scaled() -> None:
     assert len(lines) == 3
     tops = [min(float(p.split(",")[1]) for p in e.get("points").split()) for e in lines]
     assert np.allclose(tops, 172 - 150 * np.cbrt(0.3 / 0.5), atol=0.2)
+
+
+def test_the_shaded_interval_lies_around_the_curve() -> None:
+    from xml.etree import ElementTree
+
+    def flat(rho: float) -> Callable[[Angles], np.ndarray]:
+        return lambda a: np.full((len(a.theta_h), 3), rho)
+
+    curve = Curve("x", flat(0.3), lambda a: (flat(0.2)(a), flat(9.0)(a)))
+    tree = ElementTree.fromstring(polar_chart([curve], 45))
+    shapes = [e for e in tree.iter() if e.tag.endswith("polygon")]
+    assert len(shapes) == 3
+    height = [172 - float(p.split(",")[1]) for p in shapes[0].get("points").split()]
+    assert max(height) == pytest.approx(150, abs=0.1)  # as far as the chart reaches
+    n = len(height) // 2
+    assert max(height[:n]) == pytest.approx(150 * np.cbrt(0.2 / 0.5), abs=0.1)
 
 
 def test_metrics_of_known_differences() -> None:

@@ -48,8 +48,8 @@ def fitted(root: Path, ball: Path) -> Path:
 
 def test_fit_leaves_what_design_lists_and_nothing_else(fitted: Path) -> None:
     names = {p.name for p in fitted.iterdir()}
-    exr = {name for name in names if name.startswith("patina_components_")}
-    assert len(exr) == 1
+    exr = {name for name in names if name.startswith(("patina_components_", "patina_brdf_"))}
+    assert len(exr) == 2
     assert names - exr == {"result.json", "surface.binary", "scene.blend", "report", "mine.txt"}
     assert (fitted / "report" / "index.html").is_file()
     assert (fitted / "report" / "notes.txt").read_text() == "kept"
@@ -80,7 +80,8 @@ def test_the_blend_opens_with_everything_in_place(fitted: Path) -> None:
         assert ".patina-part" not in image.filepath
     material = bpy.data.materials["surface"]
     node = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeScript")
-    assert Path(node.inputs["components"].default_value).parent == fitted
+    for socket in ("components", "remainder"):
+        assert Path(node.inputs[socket].default_value).parent == fitted
     assert bpy.context.scene.camera is not None
     assert "Patina result" in bpy.data.texts
 

@@ -22,7 +22,8 @@ from tests.wheel import cycles_sphere  # noqa: E402
 
 VIEW = np.array([0.0, 0.0, 1.0])
 LIGHT = np.array([0.6, 0.2, 0.77]) / np.linalg.norm([0.6, 0.2, 0.77])
-MATERIALS = [("analytic", 5), ("dark-red-paint", 5), ("alum-bronze", 10), ("pink-fabric", 20)]
+MATERIALS = [("analytic", 5), ("dark-red-paint", 5), ("alum-bronze", 10), ("pink-fabric", 20),
+             ("gold-metallic-paint", 100)]  # fmt: skip
 
 if materials.osl_missing():
     pytest.skip(f"{materials.osl_missing()}", allow_module_level=True)
@@ -54,8 +55,8 @@ def brdf(request) -> PrincipalBRDF:
 
 def _material(brdf: PrincipalBRDF, sphere: bpy.types.Object) -> bpy.types.Material:
     fit = fit_principled(brdf.evaluate)
-    exr = osl_files.ensure_components(brdf.basis)
-    material = materials.create_material("measured", brdf, fit, exr)
+    files = osl_files.ensure_files(brdf)
+    material = materials.create_material("measured", brdf, fit, files)
     assert materials.REASON_PROPERTY not in material
     sphere.data.materials.clear()
     sphere.data.materials.append(material)
@@ -176,25 +177,71 @@ def test_two_outputs_and_the_inputs_an_artist_sees():
     assert not [s for s in shown if s.startswith("Lamp")]
 
 
-def test_the_components_come_back_when_the_blend_moves(tmp_path):
+def test_the_files_come_back_when_the_blend_moves(tmp_path):
     sphere = cycles_sphere.new_scene(osl=True)
-    basis = Basis.default()
+    brdf = _brdf("analytic", 5, None)
     first, second = tmp_path / "first", tmp_path / "second"
     first.mkdir()
     second.mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(first / "a.blend"))
-    _material(_brdf("analytic", 5, None), sphere)
-    exr = osl_files.ensure_components(basis)
-    assert exr.parent == first
+    _material(brdf, sphere)
+    files = osl_files.ensure_files(brdf)
+    assert {path.parent for path in files.values()} == {first} and len(files) == 2
     bpy.ops.wm.save_mainfile()
     (first / "a.blend").rename(second / "a.blend")
-    original = exr.read_bytes()
-    exr.unlink()
+    original = {socket: path.read_bytes() for socket, path in files.items()}
+    for path in files.values():
+        path.unlink()
     bpy.ops.wm.open_mainfile(filepath=str(second / "a.blend"))
     assert osl_files.restore() == []
     (node,) = osl_files.script_nodes(bpy.data.materials["measured"])
-    path = Path(node.inputs["components"].default_value)
-    assert path.parent == second and path.read_bytes() == original
+    for socket in osl_files.file_sockets(node):
+        path = Path(socket.default_value)
+        assert path.parent == second and path.read_bytes() == original.pop(socket.identifier)
+    assert not original
+
+
+def test_the_material_keeps_all_coefficients():
+    sphere = cycles_sphere.new_scene(osl=True)
+    basis = Basis.default()
+    c = np.random.default_rng(0).normal(0, 0.03, (3, 100))
+    material = _material(PrincipalBRDF(basis, c), sphere)
+    kept = np.array(material[materials.COEFFICIENTS]).reshape(3, -1)
+    np.testing.assert_array_equal(kept, c)
+    assert material[materials.BASIS] == basis.version
+    (node,) = osl_files.script_nodes(material)
+    shown = [s for s in node.inputs if s.name.startswith("Coefficient")]
+    np.testing.assert_allclose([tuple(s.default_value) for s in shown], c[:, :8].T, rtol=1e-6)
+
+
+def test_a_moved_coefficient_shows_in_the_render(tmp_path):
+    sphere = cycles_sphere.new_scene(size=80, osl=True)
+    cycles_sphere.sun(LIGHT, 2.0)
+    c = np.random.default_rng(1).normal(0, 0.03, (3, 30))
+    material = _material(PrincipalBRDF(Basis.default(), c), sphere)
+    (node,) = osl_files.script_nodes(material)
+    moved = c.copy()
+    moved[:, 1] += (0.03, 0.0, -0.02)
+    node.inputs["coefficient_2"].default_value = tuple(moved[:, 1])
+    image = cycles_sphere.render(tmp_path)
+    normal, inside = cycles_sphere.normals()
+    kept = inside & (normal @ LIGHT > 0.1) & (normal @ VIEW > 0.1)
+    expected = 2.0 * _expected(PrincipalBRDF(Basis.default(), moved), LIGHT)[kept]
+    assert _relative_rms(image[kept], expected) < 0.003
+
+
+def test_a_replaced_material_leaves_no_picture_behind():
+    sphere = cycles_sphere.new_scene(osl=True)
+    names = []
+    for seed in range(2):
+        c = np.random.default_rng(seed).normal(0, 0.03, (3, 10))
+        material = _material(PrincipalBRDF(Basis.default(), c), sphere)
+        names.append(material[osl_files.PROPERTIES["remainder"]])
+        if seed == 0:
+            sphere.data.materials.clear()
+            bpy.data.materials.remove(material)
+    osl_files.drop_unused()
+    assert names[1] in bpy.data.images and names[0] not in bpy.data.images
 
 
 def test_handlers_come_and_go():
@@ -213,8 +260,8 @@ def test_without_osl_the_portable_material_is_made_and_says_so(monkeypatch):
     sphere = cycles_sphere.new_scene(osl=True)
     monkeypatch.setattr(materials, "osl_missing", lambda: "no OSL here")
     brdf = _brdf("analytic", 5, None)
-    exr = osl_files.ensure_components(brdf.basis)
-    material = materials.create_material("plain", brdf, fit_principled(brdf.evaluate), exr)
+    files = osl_files.ensure_files(brdf)
+    material = materials.create_material("plain", brdf, fit_principled(brdf.evaluate), files)
     sphere.data.materials.append(material)
     assert material[materials.REASON_PROPERTY] == "no OSL here"
     assert [n.target for n in material.node_tree.nodes if n.type == "OUTPUT_MATERIAL"] == ["ALL"]

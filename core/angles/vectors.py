@@ -1,0 +1,37 @@
+"""Products of vectors along the last axis, component by component.
+
+Written out instead of left to a matrix product: the result of a row is then the same bits whatever
+rows it is computed with, and float32 stays float32.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating[Any]]
+
+
+def dot(a: Array, b: Array) -> Array:
+    """(...) inner products of vectors (..., 3) that broadcast."""
+    total: Array = a[..., 0] * b[..., 0]
+    total += a[..., 1] * b[..., 1]
+    total += a[..., 2] * b[..., 2]
+    return total
+
+
+def cross(a: Array, b: Array) -> tuple[Array, Array, Array]:
+    """Components x, y, z, each (...), of the cross products of vectors (..., 3) that broadcast."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+def length(x: Array, y: Array, z: Array) -> Array:
+    """(...) lengths of vectors given by components."""
+    total: Array = x * x
+    total += y * y
+    total += z * z
+    return np.asarray(np.sqrt(total))

@@ -1,0 +1,165 @@
+"""Training columns kept at hand, so that a basis without some of the materials takes a second.
+
+Centring removes the reference: X = C·L with L = ln(ρ·cosMap + ε) and C = I − 11ᵀ/n. So the Gram
+matrix of any subset of columns is C·(L Lᵀ)·C of that subset's block of L Lᵀ, which is summed over
+the MERL cells once; mean and components at the nodes need L at the nodes and nothing else.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import Angles
+from ..errors import UNREADABLE_NPZ, InputError, PatinaError
+from . import components, mapping
+from .basis import Basis, Progress
+from .grid import AngleGrid
+from .training import BLOCK, DEFAULT_COUNT, DEFAULT_GRID, Observations, fill_unmeasured
+
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class TrainedBasis(Basis):
+    """A basis that knows its training columns (``training`` is never None).
+
+    materials: names; training column 3m + c is channel c of materials[m].
+    """
+
+    materials: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class TrainingSet:
+    """Everything a basis of any subset of the materials is computed from.
+
+    materials: names, three columns (R, G, B) each. logs: (columns, grid.size) float32,
+    ln(ρ·cosMap + ε) at the nodes. products: (columns, columns) float64, L Lᵀ summed over the MERL
+    cells (L less each cell's mean over the columns, which centring ignores).
+    """
+
+    materials: tuple[str, ...]
+    grid: AngleGrid
+    logs: NDArray[np.float32]
+    products: NDArray[np.float64]
+    provenance: str
+
+    @staticmethod
+    def compute(
+        observations: Observations,
+        materials: Sequence[str],
+        provenance: str,
+        grid: AngleGrid = DEFAULT_GRID,
+        progress: Progress = lambda stage, fraction: None,
+    ) -> TrainingSet:
+        """From any training columns; reads each observation twice, at the cells and the nodes."""
+        if observations.columns != 3 * len(materials):
+            raise PatinaError(
+                f"{observations.columns} columns for {len(materials)} materials, expected 3 each"
+            )
+        products = np.zeros((observations.columns, observations.columns))
+        for angles, rho, fraction in observations.cell_blocks():
+            progress("training columns", fraction)
+            logs = _logs(rho, angles)
+            wide = (logs - logs.mean(axis=0)).astype(np.float64)
+            products += wide @ wide.T
+        nodes = Angles(*(a.ravel() for a in grid.nodes()))
+        at_nodes = np.empty((observations.columns, grid.size), np.float32)
+        for start in range(0, grid.size, BLOCK):
+            progress("nodes", start / grid.size)
+            part = Angles(*(a[start : start + BLOCK] for a in nodes))
+            rho = observations.at(part)
+            block = _logs(rho, part)
+            block[:, rho[0] < 0] = np.nan
+            at_nodes[:, start : start + BLOCK] = block
+        filled = fill_unmeasured(at_nodes.reshape(-1, *grid.shape)).reshape(at_nodes.shape)
+        return TrainingSet(tuple(materials), grid, filled, products, provenance)
+
+    def basis(self, without: Sequence[str] = (), count: int = DEFAULT_COUNT) -> TrainedBasis:
+        """The basis of all materials but those in ``without`` (all three channels of each).
+
+        Raises PatinaError for a name that is not in the set, or too few columns for ``count``.
+        """
+        unknown = sorted(set(without) - set(self.materials))
+        if unknown:
+            raise PatinaError(f"no training material is called {unknown[0]!r}")
+        kept = [m for m, name in enumerate(self.materials) if name not in set(without)]
+        columns = np.array([3 * m + c for m in kept for c in range(3)], np.intp)
+        n = len(columns)
+        if n <= count:
+            raise PatinaError(f"{n} training columns are too few for {count} components")
+        gram = self.products[np.ix_(columns, columns)]
+        gram = gram - gram.mean(axis=0) - gram.mean(axis=1)[:, None] + gram.mean()
+        directions, explained = components.principal_directions(gram, count)
+        logs = self.logs if len(kept) == len(self.materials) else self.logs[columns]
+        centre = logs.mean(axis=0, dtype=np.float64).astype(np.float32)
+        log_reference = np.empty(self.grid.size, np.float32)
+        scaled = np.empty((count, self.grid.size), np.float32)
+        w = directions.T.astype(np.float32)
+        for start in range(0, self.grid.size, BLOCK):
+            part = slice(start, start + BLOCK)
+            # the mapping's reference: ln(median(ρ·cosMap) + ε)
+            log_reference[part] = np.log(np.median(np.exp(logs[:, part]), axis=0))
+            scaled[:, part] = w @ (logs[:, part] - centre[part])
+        note = f" Without {', '.join(sorted(without))}." if without else ""
+        return TrainedBasis(
+            grid=self.grid,
+            mean=(centre - log_reference).reshape(self.grid.shape),
+            log_reference=log_reference.reshape(self.grid.shape),
+            components=scaled.reshape(count, *self.grid.shape),
+            explained=explained,
+            columns=n,
+            provenance=self.provenance + note,
+            training=directions,
+            materials=tuple(self.materials[m] for m in kept),
+        )
+
+    def save(self, path: Path) -> None:
+        """Write the set (about 140 MB for MERL's 300 columns); it appears whole or not at all."""
+        partial = path.with_name(path.name + ".part")
+        with open(partial, "wb") as file:
+            np.savez(
+                file,
+                format=np.int32(FORMAT),
+                materials=np.array(self.materials),
+                grid=np.array([*self.grid.shape, self.grid.knee]),
+                logs=self.logs,
+                products=self.products,
+                provenance=np.array(self.provenance),
+            )
+        os.replace(partial, path)
+
+    @staticmethod
+    def load(path: Path) -> TrainingSet:
+        """Read what :meth:`save` wrote. Raises InputError for anything else."""
+        try:
+            with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
+                if int(data["format"]) != FORMAT:
+                    raise InputError(f"format {int(data['format'])}, expected {FORMAT}", file=path)
+                n_h, n_d, n_p, knee = (float(x) for x in data["grid"])
+                grid = AngleGrid(int(n_h), int(n_d), int(n_p), knee)
+                found = TrainingSet(
+                    materials=tuple(str(n) for n in data["materials"]),
+                    grid=grid,
+                    logs=data["logs"],
+                    products=data["products"],
+                    provenance=str(data["provenance"]),
+                )
+        except UNREADABLE_NPZ as error:
+            raise InputError(f"not a set of training columns ({error})", file=path) from error
+        n = 3 * len(found.materials)
+        if found.logs.shape != (n, grid.size) or found.products.shape != (n, n):
+            raise InputError(f"arrays that do not fit {n} columns", file=path)
+        return found
+
+
+def _logs(rho: NDArray[np.float32], angles: Angles) -> NDArray[np.float32]:
+    """ln(ρ·cosMap + ε) (columns, n); negative ρ counts as 0."""
+    weighted = np.maximum(rho, 0) * mapping.cos_map(angles).astype(np.float32)
+    return np.log(weighted + np.float32(mapping.EPSILON))

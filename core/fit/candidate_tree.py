@@ -1,0 +1,155 @@
+"""The best of millions of candidate rows, by bounds on whole cells of them.
+
+Every cell has one of its rows as representative and an extent, how far the components of the others
+are from it: one bound holds for all of them. Cells lie in larger cells; those whose bound is beaten
+are never opened.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import Angles
+from .condition_bound import FIRST, ROUNDING, ConditionBound, condition_numbers
+
+KNEE = np.radians(2.0)  # cells in θh are even below and grow above: lobes are narrow
+BITS = 7, 7, 7  # of each angle's cell
+COARSE, LEVELS = 2, 3  # bits that a larger cell has less, and how many sizes of cells there are
+WELL, ROUNDING_32 = 1e3, 1e-3  # condition numbers up to which float32 will do, to this
+AT_ONCE = 1 << 18
+
+
+def angle_cells(angles: Angles) -> NDArray[np.int32]:
+    """(m,) cells of half/difference angles (m,), radians, for choose_from_cells; the cells of one
+    larger cell have neighbouring numbers."""
+    h = np.log1p(angles.theta_h / KNEE) / np.log1p(np.pi / 2 / KNEE)
+    parts = (h, angles.theta_d / (np.pi / 2), np.mod(angles.phi_d / np.pi, 1.0))
+    cells = [
+        np.clip(value * (1 << bits), 0, (1 << bits) - 1).astype(np.int32)
+        for value, bits in zip(parts, BITS, strict=True)
+    ]
+    number = np.zeros(len(h), np.int32)
+    shifts = [COARSE * level for level in reversed(range(LEVELS))]
+    for shift in shifts:  # the largest cells' bits of all angles, then the next ones'
+        for cell, bits in zip(cells, BITS, strict=True):
+            kept = bits - shift if shift == shifts[0] else COARSE
+            number = (number << kept) | ((cell >> shift) & ((1 << kept) - 1))
+    return number
+
+
+@dataclass(frozen=True)
+class _Level:
+    """Cells as ranges of what lies a level below. begin, end: (c,); place: (c,) which of the
+    tree's rows is the representative; rows: (c, k) it; extent: (c, k)."""
+
+    begin: NDArray[np.intp]
+    end: NDArray[np.intp]
+    place: NDArray[np.intp]
+    rows: NDArray[np.floating]
+    extent: NDArray[np.floating]
+
+    def of(self, which: NDArray[np.intp]) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+        """(representatives, extents) of some cells, ascending."""
+        if len(which) == len(self.begin):
+            return self.rows, self.extent
+        return self.rows[which], self.extent[which]
+
+
+@dataclass(frozen=True)
+class CandidateTree:
+    """rows: (m, k) float32 candidates, sorted by cell; order: (m,) where they stood; inverse: (m,)
+    where they stand now; levels: from
+    the largest cells to the smallest, whose ranges are of the rows."""
+
+    rows: NDArray[np.float32]
+    order: NDArray[np.intp]
+    inverse: NDArray[np.int32]
+    levels: tuple[_Level, ...]
+
+    @classmethod
+    def of(cls, rows: NDArray[np.floating], cells: NDArray[np.integer]) -> CandidateTree:
+        """The tree of rows (m, k) with the numbers of their cells (m,)."""
+        # sorting numbers that hold their place is much faster than sorting places, and as certain
+        packed = np.sort(cells.astype(np.int64) << 32 | np.arange(len(cells)))
+        order, number = packed & 0xFFFFFFFF, packed >> 32
+        del packed
+        sorted_rows = rows.astype(np.float32, copy=False).take(order, axis=0)
+        levels: list[_Level] = []
+        below: _Level | None = None
+        for _ in range(LEVELS):
+            below = _level(number, sorted_rows, below)
+            levels.insert(0, below)
+            number = number[below.begin] >> (3 * COARSE)
+        inverse = np.empty(len(order), np.int32)
+        inverse[order] = np.arange(len(order), dtype=np.int32)
+        return cls(sorted_rows, order, inverse, tuple(levels))
+
+    def smallest(
+        self, bound: ConditionBound, without: list[int], limit: float = np.inf
+    ) -> tuple[int, float] | None:
+        """(place, condition number) of the row that goes best with the bound's rows, but for those
+        ``without``; None where none goes better than ``limit``."""
+        taken = self.inverse[without]
+        known = limit * (1 + ROUNDING)
+        inside = np.arange(len(self.levels[0].begin))
+        for level in self.levels:
+            if not np.isfinite(limit):
+                known = min(known, _some_number(bound, level, inside, taken))
+            rows, extent = level.of(inside)
+            slack = ROUNDING if known > WELL else ROUNDING_32
+            largest, smallest = bound.extremes(rows, extent, single=known <= WELL)
+            inside = _ranges(level, inside[largest * (1 - slack) <= known * smallest])
+        inside = inside[~np.isin(inside, taken)]
+        if len(inside) > FIRST:
+            rows = self.rows[inside]
+            slack = ROUNDING if known > WELL else ROUNDING_32
+            largest, smallest = bound.extremes(rows, single=known <= WELL)
+            inside = inside[largest * (1 - slack) <= known * smallest]
+        found = bound.smallest(self.rows[inside], limit) if len(inside) else None
+        return None if found is None else (int(self.order[inside[found[0]]]), found[1])
+
+
+def _level(number: NDArray[np.integer], rows: NDArray[np.float32], below: _Level | None) -> _Level:
+    """Cells of what has equal numbers (n,): rows, or the cells of the level below."""
+    begin = np.flatnonzero(np.concatenate([[True], number[1:] != number[:-1]]))
+    end = np.concatenate([begin[1:], [len(number)]])
+    middle = (begin + end) // 2
+    if below is not None:
+        rows = below.rows
+    centre = rows[middle]
+    extent = np.empty_like(centre)
+    first = 0
+    while first < len(begin):  # whole cells at a time
+        last = max(first + 1, int(np.searchsorted(begin, begin[first] + AT_ONCE)))
+        part = slice(begin[first], end[last - 1])
+        away = rows[part] - np.repeat(centre[first:last], (end - begin)[first:last], axis=0)
+        np.abs(away, out=away)
+        if below is not None:
+            away += below.extent[part]
+        extent[first:last] = np.maximum.reduceat(away, begin[first:last] - begin[first], axis=0)
+        first = last
+    return _Level(begin, end, middle if below is None else below.place[middle], centre, extent)
+
+
+def _some_number(
+    bound: ConditionBound, level: _Level, which: NDArray[np.intp], taken: NDArray[np.intp]
+) -> float:
+    """The least condition number with one of the more promising representatives of some cells."""
+    which = which[~np.isin(level.place[which], taken)]
+    if not len(which):
+        return np.inf
+    rows = level.of(which)[0]
+    promise = bound.bounds(rows)
+    some = np.argpartition(promise, min(FIRST, len(which)) - 1)[:FIRST]
+    return float(condition_numbers(bound.chosen, rows[some]).min()) * (1 + ROUNDING)
+
+
+def _ranges(level: _Level, which: NDArray[np.intp]) -> NDArray[np.intp]:
+    """All places in the ranges of some cells, one range after the other."""
+    begin, count = level.begin[which], (level.end - level.begin)[which]
+    total = int(count.sum())
+    start = np.cumsum(count) - count
+    return np.repeat(begin - start, count) + np.arange(total)

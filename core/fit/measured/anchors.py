@@ -1,0 +1,69 @@
+"""Weak observations towards grazing light, where no photo looked, of what lobes expect there.
+
+The BRDF at the most grazing angle that photos saw is carried on by the lobes' own change from
+there: their Fresnel and shadowing, not their idea of the highlight's shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...angles import Angles, cosines
+from ...basis import Basis, mapping
+from .cells import AngleCells
+from .lobes import Lobes
+
+THETA_H = (0.2, 0.6, 1.2, 2.0, 4.0, 7.0, 12.0, 20.0, 30.0, 45.0)  # degrees
+BEYOND = 3.0  # degrees between rows of anchors, the first so far from what was seen
+PHI_D = (15.0, 45.0, 75.0, 105.0, 135.0, 165.0)
+LIMIT = 83.0  # of light and view
+INDEPENDENT = 50.0  # their errors go together: all of them count as so many
+NEAR_HIGHLIGHT = 15.0  # degrees of θh: cells that say how far highlights were seen
+SEEN = 0.97  # of those cells
+
+
+@dataclass(frozen=True)
+class Anchors:
+    """What the anchors add to the normal equations, per unit of 1/deviation²: gram (k, k), the
+    same for all channels; pull (3, k)."""
+
+    gram: NDArray[np.float64]
+    pull: NDArray[np.float64]
+
+    @classmethod
+    def of(
+        cls, lobes: Lobes, basis: Basis, coefficients: NDArray[np.float64], edge: float
+    ) -> Anchors:
+        """coefficients: (3, k) of the BRDF that is carried on from θd = edge (radians)."""
+        k = coefficients.shape[1]
+        angles = directions(edge)
+        if not len(angles.theta_h):
+            return cls(np.zeros((k, k)), np.zeros((3, k)))
+        at_edge = Angles(angles.theta_h, np.full_like(angles.theta_d, edge), angles.phi_d)
+        known = basis.evaluate(coefficients, at_edge).astype(np.float64)
+        change = lobes.evaluate(angles) / np.maximum(lobes.evaluate(at_edge), 1e-9)
+        centre, rows = basis.rows(angles, k)
+        q = rows.astype(np.float64)
+        mapped = mapping.log_weighted(known * change, mapping.cos_map(angles))
+        weight = INDEPENDENT / len(q)
+        return cls(weight * q.T @ q, weight * (q.T @ (mapped - centre[:, None])).T)
+
+
+def seen_edge(cells: AngleCells) -> float:
+    """The θd, radians, up to which photos saw highlights."""
+    near = cells.angles.theta_h < np.radians(NEAR_HIGHLIGHT)
+    theta_d = cells.angles.theta_d[near] if near.sum() > 20 else cells.angles.theta_d
+    return float(np.quantile(theta_d, SEEN))
+
+
+def directions(edge: float) -> Angles:
+    """Half/difference angles of the anchors beyond θd = edge, light and view within LIMIT."""
+    theta_d = np.arange(np.degrees(edge) + BEYOND, LIMIT, BEYOND)
+    grid = np.meshgrid(*(np.radians(a) for a in (THETA_H, theta_d, PHI_D)), indexing="ij")
+    flat = [a.ravel() for a in grid]
+    cos_i, cos_o = cosines(*flat)
+    seen = np.minimum(cos_i, cos_o) > np.cos(np.radians(LIMIT))
+    return Angles(*(a[seen] for a in flat))

@@ -1,0 +1,172 @@
+"""Samples → BRDF: every sample, all components, normals along, chosen by held-out photos."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...angles import Angles
+from ...basis import Basis, PrincipalBRDF
+from ...basis.log_table import LogTable
+from ...errors import FitError
+from ...samples import SampleTable
+from . import held_out
+from .cells import gather
+from .forward import CellModel
+from .normals import refine_normals
+from .patches import Patches
+from .posterior import Posterior, solve
+from .prior import ChannelPrior
+
+FEWEST = 50  # samples
+WARM = 4  # steps of the solver between refinements of the normals
+CLEARLY = 0.98  # of the first choice's held-out misfit
+SETTLED = 0.02  # RMS change of ln ρ, all directions alike: the normals are refined enough
+CHUNK = 1 << 15
+
+
+@dataclass(frozen=True)
+class MeasuredSettings:
+    """components: how many of the basis, None for all. floor: log-relative deviation granted to
+    the components themselves. normal_deviation: degrees per tangent that the scan's normals are
+    off by, to begin with. rounds: of refining normals at most, 0 for none. coupled: the
+    channels share what measured materials' channels share. trusts: log-relative deviations of the
+    anchors in unseen directions (infinite: no anchors); what held-out photos prefer is taken."""
+
+    components: int | None = None
+    floor: float = 0.15
+    normal_deviation: float = 1.0
+    rounds: int = 8
+    coupled: bool = False
+    trusts: tuple[float, ...] = (0.7,)
+
+
+@dataclass(frozen=True)
+class MeasuredFit:
+    """brdf: the most probable one. samples: number used. normal_deviation: degrees per tangent,
+    what the scan's normals are off by. gains: photo → its own gain. trust: of the anchors that was
+    chosen. without: photo → the BRDF had it not been there. refined: the samples under corrected
+    normals. covariance: (3, k, k) of each channel's coefficients."""
+
+    brdf: PrincipalBRDF
+    samples: int
+    normal_deviation: float
+    gains: dict[int, float]
+    trust: float
+    anchoring: str
+    without: dict[int, PrincipalBRDF]
+    refined: SampleTable
+    covariance: NDArray[np.float64]
+    floor: float
+    posterior: Posterior
+    model: CellModel
+    warnings: tuple[str, ...] = ()
+
+    def band(self, angles: Angles) -> NDArray[np.float64]:
+        """(n, 3) standard deviation of ln(ρ·cosMap + ε) at n directions."""
+        basis, k = self.brdf.basis, self.covariance.shape[1]
+        n = len(angles.theta_h)
+        out = np.empty((n, 3))
+        root = np.linalg.cholesky(self.covariance + 1e-12 * np.eye(k))
+        for start in range(0, n, CHUNK):
+            part = slice(start, start + CHUNK)
+            q = basis.rows(Angles(*(a[part] for a in angles)), k)[1].astype(np.float64)
+            for c in range(3):
+                out[part, c] = np.sqrt(np.sum((q @ root[c]) ** 2, axis=1))
+        return out
+
+
+def fit_measured(
+    table: SampleTable, basis: Basis, settings: MeasuredSettings | None = None
+) -> MeasuredFit:
+    """Fit one material. Raises FitError where there are too few samples."""
+    steps = measured_steps(table, basis, settings)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            found: MeasuredFit = end.value
+            return found
+
+
+def measured_steps(
+    table: SampleTable, basis: Basis, settings: MeasuredSettings | None = None
+) -> Generator[float, None, MeasuredFit]:
+    """The same in steps: yields the fraction done."""
+    s = settings or MeasuredSettings()
+    if len(table) < FEWEST:
+        raise FitError(
+            f"{len(table)} lit samples, at least {FEWEST} are needed: more light or larger masks"
+        )
+    k = min(s.components or basis.count, basis.count)
+    prior = ChannelPrior.of(basis, k, s.coupled)
+    deviation = float(np.radians(s.normal_deviation))
+    yield 0.0
+    model = CellModel.of(gather(table, deviation), basis)
+    found = solve(model, prior, s.floor, leave_out=False)
+    refined = table
+    patches = Patches.of_points(table.point) if s.rounds else None
+    for done in range(s.rounds if patches is not None else 0):
+        yield 0.1 + 0.6 * done / s.rounds
+        brdf = LogTable.of(basis, found.coefficients)
+        assert patches is not None
+        normals = refine_normals(table, patches, brdf, deviation)
+        deviation, refined = normals.deviation, normals.table
+        yield 0.1 + 0.6 * (done + 0.5) / s.rounds
+        model = CellModel.of(gather(refined, normals.error), basis)
+        before = brdf.values
+        found = solve(model, prior, s.floor, found.coefficients, leave_out=False, iterations=WARM)
+        change = LogTable.of(basis, found.coefficients).values - before
+        if np.sqrt(np.mean(change**2)) < SETTLED:
+            break
+    yield 0.7
+    final = yield from _preferred(model, s, found, prior)
+    yield 0.95
+    found = solve(model, final, s.floor, found.coefficients)
+    return MeasuredFit(
+        brdf=PrincipalBRDF(basis, found.coefficients),
+        samples=len(table),
+        normal_deviation=float(np.degrees(deviation)),
+        gains=found.gains,
+        trust=final.trust,
+        anchoring=_told(final.trust),
+        without={p: PrincipalBRDF(basis, c) for p, c in found.without.items()},
+        refined=refined,
+        covariance=found.covariance(),
+        floor=s.floor,
+        posterior=found,
+        model=model,
+    )
+
+
+def _preferred(
+    model: CellModel, s: MeasuredSettings, found: Posterior, prior: ChannelPrior
+) -> Generator[float, None, ChannelPrior]:
+    """The prior with the trust in anchors that predicts held-out photos best."""
+    trust = s.trusts[0]
+    if len(s.trusts) > 1:
+        steps = held_out.scores(model, prior, s.trusts, s.floor, found.coefficients)
+        while True:
+            try:
+                yield 0.75 + 0.2 * next(steps)
+            except StopIteration as end:
+                scores = end.value
+                break
+        if scores:
+            scores[0] *= CLEARLY  # the first is the safest: another must predict clearly better
+            trust = s.trusts[int(np.argmin(scores))]
+    if not np.isfinite(trust):
+        return prior
+    return prior.anchored(held_out.carried_on(model, found.coefficients), trust)
+
+
+def _told(trust: float) -> str:
+    if not np.isfinite(trust):
+        return "directions that no photo saw follow measured materials"
+    return (
+        "directions that no photo saw follow measured materials and microfacet lobes, the lobes "
+        f"trusted to {100 * np.expm1(trust):.0f} %"
+    )

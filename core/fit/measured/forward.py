@@ -1,0 +1,125 @@
+"""What every cell should show for given coefficients, and how that changes with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...angles import Angles, cosines
+from ...basis import Basis, mapping
+from ...basis.log_table import LogTable
+from .cells import AngleCells
+from .scatter import scattered
+
+LEAST_COSINE = 0.01
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """level: (m, 3) (ρ·cos θi)·cosMap/cos θi + ε of the blurred BRDF: what Nielsen's mapping takes
+    the logarithm of. spread: (m, 3) its relative variance over the normals a cell may have had.
+    slopes: 3 of (m, k) ∂ ln level / ∂c."""
+
+    level: NDArray[np.float64]
+    spread: NDArray[np.float64]
+    slopes: list[NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
+class CellModel:
+    """The forward model of one set of cells in one basis.
+
+    observed: (m, 3) like Prediction.level. factor: (m, j) what exp(log) − ε of a scattered normal
+    adds to ρ·cos θi. index, weight: (m, j, 8) nodes and their weights. slot: (m·j·8,) where each
+    falls in the distinct (cell, node) pairs, whose rows and columns are ``cell`` and ``node``.
+    """
+
+    basis: Basis
+    cells: AngleCells
+    observed: NDArray[np.float64]
+    scale: NDArray[np.float64]
+    share: NDArray[np.float64]
+    factor: NDArray[np.float32]
+    index: NDArray[np.int32]
+    weight: NDArray[np.float32]
+    slot: NDArray[np.int64]
+    indptr: NDArray[np.int64]
+    node: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, cells: AngleCells, basis: Basis) -> CellModel:
+        seen, cos_i, cos_o, share = scattered(cells.angles, cells.normal_error)
+        m, j = cos_i.shape
+        index, weight = basis.grid.corners(Angles(*(a.ravel() for a in seen)))
+        index = np.ascontiguousarray(index.T).reshape(m, j, 8)
+        weight = np.ascontiguousarray(weight.T).reshape(m, j, 8)
+        cos_map = np.clip(cos_i * np.maximum(cos_o, LEAST_COSINE), 0.01, 1.0)
+        lit = np.maximum(cos_i, 0.0) / cos_map
+        flat = (np.arange(m, dtype=np.int64)[:, None, None] * basis.grid.size + index).ravel()
+        pairs, slot = np.unique(flat, return_inverse=True)
+        cell, node = np.divmod(pairs, basis.grid.size)
+        own_i, own_o = cosines(*cells.angles)
+        scale = np.clip(own_i * own_o, 0.01, 1.0) / np.maximum(own_i, LEAST_COSINE)
+        observed = np.maximum(cells.reflected, 0.0) * scale[:, None] + mapping.EPSILON
+        return cls(
+            basis=basis,
+            cells=cells,
+            observed=observed,
+            scale=scale,
+            share=share,
+            factor=(share * lit).astype(np.float32),
+            index=index,
+            weight=weight,
+            slot=slot.ravel(),
+            indptr=np.searchsorted(cell, np.arange(m + 1)),
+            node=node,
+        )
+
+    def select(self, which: NDArray[np.bool_]) -> CellModel:
+        """The model of some of the cells (m,)."""
+        pairs = np.repeat(which, np.diff(self.indptr))
+        fresh = np.cumsum(pairs) - 1
+        slot = self.slot.reshape(self.index.shape)[which]
+        return CellModel(
+            self.basis,
+            self.cells.select(which),
+            self.observed[which],
+            self.scale[which],
+            self.share,
+            self.factor[which],
+            self.index[which],
+            self.weight[which],
+            fresh[slot].ravel(),
+            np.concatenate([[0], np.cumsum(np.diff(self.indptr)[which])]),
+            self.node[pairs],
+        )
+
+    def predict(self, coefficients: NDArray[np.floating], slopes: bool = True) -> Prediction:
+        """coefficients: (3, k)."""
+        k = coefficients.shape[1]
+        table = LogTable.of(self.basis, coefficients).values
+        m = len(self.cells)
+        level, spread = np.empty((m, 3)), np.empty((m, 3))
+        found: list[NDArray[np.float32]] = []
+        for channel in range(3):
+            logs = np.einsum("mjc,mjc->mj", table[:, channel][self.index], self.weight)
+            grown = np.exp(np.clip(logs, -12.0, 12.0))
+            parts = self.factor * np.maximum(grown - np.float32(mapping.EPSILON), 0)
+            total = parts.sum(axis=1, dtype=np.float64)
+            level[:, channel] = total * self.scale + mapping.EPSILON
+            second = (parts.astype(np.float64) ** 2 / self.share).sum(axis=1)
+            wide = np.maximum(second - total**2, 0.0)
+            spread[:, channel] = wide * (self.scale / level[:, channel]) ** 2
+            if slopes:
+                each = (self.factor * grown)[..., None] * self.weight
+                data = np.bincount(self.slot, each.ravel(), len(self.node))
+                matrix = sparse.csr_matrix(
+                    (data.astype(np.float32), self.node, self.indptr),
+                    shape=(m, self.basis.grid.size),
+                )
+                rise = matrix @ self.basis.nodes[:, 1 : 1 + k]
+                found.append(rise * (self.scale / level[:, channel]).astype(np.float32)[:, None])
+        return Prediction(level, spread, found)

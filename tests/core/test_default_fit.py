@@ -1,0 +1,125 @@
+"""The program's default against the paper's method, on captures whose truth is known."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from patina.core.angles import Angles
+from patina.core.appearance.principled import Principled
+from patina.core.basis import PrincipalBRDF
+from patina.core.brdf import TabulatedBRDF, metrics, nbrdf
+from patina.core.capture import read_capture
+from patina.core.fit.held_out import predicted, summarise
+from patina.core.job import FitJob, MaterialResult
+from tests import make_capture as made
+from tests.sampled import sampled
+
+
+def fitted(path: Path, method: str) -> dict[str, MaterialResult]:
+    capture = read_capture(path)
+    job = FitJob(replace(capture, fit=replace(capture.fit, method=method)))
+    job.drain()
+    assert job.result is not None
+    return {material.name: material for material in job.result.materials}
+
+
+def log_rms(material: MaterialResult, truth: TabulatedBRDF) -> float:
+    return metrics.compare(material.fit.brdf.table(), truth).log_relative_rms
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["bunny_bronze", "bunny_red", "bunny_fabric"])
+def test_half_the_papers_error_on_real_reconstructions(shared: Path, name: str) -> None:
+    """Meshes of three stereo pipelines; the basis has seen the materials, for both alike."""
+    folder = shared / "data" / "scans" / name
+    weights = np.array(json.loads((folder / "truth.json").read_text())["weights"], np.float32)
+    truth = TabulatedBRDF.from_function(lambda angles: nbrdf.evaluate(weights, angles))
+    ours = fitted(folder / "scan.capture.toml", "measured")["surface"]
+    papers = fitted(folder / "scan.capture.toml", "paper")["surface"]
+    assert log_rms(ours, truth) < 0.5 * log_rms(papers, truth)
+    assert ours.held_out is not None and papers.held_out is not None
+    assert ours.held_out.typical < papers.held_out.typical
+
+
+@pytest.mark.slow
+def test_the_demo_is_nearer_to_its_truth(root: Path) -> None:
+    """The glaze was rendered by Cycles' Principled: no material of the basis."""
+    folder = root / "assets" / "demo"
+    given = json.loads((folder / "truth.json").read_text())["materials"]["glaze"]
+    truth = TabulatedBRDF.from_function(
+        Principled(
+            base_color=np.array(given["Base Color"]),
+            roughness=given["Roughness"],
+            ior=given["IOR"],
+            specular_ior_level=given["Specular IOR Level"],
+        ).evaluate
+    )
+    ours, papers = (fitted(folder / "demo.capture.toml", m) for m in ("measured", "paper"))
+    assert log_rms(ours["glaze"], truth) < 0.6 * log_rms(papers["glaze"], truth)
+    for name in ("glaze", "clay"):
+        mine, theirs = ours[name].held_out, papers[name].held_out
+        assert mine is not None and theirs is not None
+        assert mine.typical < 0.6 * theirs.typical
+        assert mine.error < theirs.error
+
+
+def test_the_default_recovers_a_ball(tmp_path: Path) -> None:
+    """A Blinn lobe on an exact mesh, which no measured material has: the default's BRDF is right
+    where photos looked, and better than the paper's."""
+    path = made.make_capture(tmp_path / "ball")
+    table, _ = sampled(path)
+    error = {}
+    for method in ("measured", "paper"):
+        material = fitted(path, method)["surface"]
+        error[method] = np.median(
+            np.abs(np.log(material.fit.brdf.evaluate(table.angles) / table.rho))
+        )
+    assert error["measured"] < 0.05 and error["measured"] < 0.5 * error["paper"]
+
+
+def test_a_photo_that_is_far_too_bright_is_named(tmp_path: Path) -> None:
+    """Its exposure is given as half of what it was."""
+    path = made.make_capture(tmp_path / "ball")
+    said = []
+    for line in path.read_text().splitlines():
+        said.append(line)
+        if line.startswith("file ="):
+            said.append(f"exposure = {0.5 if 'lit_2' in line else 1.0}")
+    path.write_text("\n".join(said))
+    material = fitted(path, "measured")["surface"]
+    gains = material.fit.gains  # type: ignore[union-attr]
+    assert max(gains, key=lambda photo: gains[photo]) == 1
+    assert any("lit_2.exr" in told and "brighter" in told for told in material.warnings)
+
+
+def test_held_out_error_is_that_of_the_samples() -> None:
+    """A BRDF that is a tenth too bright misses every photo by a tenth."""
+    from patina.core.basis import Basis
+    from patina.core.samples import SampleTable
+
+    n = 200
+    basis, rng = Basis.default(), np.random.default_rng(0)
+    brdf = PrincipalBRDF(basis, np.zeros((3, 5)))
+    angles = Angles(*(rng.uniform(0, top, n).astype(np.float32) for top in (1.0, 0.8, 3.0)))
+    rho = brdf.evaluate(angles) / np.float32(1.1)
+    cos_i = np.full(n, 0.5, np.float32)
+    empty = SampleTable.empty()
+    table = replace(
+        empty,
+        photo=np.repeat([0, 3], n // 2).astype(np.int16),
+        theta_h=angles.theta_h, theta_d=angles.theta_d, phi_d=angles.phi_d,
+        cos_i=cos_i, cos_o=cos_i, rho=rho,
+        radiance=rho * cos_i[:, None] * np.float32(2), irradiance=np.full((n, 3), 2, np.float32),
+        pixel=np.arange(n, dtype=np.int32), point=np.zeros((n, 3)),
+        normal=np.zeros((n, 3), np.float32), view=np.zeros((n, 3), np.float32),
+        light=np.zeros((n, 3), np.float32), curvature=np.zeros(n, np.float32),
+    )  # fmt: skip
+    held = summarise([predicted(table, photo, brdf) for photo in (0, 3)])
+    assert held is not None and set(held.per_photo) == {0, 3}
+    for value in (held.error, held.typical, *held.per_photo.values()):
+        assert value == pytest.approx(0.1, abs=1e-4)

@@ -1,0 +1,137 @@
+"""Tables, charts and the document's marked parts, from records written by hand."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from tools.experiments import document, figures, goal_table, records, runs, svg, tables
+
+
+def record(estimator: str, material: str, log_rms: float, **more: object) -> records.Record:
+    figures_ = {"cube_root": log_rms, "relative_l2": log_rms, "specular_l2": log_rms}
+    return {
+        "estimator": estimator, "material": material, "scene": "bunny-openmvs", "seed": 0,
+        "in_basis": False, "log_rms": log_rms, "peak": 1.0, "peaks": [1.0, 1.0, 1.0],
+        **figures_, **more,
+    }  # fmt: skip
+
+
+def rows_of(table: str) -> dict[str, list[str]]:
+    cells = [[c.strip() for c in line.split("|")[1:-1]] for line in table.splitlines()]
+    return {row[0]: row[1:] for row in cells[2:]}
+
+
+def test_goals_are_medians_of_ratios_per_case() -> None:
+    found = [
+        *(record("paper", "pink-fabric", x, seed=i) for i, x in enumerate((0.2, 0.4, 0.9))),
+        record("ours", "pink-fabric", 0.1, peak=1.1),
+        record("paper", "alum-bronze", 0.3),
+        record("ours", "alum-bronze", 0.09),
+        record("paper", "bluebook", 0.5, psnr=[20.0, 30.0, 25.0]),
+        record("ours", "bluebook", 0.6, psnr=[41.0, 39.0, 45.0]),
+        record("ours", "bluebook", 9.0, in_basis=True),
+    ]
+    rows = rows_of(goal_table.goals(found))
+    # ratios 0.25 (against the median seed), 0.3 and 1.2: the median is 0.3, one material is worse
+    assert rows["log-relative RMS (≤ 80°), ours ÷ paper"][1:3] == ["0.30", "yes"]
+    worst = rows["worse in no material (both)"]
+    assert "1.2" in worst[1] and "bluebook" in worst[1] and worst[2] == "**no**"
+    picture = next(v for k, v in rows.items() if k.startswith("PSNR"))
+    assert picture[1].startswith("41.0 dB") and "25.0 dB" in picture[1] and picture[2] == "yes"
+    flat = next(v for k, v in rows.items() if k.startswith("flat"))
+    assert flat[1].startswith("1.10") and flat[2] == "yes"
+
+
+def test_a_missing_estimator_is_said_to_be_missing() -> None:
+    rows = rows_of(goal_table.goals([record("paper", "alum-bronze", 0.3)]))
+    assert rows["log-relative RMS (≤ 80°), ours ÷ paper"][1:3] == [goal_table.NOT, ""]
+
+
+def test_held_out_is_compared_with_the_true_image_error() -> None:
+    told = {"held_out_rms": 0.12, "image_rms": 0.1, "held_out_typical": 0.03, "image_typical": 0.02}
+    rows = rows_of(goal_table.goals([record("ours", "alum-bronze", 0.1, **told)]))
+    held = next(v for k, v in rows.items() if k.startswith("reported"))
+    assert "typical 1.50" in held[1] and "rms 1.20" in held[1] and held[2] == "**no**"
+
+
+def test_rank_correlation_of_a_known_order() -> None:
+    def run(errors: list[float]) -> records.Record:
+        return {
+            "material": "alum-bronze",
+            "scene": "s",
+            "candidates": [
+                {"similarity": i / 10, "log_rms": e, "relative_l2": e} for i, e in enumerate(errors)
+            ],
+        }
+
+    found = tables.similarity([run([5.0, 4.0, 3.0, 2.0, 1.0])])
+    assert "-1.00 ± 0.00" in found and "| 0.33 |" in found  # chosen 1, median 3
+    assert "+1.00" in tables.similarity([run([1.0, 2.0, 3.0, 4.0, 5.0])])
+
+
+def test_only_some_estimators_replace_their_own_records() -> None:
+    old = [record("paper", "a", 1.0), record("ours", "a", 2.0)]
+    new = [record("ours", "a", 0.5)]
+    kept = runs.merged(old, new, ["ours"])
+    assert [(r["estimator"], r["log_rms"]) for r in kept] == [("paper", 1.0), ("ours", 0.5)]
+    assert runs.merged(old, new, None) == new
+
+
+def test_only_the_marked_part_is_replaced() -> None:
+    text = "a\n<!-- begin x -->\nold\n<!-- end x -->\nb <!-- begin y -->1<!-- end y -->"
+    found = document.replaced(text, "x", "new \\1\n")
+    assert found == text.replace("old", "new \\1")
+    with pytest.raises(ValueError, match="'z'"):
+        document.replaced(text, "z", "")
+
+
+def test_the_document_has_every_part() -> None:
+    text = document.DOCUMENT.read_text("utf-8")
+    for marker in document.sections():
+        assert f"<!-- begin {marker} -->" in text and f"<!-- end {marker} -->" in text
+    for line in text.splitlines():
+        if line.startswith("!["):
+            picture = document.DOCUMENT.parent / line[line.index("](") + 2 : -1]
+            assert picture.is_file()
+            if picture.suffix == ".svg":
+                ElementTree.parse(picture)
+
+
+def test_charts_put_values_in_their_place() -> None:
+    chart = svg.Chart("t < 1", "x", "y", (1.0, 100.0), (0.0, 2.0), x_log=True)
+    assert chart.x(10.0) == pytest.approx((chart.x(1.0) + chart.x(100.0)) / 2)
+    assert chart.y(1.0) == pytest.approx((chart.y(0.0) + chart.y(2.0)) / 2)
+    assert chart.y(2.0) < chart.y(0.0)  # pixels run downwards
+    chart.line([1, 10, 100], [0.0, 1.0, 2.0], svg.COLOURS[0])
+    chart.whisker(10, 0.5, 1.5, svg.INK)
+    whole = svg.sheet([chart.drawing()], 1, (300, 220), svg.legend([("a & b", "#000", "bar")]))
+    root = ElementTree.fromstring(whole)
+    words = [e.text for e in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert "t < 1" in words and "a & b" in words and {"1", "10", "100", "0", "2"} <= set(words)
+
+
+def test_a_sweep_shows_medians_in_order() -> None:
+    found = [
+        {"sweep": "photos", "where": "knot", "value": v, "label": f"{v:g}", "material": m,
+         "estimator": "paper", "log_rms": 1 / v + d, "specular_l2": 0.5}
+        for v in (16, 2, 8) for m, d in (("a", 0.0), ("b", 0.1), ("c", 0.3))
+    ]  # fmt: skip
+    table = tables.sweep(found, "photos").splitlines()
+    assert [c.strip() for c in table[0].split("|")[3:6]] == ["2", "8", "16"]
+    assert "0.600, 0.500" in table[2]
+    ElementTree.fromstring(figures.sweep(found, ["photos"], {"photos": "lit photos"}))
+
+
+def test_half_circle_radius_is_the_cube_root() -> None:
+    from tools.experiments.half_circle import BASE, RADIUS, WIDTH, half_circle, slice_angles
+
+    theta, _ = slice_angles(np.radians(45))
+    drawn = half_circle("x", [(np.full((len(theta), 3), 0.125), "")], 45, 1.0)
+    root = ElementTree.fromstring(f"<g>{drawn}</g>")
+    line = next(root.iter("polyline")).get("points") or ""
+    points = np.array([[float(x) for x in p.split(",")] for p in line.split()])
+    radius = np.hypot(points[:, 0] - WIDTH / 2, points[:, 1] - BASE)
+    np.testing.assert_allclose(radius, RADIUS / 2, atol=0.1)

@@ -1,0 +1,211 @@
+"""Patina's own estimator: its parts against mathematics, the whole against a known material."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from patina.core.angles import Angles, cosines, half_difference
+from patina.core.basis import Basis
+from patina.core.basis.log_table import LogTable
+from patina.core.errors import FitError
+from patina.core.fit.measured import MeasuredSettings, fit_measured
+from patina.core.fit.measured.anchors import Anchors, directions
+from patina.core.fit.measured.cells import gather
+from patina.core.fit.measured.forward import CellModel
+from patina.core.fit.measured.lobes import Lobes, fit_lobes
+from patina.core.fit.measured.normals import refine_normals, seen_with
+from patina.core.fit.measured.patches import Patches
+from patina.core.fit.measured.prior import ChannelPrior
+from patina.core.fit.measured.scatter import rings, scattered
+from patina.core.samples import SampleTable
+from tests import make_capture as made
+from tests.sampled import sampled
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> SampleTable:
+    return sampled(made.make_capture(tmp_path_factory.mktemp("ball")))[0]
+
+
+def test_scatter_integrates_a_plane_gaussian() -> None:
+    offsets, weights = rings()
+    r2 = np.sum(offsets**2, axis=1)
+    assert weights.sum() == pytest.approx(1.0)
+    assert np.abs(weights @ offsets).max() < 1e-12
+    for power, moment in ((1, 2.0), (2, 8.0), (3, 48.0), (4, 384.0)):  # E r^2p of a plane Gaussian
+        assert weights @ r2**power == pytest.approx(moment, rel=1e-9)
+
+
+def test_no_scatter_is_the_direction_itself() -> None:
+    angles = Angles(np.array([0.1, 0.5]), np.array([0.3, 0.9]), np.array([1.0, 2.0]))
+    seen, cos_i, cos_o, weights = scattered(angles, np.zeros(2))
+    assert np.allclose(np.stack(seen)[..., 0], np.stack(angles))
+    own_i, own_o = cosines(*angles)
+    assert np.allclose(cos_i[:, 0], own_i) and np.allclose(cos_o[:, 0], own_o)
+    assert weights.tolist() == [1.0]
+
+
+def test_cells_keep_every_sample_and_the_mean_light(table: SampleTable) -> None:
+    cells = gather(table, 0.0)
+    assert cells.count.sum() == len(table)
+    light = (table.radiance / table.irradiance).sum(axis=0)
+    assert np.allclose((cells.reflected * cells.count[:, None]).sum(axis=0), light, rtol=0.01)
+
+
+def test_slopes_are_those_of_the_prediction(table: SampleTable) -> None:
+    basis = Basis.default()
+    cells = gather(table, np.radians(1.0)).select(np.arange(0, 400))
+    model = CellModel.of(cells, basis)
+    k = 12
+    c = 0.03 * np.random.default_rng(0).standard_normal((3, k))
+    slopes = model.predict(c).slopes
+    for component in (0, 5, 11):
+        step = np.zeros((3, k))
+        step[:, component] = 1e-3
+        up, down = model.predict(c + step, slopes=False), model.predict(c - step, slopes=False)
+        numeric = np.log(up.level / down.level) / 2e-3
+        for channel in range(3):
+            difference = slopes[channel][:, component] - numeric[:, channel]
+            assert np.abs(difference).max() < 2e-2 * max(1.0, np.abs(numeric).max())
+
+
+def test_part_of_a_model_predicts_as_the_whole(table: SampleTable) -> None:
+    model = CellModel.of(gather(table, np.radians(0.5)), Basis.default())
+    c = 0.02 * np.random.default_rng(1).standard_normal((3, 8))
+    some = np.random.default_rng(2).random(len(model.cells)) < 0.4
+    whole, part = model.predict(c), model.select(some).predict(c)
+    assert np.allclose(part.level, whole.level[some], rtol=1e-5)
+    assert np.allclose(part.slopes[1], whole.slopes[1][some], rtol=1e-4, atol=1e-5)
+
+
+def test_precision_is_the_inverse_of_the_priors_covariance() -> None:
+    rng = np.random.default_rng(3)
+    shared, own = rng.random(4), 0.1 + rng.random(4)
+    prior = ChannelPrior(shared, own)
+    covariance = np.zeros((12, 12))
+    for i in range(4):
+        at = [i, 4 + i, 8 + i]
+        covariance[np.ix_(at, at)] = shared[i] + own[i] * np.eye(3)
+    assert np.allclose(prior.precision() @ covariance, np.eye(12))
+
+
+def test_anchors_pull_an_empty_fit_to_the_lobes() -> None:
+    basis = Basis.default()
+    lobes = Lobes(np.log([0.1] * 3 + [0.3, 1.0] + [0.05] * 3 + [0.1, 1.0] + [1e-6] * 3), 0.0)
+    k = basis.count
+    prior = ChannelPrior.of(basis, k, coupled=False)
+    edge, average = np.radians(60.0), np.zeros((3, k))
+    anchored = prior.anchored(Anchors.of(lobes, basis, average, edge), 0.05)
+    c = np.linalg.solve(anchored.precision(), anchored.pull()).reshape(3, k)
+    angles = directions(edge)
+    at_edge = Angles(angles.theta_h, np.full_like(angles.theta_d, edge), angles.phi_d)
+    mean = basis.evaluate(average, angles)
+    change = lobes.evaluate(angles) / lobes.evaluate(at_edge)
+    expected, found = basis.evaluate(average, at_edge) * change, basis.evaluate(c, angles)
+    off = np.abs(np.log(found / expected)).mean()
+    assert off < 0.35 * np.abs(np.log(mean / expected)).mean()
+
+
+def test_lobes_find_a_lambertian_surface(table: SampleTable) -> None:
+    grey = np.array([0.3, 0.2, 0.1])
+    light = table.irradiance * table.cos_i[:, None] * grey.astype(np.float32)
+    cells = gather(replace(table, radiance=light), 0.0)
+    lobes = fit_lobes(cells)
+    rho = lobes.evaluate(Angles(*(np.array([x]) for x in (0.3, 0.4, 1.0))))
+    assert np.allclose(rho[0], grey, rtol=0.05) and lobes.misfit < 0.02
+
+
+def test_normals_come_back(table: SampleTable) -> None:
+    """A glossy material, normals tilted smoothly by two degrees: most of the tilt is found."""
+    basis = Basis.default()
+    truth = made_brdf(basis)
+    radiance = truth.evaluate(table.angles) * table.irradiance * table.cos_i[:, None]
+    clean = replace(table, radiance=radiance.astype(np.float32))
+    p = clean.point / np.ptp(clean.point, axis=0).max()
+    tilt = np.radians(2.0) * np.stack([np.sin(9 * p[:, 1]), np.cos(7 * p[:, 2]), 0 * p[:, 0]], 1)
+    true = clean.normal.astype(np.float64)
+    wrong = true + tilt - np.sum(tilt * true, axis=1, keepdims=True) * true
+    wrong /= np.linalg.norm(wrong, axis=1, keepdims=True)
+    scanned = seen_with(clean, wrong)
+    patches = Patches.of_points(scanned.point)
+    found = refine_normals(scanned, patches, truth, np.radians(1.5))
+
+    def typical(normal: np.ndarray) -> float:
+        return float(np.median(np.linalg.norm(normal - true, axis=1)))
+
+    # one photo fixes one of a normal's two directions, and away from highlights neither
+    assert typical(found.table.normal) < 0.75 * typical(wrong)
+    assert np.isfinite(found.error).all() and (found.error >= 0).all()
+
+
+def test_flat_materials_leave_normals_alone(table: SampleTable) -> None:
+    basis = Basis.default()
+    nodes = Angles(*(a.ravel() for a in basis.grid.nodes()))
+    cos_i, cos_o = cosines(*nodes)
+    flat = np.log(0.1 * np.clip(cos_i * cos_o, 0.01, 1.0) + 1e-3)
+    matte = LogTable(basis.grid, np.repeat(flat[:, None], 3, axis=1).astype(np.float32))
+    shown = matte.evaluate(table.angles) * table.irradiance * table.cos_i[:, None]
+    clean = replace(table, radiance=shown.astype(np.float32))
+    found = refine_normals(clean, Patches.of_points(clean.point), matte, np.radians(1.0))
+    angle = np.linalg.norm(found.table.normal - clean.normal, axis=1)
+    assert np.median(angle) < np.radians(0.2)
+
+
+def test_the_whole_recovers_a_material(table: SampleTable) -> None:
+    basis = Basis.default()
+    truth = made_brdf(basis)
+    shown = truth.evaluate(table.angles) * table.irradiance * table.cos_i[:, None]
+    fit = fit_measured(replace(table, radiance=shown.astype(np.float32)), basis)
+    some = np.random.default_rng(4).choice(len(table), 2000, replace=False)
+    angles = Angles(*(a[some] for a in table.angles))
+    error = np.log(fit.brdf.evaluate(angles) / truth.evaluate(angles))
+    assert np.median(np.abs(error)) < 0.03
+    band = fit.band(angles)
+    assert band.shape == (2000, 3) and (band > 0).all()
+    unseen = Angles(*(np.array([np.radians(x)]) for x in (1.0, 82.0, 90.0)))
+    assert fit.band(unseen).min() > np.median(band)
+
+
+def test_the_same_input_gives_the_same_bytes(table: SampleTable) -> None:
+    quick = MeasuredSettings(rounds=1, components=20)
+    first, second = (fit_measured(table, Basis.default(), quick) for _ in range(2))
+    assert first.brdf.coefficients.tobytes() == second.brdf.coefficients.tobytes()
+
+
+def test_too_few_samples_are_refused(table: SampleTable) -> None:
+    with pytest.raises(FitError, match="at least"):
+        fit_measured(table.select(np.arange(10)), Basis.default())
+
+
+def test_patches_touch_their_neighbours(table: SampleTable) -> None:
+    patches = Patches.of_points(table.point)
+    assert patches.of.shape == (len(table),)
+    assert np.abs(patches.neighbours.sum(axis=1)).max() < 1e-9
+    assert 2.0 < len(table) / patches.count < 20.0
+
+
+def test_normals_seen_anew_agree_with_sampling(table: SampleTable) -> None:
+    again = seen_with(table, table.normal.astype(np.float64))
+    expected = half_difference(table.normal, table.light, table.view)
+    assert np.allclose(again.theta_h, expected.theta_h, atol=1e-6)
+    assert np.allclose(again.rho, table.rho, rtol=1e-3)
+
+
+def made_brdf(basis: Basis) -> LogTable:
+    """A glossy material of the basis: its mean and the direction of gloss."""
+    c = np.zeros((3, 6))
+    c[:, 0] = 0.04
+    c[:, 1] = [0.03, 0.02, 0.01]
+    return LogTable.of(basis, c)
+
+
+def test_a_log_table_is_the_basis(table: SampleTable) -> None:
+    basis = Basis.default()
+    c = 0.03 * np.random.default_rng(5).standard_normal((3, 10))
+    angles = Angles(*(a[:500] for a in table.angles))
+    assert np.allclose(
+        LogTable.of(basis, c).evaluate(angles), basis.evaluate(c, angles), rtol=2e-3, atol=1e-6
+    )

@@ -1,0 +1,59 @@
+"""The three scanned bunnies of the reference data: real reconstruction errors, exact truth."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from patina.core.capture import Capture, read_capture
+from patina.core.job import inputs
+from patina.core.job.lights import find_lights
+from patina.core.job.photos import LitPhotos
+from patina.core.light import DistantLight
+from patina.core.scan import Camera, Mesh, Scan
+from patina.core.scan.mesh import read_mesh
+
+from .materials import data_folder
+from .simulate import Shot
+
+BUNNIES = {
+    "OpenMVS": "bunny_red",
+    "OpenMVS refined": "bunny_bronze",
+    "MVE": "bunny_fabric",
+}
+"""Stereo tool → the capture whose mesh it made."""
+
+
+def folder(tool: str) -> Path:
+    """The capture's folder."""
+    return data_folder() / "scans" / BUNNIES[tool]
+
+
+@lru_cache(maxsize=1)
+def true_bunny() -> Mesh:
+    """The exact surface, in the scans' frame."""
+    return read_mesh(data_folder() / "scans" / "bunny_truth.ply")
+
+
+@lru_cache(maxsize=3)
+def opened(tool: str) -> tuple[Capture, Scan, tuple[Shot, ...]]:
+    """The capture as the program reads it, its scan and its eight shots."""
+    capture = read_capture(folder(tool) / "scan.capture.toml")
+    scan = inputs.open_scan(capture)
+    lights = find_lights(capture, scan, LitPhotos.open(capture))
+    shots = []
+    for place in range(len(capture.photos)):
+        light = lights.of(capture, place)
+        if not isinstance(light, DistantLight):
+            raise TypeError("the bunnies' lights are distant")
+        shots.append(Shot(inputs.camera_of(capture, scan, place), light))
+    return capture, scan, tuple(shots)
+
+
+def other_cameras(tool: str) -> list[Camera]:
+    """Cameras of the scan that none of the eight lit photos was taken with."""
+    _, scan, shots = opened(tool)
+    used = {shot.camera.label for shot in shots}
+    size = (shots[0].camera.width, shots[0].camera.height)
+    others = [camera for camera in scan.cameras if camera.label not in used]
+    return [camera.resized(*size) for camera in sorted(others, key=lambda c: c.label)]

@@ -1,0 +1,134 @@
+"""docs/experiments.md: what stands between its markers is written anew from the results."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import partial
+
+from ..common import ROOT, say
+from . import figures, goal_table, store, tables
+from .ablation import SCENES
+from .records import Record, distinct, where
+
+DOCUMENT = ROOT / "docs" / "experiments.md"
+IMAGES = "images/experiments"
+ESTIMATORS = (
+    "paper", "all samples k=20", "ours", "ours, true mesh", "all samples k=40, true mesh",
+    "floor k=20", "floor k=40", "floor k=120",
+)  # fmt: skip
+X_LABELS = {
+    "samples": "samples the fit is solved from",
+    "curvature": "largest curvature allowed, 1/pixel",
+    "photos": "lit photos",
+    "mesh error, bumpy": "median normal error, degrees",
+    "mesh error, wavy": "median normal error, degrees",
+    "mesh error, blurred": "median normal error, degrees",
+    "stereo tool": "mesh of",
+}
+Section = Callable[[list[Record]], str]
+
+
+def sections() -> dict[str, tuple[str, Section]]:
+    """Marker → (experiment it needs, what makes its text)."""
+    found: dict[str, tuple[str, Section]] = {
+        "check": ("check", tables.check),
+        "goals": ("goals", goal_table.goals),
+        "by scene": ("goals", lambda r: goal_table.by_scene(r, _present(r))),
+        "by material": ("goals", lambda r: goal_table.by_material(r, _present(r))),
+        "in-basis": ("goals", goal_table.in_basis),
+        "polar": ("ablation", _polar),
+        "ablation": ("ablation", _ablation),
+        "similarity": ("ablation", _similarity),
+    }
+    for name in ("samples", "curvature", "photos", "mesh error", "stereo tool"):
+        found[name] = ("sweeps", partial(_sweep, name))
+    return found
+
+
+def write() -> None:
+    """Fill every marked part whose results are there; the rest stays as it was."""
+    text = DOCUMENT.read_text("utf-8")
+    for marker, (experiment, make) in sections().items():
+        records = store.load(experiment)
+        if not records:
+            say(f"{marker}: no results of {experiment!r} yet, left as it was")
+            continue
+        if content := make(records):
+            text = replaced(text, marker, content)
+    DOCUMENT.write_text(text, "utf-8")
+    say(f"wrote {DOCUMENT.relative_to(ROOT)}")
+
+
+def summary() -> str:
+    """The tables of the quick runs, for the terminal."""
+    parts = []
+    for marker in ("check", "goals", "by scene"):
+        experiment, make = sections()[marker]
+        if records := store.load(experiment, quick=True):
+            parts.append(f"## {marker}\n\n{make(records)}")
+    runs = store.load("ablation", quick=True) or []
+    if runs:
+        parts.append(f"## ablation\n\n{tables.ablation(runs, 'log_rms')}")
+    for name in distinct(store.load("sweeps", quick=True) or [], "sweep"):
+        parts.append(f"## {name}\n\n{tables.sweep(store.load('sweeps', quick=True) or [], name)}")
+    return "\n".join(parts)
+
+
+def replaced(text: str, marker: str, content: str) -> str:
+    """The text with what stands between a marker's two comments replaced."""
+    begin, end = f"<!-- begin {marker} -->", f"<!-- end {marker} -->"
+    pattern = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
+    if not pattern.search(text):
+        raise ValueError(f"the document has no part {marker!r}")
+    return pattern.sub(lambda _: f"{begin}\n{content.strip()}\n{end}", text)
+
+
+def _present(records: list[Record]) -> list[str]:
+    names = distinct(records, "estimator")
+    return [name for name in ESTIMATORS if name in names]
+
+
+def _polar(records: list[Record]) -> str:
+    out = []
+    for scene in SCENES:
+        if where(records, scene=scene):
+            file = figures.write(f"polar-{scene}.svg", figures.polar(records, scene))
+            out.append(_picture(file.name, f"Polar slices, six materials, {scene}"))
+    return "\n\n".join(out)
+
+
+def _ablation(records: list[Record]) -> str:
+    file = figures.write("ablation.svg", figures.ablation(records))
+    return "\n\n".join(
+        [
+            _picture(file.name, "Ablation: bars of five variants for six materials"),
+            tables.ablation_claims(records),
+            "Around the specular direction, relative L2, mean ± standard deviation:",
+            tables.ablation(records, "specular_l2"),
+            "Whole hemisphere, relative L2:",
+            tables.ablation(records, "relative_l2"),
+        ]
+    )
+
+
+def _similarity(records: list[Record]) -> str:
+    file = figures.write("similarity.svg", figures.similarity(records))
+    picture = _picture(file.name, "Cosine similarity against log-relative RMS")
+    return f"{picture}\n\n{tables.similarity(records)}"
+
+
+def _sweep(name: str, records: list[Record]) -> str:
+    sweeps = [s for s in distinct(records, "sweep") if s == name or s.startswith(f"{name},")]
+    if not sweeps:
+        return ""
+    drawing = figures.sweep(records, sweeps, X_LABELS)
+    file = figures.write(f"{name.replace(' ', '-')}.svg", drawing)
+    parts = [_picture(file.name, f"Error against {name}")]
+    for sweep in sweeps:
+        parts += [f"{sweep[0].upper()}{sweep[1:]}:", tables.sweep(records, sweep)]
+    return "\n\n".join(parts)
+
+
+def _picture(name: str, words: str) -> str:
+    return f"![{words}]({IMAGES}/{name})"

@@ -1,0 +1,152 @@
+"""Every estimator on every material and scene: the records behind the table of goals."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from patina.core.basis import Basis
+from patina.core.fit import PaperSettings
+from patina.core.fit.held_out import leave_out, photos_to_hold_out, summarise
+from patina.core.samples import SampleTable
+
+from . import estimators, materials, metrics, scenes, spheres
+from .runs import Records
+
+SEEDS = 3
+IN_BASIS = ("paper", "ours")
+PICTURES = ("paper", "ours", "ours, true mesh")
+ORACLES = ("bunny-refined", "jar-bumpy", "pebble-wavy")
+"""Scenes where our own estimator is given the true mesh too (it is the slowest row)."""
+FLOORS = (5, 20, 40, 120)
+
+
+def tasks(quick: bool) -> list[tuple[str, list[str], int]]:
+    """(scene or "floors", materials, seeds), longest first."""
+    names = [m.name for m in materials.materials()]
+    if quick:
+        names = ["pink-fabric2", "paper_blue_rgb"]
+    some = ["pebble-wavy"] if quick else list(scenes.SCENES)
+    half = len(names) // 2
+    parts = [names] if quick else [names[:half], names[half:]]
+    found = [(scene, part, 1 if quick else SEEDS) for scene in some for part in parts]
+    return [*found, ("floors", names, 1)]
+
+
+def work(task: tuple[str, list[str], int]) -> Records:
+    """The records of one task."""
+    scene, names, seeds = task
+    if scene == "floors":
+        return floors(names) if estimators.asked("floors") else []
+    found: Records = []
+    taken, oracle = scenes.sampled(scene), scenes.sampled(scene, "oracle")
+    elsewhere = scenes.sampled(scene, "elsewhere")
+    seen = metrics.covered(taken.table)
+    for material in materials.materials(names):
+        reference = metrics.Reference.of(material.evaluate)
+        unseen = elsewhere.photograph(material.evaluate, None)
+        light = {False: taken.true.transport(material.evaluate)}
+        light[True] = oracle.true.transport(material.evaluate)
+        for row in estimators.rows().values():
+            for in_basis in (False, True):
+                if in_basis and not (material.trained and row.name in IN_BASIS):
+                    continue
+                basis = materials.basis_for(material, row.components, in_basis)
+                if row.true_mesh and row.components > 40 and scene not in ORACLES:
+                    continue
+                for seed in range(seeds if row.random and not in_basis else 1):
+                    capture = oracle if row.true_mesh else taken
+                    table = capture.exposed(light[row.true_mesh], seed)
+                    since = time.perf_counter()
+                    fit = row.estimator(table, basis, seed)
+                    seconds = time.perf_counter() - since
+                    record: dict[str, Any] = {
+                        "scene": scene, "material": material.name, "estimator": row.name,
+                        "in_basis": in_basis, "seed": seed, "seconds": seconds,
+                        "coverage": float(seen.mean()),
+                        **asdict(reference.errors(fit.evaluate, seen)),
+                    }  # fmt: skip
+                    record |= band_coverage(fit, reference, seen)
+                    if not row.true_mesh and not in_basis and seed == 0:
+                        record |= image_errors(fit, table, unseen, basis, row.name)
+                    if (
+                        not in_basis
+                        and seed == 0
+                        and not material.trained
+                        and (row.name in PICTURES)
+                    ):
+                        record["psnr"] = spheres.psnr(
+                            spheres.pictures(fit.evaluate), true_pictures(material.name)
+                        ).tolist()
+                    found.append(record)
+    return found
+
+
+def image_errors(
+    fit: estimators.Fitted, table: SampleTable, unseen: SampleTable, basis: Basis, name: str
+) -> dict[str, float]:
+    """What the program reports of held-out photos, beside the error of photos of unseen views and
+    lights without noise, both through the scanned mesh: relative RMS and typical pixel."""
+    rho = np.asarray(fit.evaluate(unseen.angles))
+    predicted = rho * unseen.irradiance * unseen.cos_i[:, None]
+    rms, typical = metrics.image_error(predicted, unseen.radiance)
+    out = {"image_rms": rms, "image_typical": typical}
+    if name == "paper":
+        parts = [
+            leave_out(table, photo, basis, PaperSettings()) for photo in photos_to_hold_out(table)
+        ]
+        held = summarise([part for part in parts if part is not None])
+    else:
+        held = estimators.reported(fit)
+    if held is not None:
+        out |= {"held_out_rms": held.error, "held_out_typical": held.typical}
+    return out
+
+
+def band_coverage(
+    fit: estimators.Fitted, reference: metrics.Reference, seen: NDArray[np.bool_]
+) -> dict[str, float]:
+    """Share of the truth inside the fit's 90 % bands (all channels), light and view within 80°: of
+    cells that hold a sample, and of those that do not. Nothing where a fit has no bands."""
+    interval = estimators.interval(fit)
+    if interval is None:
+        return {}
+    cells = metrics.cells(reference.every)
+    low, high = interval(cells.angles)
+    inside = (reference.values >= low) & (reference.values <= high)
+    return {
+        "band_seen": float(inside[cells.near & seen].mean()),
+        "band_unseen": float(inside[cells.near & ~seen].mean()),
+    }
+
+
+def floors(names: list[str]) -> Records:
+    """The truth itself on the components of the basis without it."""
+    found: Records = []
+    for material in materials.materials(names):
+        reference = metrics.Reference.of(material.evaluate)
+        for in_basis in (False, True) if material.trained else (False,):
+            for count in FLOORS:
+                basis = materials.basis_for(material, count, in_basis)
+                best = reference.projected(basis, count)
+                record = {
+                    "scene": "floor", "material": material.name, "estimator": f"floor k={count}",
+                    "in_basis": in_basis, "seed": 0, **asdict(reference.errors(best.evaluate)),
+                }  # fmt: skip
+                if not material.trained and count >= 40:
+                    record["psnr"] = spheres.psnr(
+                        spheres.pictures(best.evaluate), true_pictures(material.name)
+                    ).tolist()
+                found.append(record)
+    return found
+
+
+@lru_cache(maxsize=40)
+def true_pictures(name: str) -> NDArray[np.float32]:
+    """The sphere of a material under every world."""
+    return spheres.pictures(materials.materials([name])[0].evaluate)

@@ -1,0 +1,124 @@
+"""The materials, their truth from the neural encodings, and the basis that has not seen them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from patina.core.angles import Angles
+from patina.core.basis.build_default import PROVENANCE, NeuralObservations
+from patina.core.basis.merl_folder import user_cache
+from patina.core.basis.training_set import FORMAT, TrainedBasis, TrainingSet
+from patina.core.brdf import nbrdf
+from patina.core.errors import InputError
+
+from ..common import ROOT, say
+
+PAPER = (
+    "alum-bronze",
+    "fruitwood-241",
+    "pink-fabric",
+    "blue-acrylic",
+    "pink-fabric2",
+    "green-latex",
+)
+"""The six of Ono et al. 2019, in the order of their Fig. 9."""
+
+FLAT = frozenset(
+    (
+        "pink-fabric", "pink-fabric2", "green-latex", "acrylic_felt_pink_rgb", "paper_blue_rgb",
+        "paper_white_rgb", "greencloth",
+    )
+)  # fmt: skip
+"""Fabric, latex, felt and paper: materials without a highlight to speak of."""
+
+OUT_OF_SPAN = frozenset(
+    ("cc_blue_agat_rgb", "cc_iris_purple_gem_rgb", "chm_orange_rgb", "irid_flake_paint1_fine_rgb",
+     "irid_flake_paint1_rgb", "irid_flake_paint2_rgb")
+)  # fmt: skip
+"""Sharp coats and flakes, which no material of MERL resembles."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """One material. weights: (675,) of its encoding; trained: it is one of the 100 of MERL."""
+
+    name: str
+    weights: NDArray[np.float32]
+    trained: bool
+
+    @property
+    def flat(self) -> bool:
+        """True for fabric, latex, felt and paper."""
+        return self.name in FLAT
+
+    def evaluate(self, angles: Angles) -> NDArray[np.float32]:
+        """True ρ (..., 3) in 1/sr, from the network itself."""
+        return nbrdf.evaluate(self.weights, angles)
+
+
+def data_folder() -> Path:
+    """The folder of reference data beside the checkout."""
+    return Path(os.environ.get("PATINA_SHARED", ROOT.parent / "shared")) / "data"
+
+
+def materials(names: Sequence[str] | None = None) -> list[Material]:
+    """The paper's six and the 25 validation materials, or those named (any of MERL's too)."""
+    merl = _encodings("nbrdf_merl.npz")
+    unseen = _encodings("nbrdf_validation.npz")
+    if names is None:
+        names = [*PAPER, *unseen]
+    return [
+        Material(name, merl[name], True) if name in merl else Material(name, unseen[name], False)
+        for name in names
+    ]
+
+
+def training_set() -> TrainingSet:
+    """The columns of the 100 encodings of MERL: computed once (20 s), then read from the cache."""
+    return _training_set()
+
+
+def basis_for(material: Material, count: int = 40, in_basis: bool = False) -> TrainedBasis:
+    """The basis that does not contain the material (all of it for a validation material).
+
+    in_basis: the other variant, the basis of all 100, which has seen the paper's six.
+    """
+    without = (material.name,) if material.trained and not in_basis else ()
+    return _basis(without, count)
+
+
+@lru_cache(maxsize=1)
+def _training_set() -> TrainingSet:
+    file = data_folder() / "brdf" / "nbrdf_merl.npz"
+    key = hashlib.sha256(file.read_bytes() + bytes([FORMAT])).hexdigest()[:16]
+    stored = user_cache() / f"training_set_{key}.npz"
+    if stored.is_file():
+        try:
+            return TrainingSet.load(stored)
+        except InputError:
+            stored.unlink()  # a damaged cache is made anew
+    say("training columns at cells and nodes (20 s, once)")
+    names, weights = nbrdf.load(file)
+    found = TrainingSet.compute(NeuralObservations(weights), names, PROVENANCE)
+    stored.parent.mkdir(parents=True, exist_ok=True)
+    found.save(stored)
+    return found
+
+
+@lru_cache(maxsize=3)
+def _basis(without: tuple[str, ...], count: int) -> TrainedBasis:
+    return training_set().basis(without, count)
+
+
+@lru_cache(maxsize=2)
+def _encodings(file: str) -> dict[str, NDArray[np.float32]]:
+    names, weights = nbrdf.load(data_folder() / "brdf" / file)
+    return dict(zip(names, weights, strict=True))

@@ -1,0 +1,114 @@
+"""Scanned variants of an exact mesh: how wrong its normals are is chosen, in degrees.
+
+bumpy: vertices moved along their normals by a smooth random field (stereo errs in patches, not
+point by point), fine or coarse; blurred: details smoothed away, as refinement and decimation do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from patina.core.scan import Mesh
+
+from .shapes import waves
+
+Array = NDArray[np.float64]
+
+FINE, COARSE = 0.012, 0.06
+"""Wavelengths of the bumps, of the mesh's size (diagonal of its box)."""
+
+
+def normal_errors(vertices: Array, true: Mesh) -> Array:
+    """(v,) degrees between a mesh's normals and those with its vertices moved to ``vertices``."""
+    incidence = _incidence(true)
+    before = _normals(true.vertices, true.faces, incidence)
+    return _angle(_normals(vertices, true.faces, incidence), before)
+
+
+def bumpy(true: Mesh, degrees: float, wavelength: float = FINE, seed: int = 0) -> Mesh:
+    """Bumps whose median normal error is ``degrees``; wavelength: of the mesh's size."""
+    field = waves(wavelength * true.size, 100 + seed)(true.vertices)
+    moved = _bumps(true, true.vertices, field, degrees, 1e-3 * true.size * wavelength)
+    return replace(true, vertices=moved)
+
+
+def blurred(true: Mesh, degrees: float, seed: int = 0) -> Mesh:
+    """Smoothed until the median normal error is ``degrees``, then faint coarse bumps (a third)."""
+    average = _averaging(true)
+    incidence = _incidence(true)
+    normals = _normals(true.vertices, true.faces, incidence)
+
+    def error(vertices: Array) -> float:
+        return float(np.median(_angle(_normals(vertices, true.faces, incidence), normals)))
+
+    before = after = true.vertices
+    for _ in range(400):
+        before = after
+        for _ in range(5):
+            after = after + 0.5 * (average @ after - after)
+        if error(after) >= degrees:
+            break
+    low, high = error(before), error(after)
+    part = np.clip((degrees - low) / max(high - low, 1e-9), 0, 1)
+    smooth = before + part * (after - before)
+    field = waves(COARSE * true.size, 200 + seed)(true.vertices)
+    moved = _bumps(true, smooth, field, degrees / 3, 1e-3 * true.size * COARSE)
+    return replace(true, vertices=moved)
+
+
+def _bumps(mesh: Mesh, origin: Array, field: Array, degrees: float, start: float) -> Array:
+    """``origin`` moved along its normals by the amplitude whose median normal error is asked for
+    (steps in tan, which is all but linear)."""
+    incidence = _incidence(mesh)
+    normals = _normals(origin, mesh.faces, incidence)
+    amplitude = start
+    for _ in range(8):
+        moved = origin + amplitude * field[:, None] * normals
+        error = float(np.median(_angle(_normals(moved, mesh.faces, incidence), normals)))
+        if abs(error - degrees) < 0.01 * degrees:
+            break
+        amplitude *= np.tan(np.radians(degrees)) / np.tan(np.radians(min(error, 60.0)))
+    return np.asarray(origin + amplitude * field[:, None] * normals)
+
+
+def _incidence(mesh: Mesh) -> csr_matrix:
+    """(v, f) 1 where a face meets a vertex."""
+    rows = mesh.faces.ravel()
+    columns = np.repeat(np.arange(len(mesh.faces)), 3)
+    return csr_matrix((np.ones(len(rows)), (rows, columns)), (len(mesh.vertices), len(mesh.faces)))
+
+
+def _normals(vertices: Array, faces: NDArray[np.int32], incidence: csr_matrix) -> Array:
+    """(v, 3) area-weighted: quicker than the program's, and the same on even triangles."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    total = incidence @ np.cross(b - a, c - a)
+    return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300))
+
+
+def _angle(a: Array, b: Array) -> Array:
+    sine = np.linalg.norm(np.cross(a, b), axis=1)
+    return np.degrees(np.arctan2(sine, np.einsum("ij,ij->i", a, b)))
+
+
+def _averaging(mesh: Mesh) -> csr_matrix:
+    """(v, v) mean over the neighbours of each vertex."""
+    a, b = mesh.faces.ravel(), np.roll(mesh.faces, 1, axis=1).ravel()
+    n = len(mesh.vertices)
+    rows, columns = np.concatenate([a, b]), np.concatenate([b, a])
+    links = csr_matrix((np.ones(len(rows)), (rows, columns)), (n, n))
+    links.data[:] = 1.0
+    degree = np.maximum(np.asarray(links.sum(axis=1)).ravel(), 1.0)
+    return csr_matrix(links.multiply(1.0 / degree[:, None]))
+
+
+def make(kind: str) -> Callable[[Mesh, float, int], Mesh]:
+    """kind: bumpy (fine bumps), wavy (coarse bumps) or blurred, by their median normal error."""
+    if kind == "blurred":
+        return blurred
+    wavelength = {"bumpy": FINE, "wavy": COARSE}[kind]
+    return lambda true, degrees, seed: bumpy(true, degrees, wavelength, seed)

@@ -1,0 +1,125 @@
+"""A sphere under the HDR worlds that Blender ships: what a fit is worth in a picture.
+
+Orthographic view, no shadows or interreflection (a sphere has none). Each pixel sums ρ·L·cos over
+the cells of the world (a latitude-longitude map averaged to 48 × 96 cells), one direction in each,
+jittered and the same for truth and fit. Exposure: the 95th percentile of the true picture is white.
+PSNR of the 8-bit sRGB values of the disc's pixels (background would only flatter).
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from patina.core.angles import Angles, half_difference
+from patina.core.report.display import srgb
+
+Evaluate = Callable[[Angles], NDArray[np.floating]]
+
+ROWS, COLUMNS = 48, 96
+DISC = 28  # pixels across
+WHITE = 95.0
+CHUNK = 1 << 19
+
+
+@dataclass(frozen=True)
+class Quadrature:
+    """pixel, cell: (m,) of every pair of disc pixel and world cell above its horizon; angles: of
+    each; weight: (m,) cos θi × solid angle."""
+
+    pixel: NDArray[np.int32]
+    cell: NDArray[np.int32]
+    angles: Angles
+    weight: NDArray[np.float32]
+    pixels: int
+
+
+def worlds() -> dict[str, Path]:
+    """Name → the .exr files that come with Blender's bpy module."""
+    found = importlib.util.find_spec("bpy")
+    if found is None or found.origin is None:
+        return {}
+    root = Path(found.origin).parent
+    files = sorted(root.glob("**/datafiles/studiolights/world/*.exr"))
+    return {file.stem: file for file in files}
+
+
+@lru_cache(maxsize=1)
+def skies() -> tuple[tuple[str, ...], NDArray[np.float32]]:
+    """(names, (worlds, ROWS·COLUMNS, 3) mean radiance of each cell)."""
+    names, maps = [], []
+    for name, file in worlds().items():
+        pixels = np.asarray(oiio.ImageBuf(str(file)).get_pixels(oiio.FLOAT), np.float64)[..., :3]
+        h, w = pixels.shape[0] // ROWS * ROWS, pixels.shape[1] // COLUMNS * COLUMNS
+        theta = (np.arange(h) + 0.5) / pixels.shape[0] * np.pi
+        area = np.sin(theta)[:, None, None]
+        shape = (ROWS, h // ROWS, COLUMNS, w // COLUMNS, -1)
+        total = (pixels[:h, :w] * area).reshape(shape).sum(axis=(1, 3))
+        weight = np.broadcast_to(area, (h, w, 1)).reshape(shape).sum(axis=(1, 3))
+        names.append(name)
+        maps.append((total / weight).reshape(-1, 3))
+    return tuple(names), np.asarray(maps, np.float32)
+
+
+@lru_cache(maxsize=1)
+def quadrature() -> Quadrature:
+    """All pairs of pixel and cell."""
+    axis = (np.arange(DISC) + 0.5) / DISC * 2 - 1
+    x, z = np.meshgrid(axis, -axis)
+    inside = x**2 + z**2 < 0.98
+    x, z = x[inside], z[inside]
+    normal = np.stack([x, -np.sqrt(1 - x**2 - z**2), z], axis=1)  # the camera looks along +y
+    rng = np.random.default_rng(0)
+    n, m = len(normal), ROWS * COLUMNS
+    row, column = np.divmod(np.arange(m), COLUMNS)
+    low, high = np.cos(np.pi * row / ROWS), np.cos(np.pi * (row + 1) / ROWS)
+    cosine = low + (high - low) * rng.random((n, m))
+    around = 2 * np.pi * (column + rng.random((n, m))) / COLUMNS
+    sine = np.sqrt(np.maximum(1 - cosine**2, 0))
+    light = np.stack([sine * np.cos(around), sine * np.sin(around), cosine], axis=-1)
+    cos_i = np.einsum("nmi,ni->nm", light, normal)
+    pixel, cell = np.nonzero(cos_i > 1e-3)
+    view = np.broadcast_to(np.array([0.0, -1.0, 0.0]), (len(pixel), 3))
+    angles = half_difference(normal[pixel], light[pixel, cell], view)
+    solid = (2 * np.pi / COLUMNS) * (low - high)
+    weight = cos_i[pixel, cell] * solid[cell]
+    return Quadrature(
+        pixel.astype(np.int32),
+        cell.astype(np.int32),
+        Angles(*(a.astype(np.float32) for a in angles)),
+        weight.astype(np.float32),
+        n,
+    )
+
+
+def pictures(evaluate: Evaluate) -> NDArray[np.float32]:
+    """(worlds, pixels, 3) radiance of the disc's pixels under every world."""
+    q, (_, sky) = quadrature(), skies()
+    out = np.zeros((len(sky), q.pixels, 3))
+    for start in range(0, len(q.pixel), CHUNK):
+        part = slice(start, start + CHUNK)
+        rho = np.asarray(evaluate(Angles(*(a[part] for a in q.angles))), np.float32)
+        weighted = rho * q.weight[part, None]
+        for w in range(len(sky)):
+            light = weighted * sky[w, q.cell[part]]
+            for c in range(3):
+                out[w, :, c] += np.bincount(q.pixel[part], light[:, c], q.pixels)
+    return out.astype(np.float32)
+
+
+def psnr(fit: NDArray[np.float32], truth: NDArray[np.float32]) -> NDArray[np.float64]:
+    """(worlds,) dB between pictures of :func:`pictures`; at most 60 (the same bytes)."""
+    found = []
+    for a, b in zip(fit, truth, strict=True):
+        white = max(float(np.percentile(b, WHITE)), 1e-9)
+        difference = srgb(a / white).astype(float) - srgb(b / white)
+        mse = float(np.mean(difference**2))
+        found.append(10 * np.log10(255.0**2 / max(mse, 255.0**2 * 1e-6)))
+    return np.array(found)

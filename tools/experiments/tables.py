@@ -1,0 +1,107 @@
+"""Tables of the check, the ablation, the similarity and the sweeps."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import spearmanr
+
+from .ablation import VARIANTS
+from .records import Record, distinct, middle, number, table, values, where
+
+
+def check(records: list[Record]) -> str:
+    """Ours against the other renderer's photos."""
+    rows = [
+        [
+            r["tool"], r["material"], f"{r['samples']:,}", f"{r['median']:+.4f}",
+            f"{r['scatter']:.4f}", f"{100 * r['relative_l2']:.2f} %", f"{r['worst_20']:.0%}",
+        ]
+        for r in records
+    ]  # fmt: skip
+    head = ["mesh of", "material", "pixels", "median of ln(ours / theirs)", "robust scatter"]
+    return table([*head, "relative L2", "of it, the 20 worst pixels"], rows)
+
+
+def ablation(records: list[Record], key: str) -> str:
+    """Mean ± standard deviation over the runs, one row a scene and material."""
+    runs = [r for r in records if "variant" in r]
+    rows = []
+    for scene in distinct(runs, "scene"):
+        for name in distinct(runs, "material"):
+            cells = []
+            for variant in VARIANTS:
+                found = values(where(runs, scene=scene, material=name, variant=variant), key)
+                cells.append(f"{number(float(np.mean(found)))} ± {number(float(np.std(found)))}")
+            rows.append([scene, name, *cells])
+    return table(["scene", "material", *VARIANTS], rows)
+
+
+def ablation_claims(records: list[Record]) -> str:
+    """How often each assumption helps, from the means."""
+    runs = [r for r in records if "variant" in r]
+    rows = []
+    for key, words in (
+        ("relative_l2", "whole hemisphere, relative L2"),
+        ("specular_l2", "around the specular direction, relative L2"),
+        ("log_rms", "to 80°, log-relative RMS"),
+    ):
+        cells = []
+        for variant in list(VARIANTS)[1:]:
+            gains = []
+            for scene in distinct(runs, "scene"):
+                for name in distinct(runs, "material"):
+                    mean = [
+                        float(
+                            np.mean(values(where(runs, scene=scene, material=name, variant=v), key))
+                        )
+                        for v in (variant, "none")
+                    ]
+                    gains.append(mean[0] / mean[1])
+            better = sum(g < 1 for g in gains)
+            cells.append(f"{np.median(gains):.2f} ({better} of {len(gains)})")
+        rows.append([words, *cells])
+    head = ["error with ÷ without, median (cases where it is lower)", *list(VARIANTS)[1:]]
+    return table(head, rows)
+
+
+def similarity(records: list[Record]) -> str:
+    """Rank correlation of similarity and error within each run, and what choosing by it gains."""
+    runs = [r for r in records if "candidates" in r]
+    rows = []
+    for name in distinct(runs, "material"):
+        cells = []
+        for key in ("log_rms", "relative_l2"):
+            ranks, gain, best = [], [], []
+            for run in where(runs, material=name):
+                errors = np.array([c[key] for c in run["candidates"]])
+                similar = np.array([c["similarity"] for c in run["candidates"]])
+                ranks.append(float(spearmanr(similar, errors).statistic))
+                gain.append(errors[similar.argmax()] / np.median(errors))
+                best.append(errors.min() / np.median(errors))
+            cells += [
+                f"{np.mean(ranks):+.2f} ± {np.std(ranks):.2f}",
+                f"{np.median(gain):.2f}",
+                f"{np.median(best):.2f}",
+            ]
+        rows.append([name, *cells])
+    head = ["material", "rank correlation, log RMS", "chosen ÷ median", "best ÷ median"]
+    return table([*head, "rank correlation, relative L2", "chosen ÷ median", "best ÷ median"], rows)
+
+
+def sweep(records: list[Record], name: str) -> str:
+    """Medians over materials and seeds: log RMS, then around the specular direction."""
+    here = where(records, sweep=name)
+    rows = []
+    for place in distinct(here, "where"):
+        for estimator in distinct(where(here, where=place), "estimator"):
+            some = where(here, where=place, estimator=estimator)
+            marks = sorted({(r["value"], r["label"]) for r in here})
+            cells = []
+            for _, label in marks:
+                at = where(some, label=label)
+                failed = sum("failed" in r for r in at)
+                words = f"{number(middle(at, 'log_rms'))}, {number(middle(at, 'specular_l2'))}"
+                cells.append("" if not at else "no fit" if failed == len(at) else words)
+            rows.append([place, estimator, *cells])
+    labels = [label for _, label in sorted({(r["value"], r["label"]) for r in here})]
+    return table(["", "log RMS, specular L2", *labels], rows)
