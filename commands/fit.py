@@ -16,6 +16,7 @@ from ..core.job.job import Step, peak_memory
 from ..core.report import result_json, write_report
 from ..core.report.figures import reach
 from .progress import Progress
+from .solve import check_threads
 from .staging import check_out, staged_folder
 
 HELP = "fit every material of a capture and write them"
@@ -30,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
+    check_threads(arguments.threads)
     fit_to_folder(arguments.capture, arguments.out, arguments.threads)
 
 

@@ -6,6 +6,7 @@ import textwrap
 
 import bpy
 
+from ..core.report.figures import either_side
 from ..operators.look_through import lit_cameras
 from ..scene.apply import measured_materials
 from ..scene.materials import REASON_PROPERTY
@@ -78,9 +79,9 @@ class PATINA_PT_fit(_Stage, bpy.types.Panel):
             held = material.get("held_out")
             if held:
                 box.label(text=f"Predicts unseen photos to {100 * held['typical']:.0f} %")
-            known = material["uncertainty"].get("interval_90")
-            if known:
-                box.label(text=f"Reflectance known to ± {100 * known['median']:.0f} %")
+            if "interval_90" in material["uncertainty"]:
+                known = either_side(material["uncertainty"]["median"])
+                box.label(text=f"BRDF: {known} in half of directions")
             box.label(text=f"{material['samples']['used']:,} samples")
             for warning in material["warnings"]:
                 _wrapped(box, warning, "ERROR")

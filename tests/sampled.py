@@ -1,4 +1,4 @@
-"""The samples and surface views of a capture with one material, as the fit job takes them."""
+"""The samples of a capture as the fit job takes them: of one material with the views, or of all."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from pathlib import Path
 from patina.core.capture import read_capture
 from patina.core.geometry import RayScene, SurfaceView, view_surface
 from patina.core.job import inputs
+from patina.core.job.job import drained
 from patina.core.job.lights import find_lights
 from patina.core.job.photos import LitPhotos
+from patina.core.job.sampling import take_samples
 from patina.core.samples import Margins, SampleTable, sample_photo
 from patina.core.samples.take import light_surface, trusted_pixels
 
@@ -31,3 +33,14 @@ def sampled(path: Path) -> tuple[SampleTable, list[SurfaceView]]:
         tables.append(sample_photo(view, lighting, radiance, keep))
         views.append(view)
     return SampleTable.join(tables), views
+
+
+def sampled_materials(path: Path) -> dict[str, SampleTable]:
+    """All samples of every material, by its name."""
+    capture = read_capture(path)
+    scan = inputs.open_scan(capture)
+    rays = RayScene.build(scan.mesh)
+    photos = LitPhotos.open(capture)
+    lights = find_lights(capture, scan, photos)
+    taken = drained(take_samples(capture, scan, rays, photos, lights))
+    return {material.name: taken.kept[material.name].table() for material in capture.materials}

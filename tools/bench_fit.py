@@ -35,7 +35,8 @@ def run(data: Path) -> None:
         rows, peaks, held = [], [], []
         for seed in range(SEEDS):
             paper = replace(capture.fit.paper, seed=seed)
-            job = FitJob(replace(capture, fit=replace(capture.fit, paper=paper)))
+            fit = replace(capture.fit, method="paper", paper=paper)
+            job = FitJob(replace(capture, fit=fit))
             job.drain()
             if job.result is None or job.result.materials[0].held_out is None:
                 raise RuntimeError("the job ended without a result")

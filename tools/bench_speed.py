@@ -6,7 +6,7 @@ own; captures are made in a temporary folder.
 
 from __future__ import annotations
 
-import itertools
+import hashlib
 import json
 import subprocess
 import sys
@@ -20,47 +20,81 @@ from .common import ROOT
 
 PHOTOS = 8
 SIZES = ((1, 100_000), (6, 100_000), (24, 100_000), (1, 1_000_000), (6, 1_000_000),
-         (24, 1_000_000), (1, 5_000_000), (24, 5_000_000))  # fmt: skip
-PLAIN = (6, 100_000)  # megapixels, triangles that the plain way can hold
+         (24, 1_000_000), (1, 5_000_000), (6, 5_000_000), (24, 5_000_000))  # fmt: skip
+MANY_PHOTOS = (6, 100_000, 16)
+SMALL = (6, 100_000)  # megapixels, triangles: what the plain way can hold
 SELECTIONS = ((10_000_000, 6), (10_000_000, 12), (10_000_000, 20))
 PLAIN_SELECTIONS = ((20_000, 6), (3_000, 20))
+STAGES = {"reading the scan": "scan", "sampling the photos": "samples"}  # all others are the fit's
+WITHOUT = ("Principled", "materials on")  # and those that come after the coefficients
 
 
 def run(data: Path) -> None:
     """Print the tables of docs/measurements.md, section "Speed and memory"."""
-    print(f"## speed ({PHOTOS} photos, half-float EXR; 2 threads)\n")
-    print("| photos | triangles | samples | scan | rays ready | samples taken | paper's fit "
-          "| all | processor time | peak memory |")  # fmt: skip
-    print("|---|---|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
-        for megapixels, triangles in SIZES:
-            where = Path(folder) / f"{megapixels}_{triangles}"
-            _case("make", where, megapixels, triangles)
-            found = _case("job", where, 2)
-            s = found["seconds"]
-            print(
-                f"| {megapixels} MP | {triangles:,} | {found['samples']:,} | {s['scan']:.1f} s | "
-                f"{s['rays']:.1f} s | {s['samples']:.1f} s | {s['fit']:.1f} s | "
-                f"{sum(s.values()):.1f} s | {found['processor']:.1f} s | "
-                f"{found['peak_mb']:.0f} MB |",
-                flush=True,
-            )
-            if (megapixels, triangles) == PLAIN:
-                plain = _case("plain", where)
-                quick, quick_work = sum(s.values()), found["processor"]
-            _remove(where)
+        _jobs(Path(folder))
+    _selections()
+
+
+def _jobs(folder: Path) -> None:
+    print("## speed (half-float EXR, 2 threads, the default estimator)\n")
+    print("| photos | triangles | samples | used | scan, rays ready | samples taken | fit "
+          "| to coefficients | processor time | peak memory, sampling | all | report "
+          "| with it |")  # fmt: skip
+    print("|---|---|---|---|---|---|---|---|---|---|---|---|---|")
+    told = []
+    for megapixels, triangles, photos in (*((*size, PHOTOS) for size in SIZES), MANY_PHOTOS):
+        where = folder / f"{megapixels}_{triangles}_{photos}"
+        _case("make", where, megapixels, triangles, photos)
+        found = _case("job", where, 2, "measured")
+        s = found["seconds"]
         print(
-            f"\nthe plain way, {PLAIN[0]} MP and {PLAIN[1]:,} triangles: {plain['seconds']:.1f} s, "
-            f"{plain['peak_mb']:.0f} MB; ours {quick:.1f} s: {plain['seconds'] / quick:.1f} times; "
-            f"processor time {plain['processor']:.1f} s to {quick_work:.1f} s: "
-            f"{plain['processor'] / quick_work:.1f} times\n"
+            f"| {photos} of {megapixels} MP | {triangles:,} | {found['samples']:,} | "
+            f"{found['used']:,} | {s['scan']:.1f} s | {s['samples']:.1f} s | {s['fit']:.1f} s | "
+            f"{sum(s.values()):.1f} s | {found['processor']:.1f} s | "
+            f"{found['sampling_mb']:.0f} MB | {found['peak_mb']:.0f} MB | "
+            f"{found['report']:.1f} s | {found['report_mb']:.0f} MB |",
+            flush=True,
         )
-    print("| candidates | n | condition number | selection | peak memory |")
-    print("|---|---|---|---|---|")
+        if (megapixels, triangles, photos) == (*SMALL, PHOTOS):
+            told = [_threads(where, found), _plain_way(where)]
+        _remove(where)
+    print("", *told, "", sep="\n")
+
+
+def _threads(where: Path, two: dict[str, Any]) -> str:
+    one = _case("job", where, 1, "measured")
+    same = "the same" if one["digest"] == two["digest"] else "NOT the same"
+    return (
+        f"- on 1 thread {sum(one['seconds'].values()):.1f} s, on 2 "
+        f"{sum(two['seconds'].values()):.1f} s: {same} coefficients, byte for byte"
+    )
+
+
+def _plain_way(where: Path) -> str:
+    ours, plain = _case("job", where, 2, "paper"), _case("plain", where)
+    seconds = sum(ours["seconds"].values())
+    return (
+        f"- the paper's fit, {SMALL[0]} MP and {SMALL[1]:,} triangles: the plain way "
+        f"{plain['seconds']:.1f} s, {plain['peak_mb']:.0f} MB; ours {seconds:.1f} s, "
+        f"{ours['peak_mb']:.0f} MB: {plain['seconds'] / seconds:.1f} times; processor time "
+        f"{plain['processor']:.1f} s to {ours['processor']:.1f} s: "
+        f"{plain['processor'] / ours['processor']:.1f} times"
+    )
+
+
+def _selections() -> None:
+    print("| candidates | n | condition number | of Nielsen's search | selection | peak memory |")
+    print("|---|---|---|---|---|---|")
     for candidates, count in SELECTIONS:
         found = _case("select", candidates, count)
-        print(f"| {candidates:,} | {count} | {found['condition']:.2f} | {found['seconds']:.1f} s | "
-              f"{found['peak_mb']:.0f} MB |", flush=True)  # fmt: skip
+        nielsen = _case("nielsen", candidates, count)
+        print(
+            f"| {candidates:,} | {count} | {found['condition']:.2f} | {nielsen['condition']:.2f} "
+            f"(by our bounds in {nielsen['seconds']:.0f} s) | {found['seconds']:.1f} s | "
+            f"{found['peak_mb']:.0f} MB |",
+            flush=True,
+        )
     print()
     for candidates, count in PLAIN_SELECTIONS:
         found = _case("compare", candidates, count)
@@ -93,10 +127,12 @@ def _peak() -> float:
     return peak_memory() or float("nan")
 
 
-def _make(folder: str, megapixels: str, triangles: str) -> dict[str, Any]:
+def _make(
+    folder: str, megapixels: str, triangles: str, photos: str = str(PHOTOS)
+) -> dict[str, Any]:
     from .bench_speed_scene import make_capture
 
-    make_capture(Path(folder), float(megapixels), int(triangles), PHOTOS)
+    make_capture(Path(folder), float(megapixels), int(triangles), int(photos))
     return {}
 
 
@@ -113,32 +149,45 @@ def _opened(folder: str):  # type: ignore[no-untyped-def]
     return capture, scan, time.perf_counter() - since
 
 
-def _job(folder: str, threads: str) -> dict[str, Any]:
-    from patina.core.basis import Basis
-    from patina.core.fit import fit_paper
-    from patina.core.geometry import RayScene
-    from patina.core.job.job import drained
-    from patina.core.job.lights import find_lights
-    from patina.core.job.photos import LitPhotos
-    from patina.core.job.sampling import take_samples
+def _job(folder: str, threads: str, method: str) -> dict[str, Any]:
+    """The whole job, and its report. processor, peak_mb: to the end of the fit."""
+    from dataclasses import replace
 
-    worked = time.process_time()
-    capture, scan, reading = _opened(folder)
-    marks = [time.perf_counter()]
-    rays = RayScene.build(scan.mesh)
-    photos = LitPhotos.open(capture)
-    lights = find_lights(capture, scan, photos)
-    marks.append(time.perf_counter())
-    taken = drained(take_samples(capture, scan, rays, photos, lights, threads=int(threads)))
-    marks.append(time.perf_counter())
-    name = capture.materials[0].name
-    fit_paper(taken.kept[name].table(), Basis.default(), capture.fit.paper)
-    marks.append(time.perf_counter())
-    steps = [b - a for a, b in itertools.pairwise(marks)]
-    seconds = dict(zip(("scan", "rays", "samples", "fit"), (reading, *steps), strict=True))
+    from patina.core.capture import read_capture
+    from patina.core.job import FitJob
+    from patina.core.job.job import Step
+    from patina.core.report import write_report
+
+    capture = read_capture(Path(folder) / "ball.capture.toml")
+    # the plain way holds nothing out either
+    fit = replace(capture.fit, method=method, held_out=method == "measured")
+    job = FitJob(replace(capture, fit=fit), threads=int(threads))
+    worked, processor = time.process_time(), []
+
+    def look(step: Step) -> None:
+        if not step.stage.startswith(WITHOUT):
+            processor[:] = [time.process_time() - worked]
+
+    job.drain(look)
+    seconds = {"scan": 0.0, "samples": 0.0, "fit": 0.0}
+    peak = sampling = 0.0
+    for stage in job.stages:
+        if not stage.name.startswith(WITHOUT):
+            seconds[STAGES.get(stage.name, "fit")] += stage.seconds
+            peak = stage.peak_mb or float("nan")  # so far
+            sampling = peak if STAGES.get(stage.name) else sampling
+    if job.result is None:
+        raise RuntimeError("the job ended without a result")
+    material = job.result.materials[0]
+    since = time.perf_counter()
+    with tempfile.TemporaryDirectory() as report:
+        for _ in write_report(Path(report), job.result):
+            pass
     return {
-        "seconds": seconds, "samples": int(taken.counts[name].sum()), "peak_mb": _peak(),
-        "processor": time.process_time() - worked,
+        "seconds": seconds, "samples": material.samples, "used": material.used, "peak_mb": peak,
+        "sampling_mb": sampling, "processor": processor[0],
+        "report": time.perf_counter() - since, "report_mb": _peak(),
+        "digest": hashlib.sha256(material.fit.brdf.coefficients.tobytes()).hexdigest(),
     }  # fmt: skip
 
 
@@ -204,6 +253,29 @@ def _select(candidates: str, count: str) -> dict[str, Any]:
     return {"seconds": seconds, "condition": condition, "peak_mb": _peak()}
 
 
+def _nielsen(candidates: str, count: str) -> dict[str, Any]:
+    """His search with every candidate at every step, the best found by bounds."""
+    import numpy as np
+
+    from patina.core.fit import selection
+    from patina.core.fit.candidate_tree import CandidateTree, angle_cells
+    from patina.core.fit.condition_bound import ConditionBound
+
+    angles, rows = _candidates(int(candidates), int(count))
+    since = time.perf_counter()
+    tree = CandidateTree.of(rows, angle_cells(angles))
+    chosen = selection.search(
+        rows,
+        int(np.square(rows).sum(axis=1).argmax()),
+        int(count),
+        lambda taken, limit: tree.smallest(ConditionBound.of(rows[taken]), taken, limit),
+    )
+    return {
+        "seconds": time.perf_counter() - since,
+        "condition": float(np.linalg.cond(rows[chosen].astype(float))),
+    }
+
+
 def _compare(candidates: str, count: str) -> dict[str, Any]:
     import numpy as np
 
@@ -228,6 +300,7 @@ if __name__ == "__main__":
 
     load_patina()
     cases: dict[str, Callable[..., dict[str, Any]]] = {
-        "make": _make, "job": _job, "plain": _plain, "select": _select, "compare": _compare,
+        "make": _make, "job": _job, "plain": _plain, "select": _select, "nielsen": _nielsen,
+        "compare": _compare,
     }  # fmt: skip
     print(json.dumps(cases[sys.argv[1]](*sys.argv[2:])))

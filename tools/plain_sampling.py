@@ -81,6 +81,7 @@ def sample_plainly(rays: Any, camera: Any, light: Any, radiance: np.ndarray, mar
         curvature=curvature[keep],
         light=to.astype(single),
         irradiance=irradiance.astype(single),
+        weight=np.ones(len(n), single),
     )
 
 

@@ -7,19 +7,30 @@ are never opened.
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import Angles
-from .condition_bound import FIRST, ROUNDING, ConditionBound, condition_numbers
+from .condition_bound import (
+    FIRST,
+    ROUNDING,
+    ROUNDING_32,
+    WELL,
+    ConditionBound,
+    condition_numbers,
+)
 
 KNEE = np.radians(2.0)  # cells in θh are even below and grow above: lobes are narrow
 BITS = 7, 7, 7  # of each angle's cell
 COARSE, LEVELS = 2, 3  # bits that a larger cell has less, and how many sizes of cells there are
-WELL, ROUNDING_32 = 1e3, 1e-3  # condition numbers up to which float32 will do, to this
-AT_ONCE = 1 << 18
+MOST = 8  # times fewer cells than a level has are picked out, more are worked on together
+AT_ONCE = 1 << 17
+THREADS = 4  # at most
 
 
 def angle_cells(angles: Angles) -> NDArray[np.int32]:
@@ -57,6 +68,14 @@ class _Level:
             return self.rows, self.extent
         return self.rows[which], self.extent[which]
 
+    def may(self, bound: ConditionBound, which: NDArray[np.intp], known: float) -> NDArray[np.intp]:
+        """Those of the cells ``which`` (ascending) that a quick look does not exclude."""
+        if known > WELL:
+            return which
+        if len(which) * MOST > len(self.begin):
+            return which[bound.may(self.rows, known, self.extent)[which]]
+        return which[bound.may(self.rows[which], known, self.extent[which])]
+
 
 @dataclass(frozen=True)
 class CandidateTree:
@@ -76,7 +95,12 @@ class CandidateTree:
         packed = np.sort(cells.astype(np.int64) << 32 | np.arange(len(cells)))
         order, number = packed & 0xFFFFFFFF, packed >> 32
         del packed
-        sorted_rows = rows.astype(np.float32, copy=False).take(order, axis=0)
+        sorted_rows = np.empty(rows.shape, np.float32)
+
+        def sort(part: slice) -> None:
+            sorted_rows[part] = rows.take(order[part], axis=0)
+
+        _for_all([slice(b, b + AT_ONCE) for b in range(0, len(order), AT_ONCE)], sort)
         levels: list[_Level] = []
         below: _Level | None = None
         for _ in range(LEVELS):
@@ -96,6 +120,7 @@ class CandidateTree:
         known = limit * (1 + ROUNDING)
         inside = np.arange(len(self.levels[0].begin))
         for level in self.levels:
+            inside = level.may(bound, inside, known)
             if not np.isfinite(limit):
                 known = min(known, _some_number(bound, level, inside, taken))
             rows, extent = level.of(inside)
@@ -105,11 +130,25 @@ class CandidateTree:
         inside = inside[~np.isin(inside, taken)]
         if len(inside) > FIRST:
             rows = self.rows[inside]
+            if known <= WELL:
+                possible = bound.may(rows, known)
+                inside, rows = inside[possible], rows[possible]
             slack = ROUNDING if known > WELL else ROUNDING_32
             largest, smallest = bound.extremes(rows, single=known <= WELL)
             inside = inside[largest * (1 - slack) <= known * smallest]
         found = bound.smallest(self.rows[inside], limit) if len(inside) else None
         return None if found is None else (int(self.order[inside[found[0]]]), found[1])
+
+
+def _for_all(parts: Sequence[slice], work: Callable[[slice], None]) -> None:
+    """Work on parts that are independent of each other, on a few threads where there are many."""
+    workers = min(THREADS, os.cpu_count() or 1, len(parts))
+    if workers < 2:
+        for part in parts:
+            work(part)
+        return
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(work, parts))
 
 
 def _level(number: NDArray[np.integer], rows: NDArray[np.float32], below: _Level | None) -> _Level:
@@ -121,16 +160,21 @@ def _level(number: NDArray[np.integer], rows: NDArray[np.float32], below: _Level
         rows = below.rows
     centre = rows[middle]
     extent = np.empty_like(centre)
-    first = 0
-    while first < len(begin):  # whole cells at a time
-        last = max(first + 1, int(np.searchsorted(begin, begin[first] + AT_ONCE)))
-        part = slice(begin[first], end[last - 1])
-        away = rows[part] - np.repeat(centre[first:last], (end - begin)[first:last], axis=0)
+
+    def reach(cells: slice) -> None:
+        part = slice(begin[cells.start], end[cells.stop - 1])
+        away = rows[part] - np.repeat(centre[cells], (end - begin)[cells], axis=0)
         np.abs(away, out=away)
         if below is not None:
             away += below.extent[part]
-        extent[first:last] = np.maximum.reduceat(away, begin[first:last] - begin[first], axis=0)
+        extent[cells] = np.maximum.reduceat(away, begin[cells] - begin[cells.start], axis=0)
+
+    pieces, first = [], 0
+    while first < len(begin):  # whole cells at a time
+        last = max(first + 1, int(np.searchsorted(begin, begin[first] + AT_ONCE)))
+        pieces.append(slice(first, last))
         first = last
+    _for_all(pieces, reach)
     return _Level(begin, end, middle if below is None else below.place[middle], centre, extent)
 
 

@@ -16,7 +16,10 @@ from numpy.typing import NDArray
 
 AT_ONCE = 1 << 14  # rows whose products stay in the processor's cache
 FIRST, BATCH = 16, 32  # condition numbers computed at a time
+SHARPENED = 0, 2, 6, 30  # halvings of a bound's interval, while there are many contenders
 ROUNDING = 1e-6  # that a bound is lowered by: it must not exclude for rounding
+ROUNDING_32 = 1e-3  # the same in float32, for condition numbers up to WELL
+WELL = 1e3
 
 
 def condition_numbers(
@@ -72,26 +75,55 @@ class ConditionBound:
             largest[part], smallest[part] = self._extremes(q, e, rounds)
         return largest, smallest
 
-    def bounds(self, candidates: NDArray[np.floating], rounds: int = 0) -> NDArray[np.float64]:
+    def bounds(
+        self, candidates: NDArray[np.floating], rounds: int = 0, single: bool = False
+    ) -> NDArray[np.float64]:
         """(m,) no condition number with a candidate row (m, k) is smaller. rounds: how often the
-        bound is sharpened, each for more time than the first."""
-        largest, smallest = self.extremes(candidates, rounds=rounds)
-        return largest / np.maximum(smallest, 1e-300) * (1 - ROUNDING)
+        interval is halved that the two singular values are known to lie in. single: in float32,
+        right up to WELL."""
+        largest, smallest = self.extremes(candidates, rounds=rounds, single=single)
+        slack = ROUNDING_32 if single else ROUNDING
+        return largest / np.maximum(smallest, 1e-300) * (1 - slack)
+
+    def may(
+        self,
+        candidates: NDArray[np.floating],
+        limit: float,
+        extent: NDArray[np.floating] | None = None,
+    ) -> NDArray[np.bool_]:
+        """(m,) False where a candidate row (m, k), or none within ``extent`` (m, k) of it, gives a
+        condition number up to ``limit``: a weaker bound than bounds() for a fraction of its time.
+
+        The smallest singular value is no larger than what the rows make of any unit vector in their
+        span, here of the candidate's own part outside the others' span; the largest only grows.
+        """
+        vectors = self.vectors[: max(self.outside, 1)].astype(candidates.dtype)
+        need = self.poles[-1] / limit**2 * (1 - 2 * ROUNDING_32) - self.poles[0]
+        if need <= 0:
+            return np.ones(len(candidates), bool)
+        high = np.abs(candidates @ vectors.T)
+        if extent is not None:
+            high += extent @ np.abs(vectors.T)
+        return np.asarray(np.square(high).sum(axis=1) >= need)
 
     def smallest(
         self, candidates: NDArray[np.floating], limit: float = np.inf
     ) -> tuple[int, float] | None:
         """(place, condition number) of the candidate row (m, k) for which it is least, the first of
         them where several are equal; None where it is for none below ``limit``."""
-        bounds = self.bounds(candidates)
-        if not np.isfinite(limit) and len(bounds) > BATCH:
-            nearest = np.argpartition(bounds, FIRST)[:FIRST]
-            known = float(condition_numbers(self.chosen, candidates[nearest]).min())
-        else:
-            known = limit
-        contenders = np.flatnonzero(bounds <= known)
-        if len(contenders) > BATCH:  # nearly exact, for few
-            bounds[contenders] = self.bounds(candidates[contenders], rounds=2)
+        contenders = np.arange(len(candidates))
+        if np.isfinite(limit) and len(candidates) > BATCH:
+            contenders = np.flatnonzero(self.may(candidates, limit))
+        bounds = np.full(len(candidates), np.inf)
+        known = limit
+        for rounds in SHARPENED:  # nearly exact in the end, for few
+            single = rounds == 0 and known <= WELL
+            bounds[contenders] = self.bounds(candidates[contenders], rounds, single)
+            contenders = contenders[bounds[contenders] <= known]
+            if len(contenders) <= BATCH:
+                break
+            nearest = contenders[np.argpartition(bounds[contenders], FIRST)[:FIRST]]
+            known = min(known, float(condition_numbers(self.chosen, candidates[nearest]).min()))
             contenders = contenders[bounds[contenders] <= known]
         contenders = contenders[np.argsort(bounds[contenders], kind="stable")]
         best, number = -1, limit
@@ -125,19 +157,21 @@ class ConditionBound:
         rest = np.maximum(poles[2:] - poles[0], np.finfo(q.dtype).tiny)
         c = 1 + (1 / rest) @ weight[1:]
         root = _root(c, sure, weight[0], gap)
-        for _ in range(2 * rounds):  # from above and from below in turn
-            terms = weight[1:] / np.maximum(rest[:, None] - root, np.finfo(q.dtype).tiny)
-            root = _root(1 + terms.sum(axis=0), sure, weight[0], gap)
         top = poles[-1] + weight[-1]
-        if rounds:  # the largest root: what follows from an upper bound lies below it
+        if rounds:
+            least = np.finfo(q.dtype).tiny
+            away = np.concatenate([[gap], rest])[:, None]
+            under = np.zeros_like(root)
+            for _ in range(rounds):
+                x = 0.5 * (under + root)
+                above = 1 + (weight / np.maximum(away - x, least)).sum(axis=0) > sure / x
+                under, root = np.where(above, under, x), np.where(above, x, root)
             over = poles[-1] + np.square(q).sum(axis=1)
             for _ in range(rounds):
-                beyond = over[None] - poles[1:-1, None]
-                c = 1 - (weight[:-1] / np.maximum(beyond, 1e-300)).sum(axis=0) - sure / over
-                top = np.maximum(top, poles[-1] + weight[-1] / np.maximum(c, 1e-300))
-                beyond = top[None] - poles[1:-1, None]
-                c = 1 - (weight[:-1] / np.maximum(beyond, 1e-300)).sum(axis=0) - sure / top
-                over = np.where(c > 0, np.minimum(over, poles[-1] + weight[-1] / c), over)
+                x = 0.5 * (top + over) - poles[0]
+                below = 1 - (weight / np.maximum(x - away, least)).sum(axis=0) < sure / x
+                top = np.where(below, x + poles[0], top)
+                over = np.where(below, over, x + poles[0])
         return np.sqrt(top), np.sqrt(poles[0] + root)
 
 

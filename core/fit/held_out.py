@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..basis import Basis, PrincipalBRDF
 from ..errors import FitError
 from ..predict import predict_radiance
-from ..samples import SampleTable
+from ..samples import SampleTable, weighted
 from .paper import PaperSettings, fit_paper
 
 DARK = 0.05  # of the median radiance: below it relative errors are those of the noise
@@ -20,12 +20,14 @@ DARK = 0.05  # of the median radiance: below it relative errors are those of the
 @dataclass(frozen=True)
 class LeftOut:
     """One photo predicted from the others. missed, size: sums of squares of L̂ − L and of L;
-    relative: (m,) channels' mean |L̂ − L| over mean L, of its pixels that are not dark."""
+    relative: (m,) channels' mean |L̂ − L| over mean L, of its pixels that are not dark; weight: (m,)
+    how many pixels each of them stands for."""
 
     photo: int
     missed: float
     size: float
     relative: NDArray[np.floating]
+    weight: NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -62,12 +64,14 @@ def predicted(table: SampleTable, photo: int, brdf: PrincipalBRDF) -> LeftOut:
     held = table.select(table.photo == photo)
     difference = predict_radiance(brdf, held) - held.radiance
     level = held.radiance.mean(axis=1)
-    bright = level > DARK * np.median(level)
+    bright = level > DARK * weighted.median(level, held.weight)
+    weight = held.weight[:, None]
     return LeftOut(
         photo=photo,
-        missed=float(np.sum(np.square(difference, dtype=np.float64))),
-        size=float(np.sum(np.square(held.radiance, dtype=np.float64))),
+        missed=float(np.sum(weight * np.square(difference, dtype=np.float64))),
+        size=float(np.sum(weight * np.square(held.radiance, dtype=np.float64))),
         relative=np.abs(difference).mean(axis=1)[bright] / level[bright],
+        weight=held.weight[bright],
     )
 
 
@@ -76,10 +80,11 @@ def summarise(parts: Sequence[LeftOut]) -> HeldOut | None:
     if not parts:
         return None
     relative = np.concatenate([p.relative for p in parts])
+    weight = np.concatenate([p.weight for p in parts])
     error = _ratio(sum(p.missed for p in parts), sum(p.size for p in parts))
     return HeldOut(
         error=error,
-        typical=float(np.median(relative)) if relative.size else error,
+        typical=weighted.median(relative, weight) if relative.size else error,
         per_photo={p.photo: _ratio(p.missed, p.size) for p in parts},
     )
 

@@ -47,7 +47,8 @@ class Band:
 @dataclass(frozen=True)
 class MeasuredResult:
     """brdf: the most probable one, all components. normal_deviation: degrees along each tangent
-    that the scan's normals are off by. gains: photo → what it is brighter by than the others say.
+    that the scan's normals are off by. gains: photo → what it is brighter by than the BRDF that
+    all of them give: its exposure, and what no BRDF of the basis explains.
     anchoring: what the BRDF rests on where no photo looked. samples: how many were used."""
 
     brdf: PrincipalBRDF

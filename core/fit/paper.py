@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..basis import Basis, PrincipalBRDF
 from ..errors import FitError
 from ..predict import similarity_sums
-from ..samples import SampleTable
+from ..samples import SampleTable, weighted
 from . import reliability, ridge, selection
 
 REDRAWS = 20  # subsets tried before a trial gives up on the monotonicity constraint
@@ -75,10 +75,12 @@ def fit_paper(
             "curvature threshold"
         )
     peak = reliability.highest_intensity(table) if s.highest_intensity else None
+    likely = table.weight[reliable].astype(np.float64)
+    likely /= likely.sum()
     rng = np.random.default_rng(s.seed)
     trials = []
     for _ in range(s.trials):
-        trials.append(_one_trial(table, reliable, peak, basis, s, rng, warnings))
+        trials.append(_one_trial(table, reliable, likely, peak, basis, s, rng, warnings))
     candidates = np.stack([coefficients for coefficients, _, _ in trials])
     similarity = similarity_sums(basis, candidates, table)
     best = int(similarity.argmax())
@@ -88,7 +90,7 @@ def fit_paper(
         condition=trials[best][2],
         candidates=candidates,
         similarity=similarity,
-        reliable=len(reliable),
+        reliable=round(float(table.weight[reliable].sum(dtype=np.float64))),
         warnings=tuple(dict.fromkeys(warnings)),
     )
 
@@ -96,6 +98,7 @@ def fit_paper(
 def _one_trial(
     table: SampleTable,
     reliable: NDArray[np.intp],
+    likely: NDArray[np.float64],
     peak: tuple[int, SampleTable] | None,
     basis: Basis,
     s: PaperSettings,
@@ -104,7 +107,11 @@ def _one_trial(
 ) -> tuple[NDArray[np.float64], SampleTable, float]:
     """Draw a subset, choose samples, solve: (coefficients (3, k), chosen samples, condition)."""
     for redraw in range(REDRAWS + 1):
-        rows = rng.choice(reliable, min(s.subset, len(reliable)), replace=False)
+        size = min(s.subset, len(reliable))
+        if weighted.thinned(table):
+            rows = rng.choice(reliable, size, replace=False, p=likely)
+        else:
+            rows = rng.choice(reliable, size, replace=False)
         drawn = table.select(rows if peak is None else rows[rows != peak[0]])
         if peak is not None:
             drawn = SampleTable.prepend(peak[1], drawn)

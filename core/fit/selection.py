@@ -19,8 +19,12 @@ from .candidate_tree import CandidateTree
 from .condition_bound import ConditionBound, condition_numbers
 
 MANY = 64_000_000  # numbers in the rows up to which nothing is left to chance
+STARTS = 6  # beginnings of the search, beside Nielsen's
+POLISH = 2  # sweeps with all candidates, after those with the larger cells'
+AT_ONCE = 1 << 16
 
 Allowed = Callable[[NDArray[np.intp]], NDArray[np.bool_]]
+Best = Callable[[list[int], float], tuple[int, float] | None]
 
 __all__ = ["Allowed", "choose", "choose_from_cells", "condition_numbers"]
 
@@ -37,22 +41,8 @@ def choose(
     rows: (m, k). allowed(chosen) -> (m,) candidates that may join the chosen ones. fixed: a row
     that must be in the set. None where the constraint leaves too few candidates.
     """
-
-    def best(chosen: list[int], limit: float) -> tuple[int, float] | None:
-        if allowed is None:
-            may = np.ones(len(rows), bool)
-        else:
-            may = allowed(np.array(chosen))
-        may[chosen] = False
-        candidates = np.flatnonzero(may)
-        if candidates.size == 0:
-            return None
-        bound = ConditionBound.of(rows[chosen])
-        found = bound.smallest(rows[candidates], limit)
-        return None if found is None else (int(candidates[found[0]]), found[1])
-
-    first = int(np.linalg.norm(rows, axis=1).argmax()) if fixed is None else fixed
-    return _search(rows, first, count, best, fixed, sweeps)
+    first = _longest(rows) if fixed is None else fixed
+    return search(rows, first, count, _all_of(rows, allowed), fixed, sweeps)
 
 
 def choose_from_cells(
@@ -66,42 +56,79 @@ def choose_from_cells(
     rows: (m, k). cells: (m,) the number of a cell of each, rows of one cell being much alike and
     rows of neighbouring numbers somewhat (angle_cells of their angles).
 
-    The search first runs on one candidate of every larger cell, then goes on from there with all of
-    them. Up to MANY numbers it runs on all of them from its beginning as well, and the better set
-    is taken: none is then worse than choose()'s.
+    The search first runs on one candidate of every larger cell, from several beginnings; the best
+    set found is exchanged further with all candidates. Up to MANY numbers Nielsen's search runs on
+    all of them as well, and the better set is taken: none is then worse than choose()'s. Beyond,
+    his search alone would take minutes, and several beginnings have found better sets than his one
+    (measured by ``run.py bench speed``).
     """
     tree = CandidateTree.of(rows, cells)
     places = tree.order[tree.levels[1].place]
+    many = rows.size > MANY
 
     def best(chosen: list[int], limit: float) -> tuple[int, float] | None:
         return tree.smallest(ConditionBound.of(rows[chosen]), chosen, limit)
 
     found: list[NDArray[np.intp]] = []
     if len(places) >= 2 * count:
-        some = choose(rows[places], count, sweeps=sweeps)
+        some = _best_of_starts(rows[places], count, sweeps)
         if some is not None:
             start = places[some].tolist()
-            found.append(_exchanged(rows, start, best, None, sweeps))
-    if not found or rows.size <= MANY:
-        squares = np.concatenate(
-            [
-                np.einsum("ij,ij->i", part, part)
-                for part in np.array_split(rows, max(1, len(rows) >> 16))
-            ]
-        )
-        whole = _search(rows, int(squares.argmax()), count, best, None, sweeps)
+            found.append(_exchanged(rows, start, best, None, min(sweeps, POLISH)))
+    if not found or not many:
+        whole = search(rows, _longest(rows), count, best, None, sweeps)
         found += [] if whole is None else [whole]
-    numbers = [float(np.linalg.cond(rows[one])) for one in found]
+    numbers = [float(np.linalg.cond(rows[one].astype(np.float64))) for one in found]
     return found[int(np.argmin(numbers))] if found else None
 
 
-def _search(
+def _best_of_starts(rows: NDArray[np.floating], count: int, sweeps: int) -> NDArray[np.intp] | None:
+    """The best set that searches from several rows (m, k) find."""
+    everywhere = np.linspace(0, len(rows) - 1, STARTS + 1).astype(np.intp)[1:]
+    best = _all_of(rows)
+    found = [
+        search(rows, first, count, best, None, sweeps)
+        for first in dict.fromkeys([_longest(rows), *everywhere.tolist()])
+    ]
+    sets = [one for one in found if one is not None]
+    numbers = [float(np.linalg.cond(rows[one].astype(np.float64))) for one in sets]
+    return sets[int(np.argmin(numbers))] if sets else None
+
+
+def _longest(rows: NDArray[np.floating]) -> int:
+    """The row (m, k) of largest norm, where Nielsen's search begins."""
+    best, length = 0, -np.inf
+    for begin in range(0, len(rows), AT_ONCE):
+        part = rows[begin : begin + AT_ONCE]
+        squares = np.einsum("ij,ij->i", part, part)
+        place = int(squares.argmax())
+        if squares[place] > length:
+            best, length = begin + place, float(squares[place])
+    return best
+
+
+def _all_of(rows: NDArray[np.floating], allowed: Allowed | None = None) -> Best:
+    """best() of search() for rows (m, k), under a constraint."""
+
+    def best(chosen: list[int], limit: float) -> tuple[int, float] | None:
+        may = np.ones(len(rows), bool) if allowed is None else allowed(np.array(chosen))
+        may[chosen] = False
+        candidates = np.flatnonzero(may)
+        if candidates.size == 0:
+            return None
+        found = ConditionBound.of(rows[chosen]).smallest(rows[candidates], limit)
+        return None if found is None else (int(candidates[found[0]]), found[1])
+
+    return best
+
+
+def search(
     rows: NDArray[np.floating],
     first: int,
     count: int,
-    best: Callable[[list[int], float], tuple[int, float] | None],
-    fixed: int | None,
-    sweeps: int,
+    best: Best,
+    fixed: int | None = None,
+    sweeps: int = 10,
 ) -> NDArray[np.intp] | None:
     """Greedy growth from one row, then exchanges. best(chosen, limit): the candidate with which the
     chosen ones have the smallest condition number, and that number; None where it is not below."""
@@ -117,7 +144,7 @@ def _search(
 def _exchanged(
     rows: NDArray[np.floating],
     chosen: list[int],
-    best: Callable[[list[int], float], tuple[int, float] | None],
+    best: Best,
     fixed: int | None,
     sweeps: int,
 ) -> NDArray[np.intp]:

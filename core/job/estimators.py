@@ -13,11 +13,13 @@ from ..fit.measured.estimate import measured_steps
 from ..fit.measured_result import MeasuredResult
 from ..fit.spread import Spread, candidate_spread
 from ..samples import SampleTable
+from .beside import beside, stepped_beside
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """held_out: None where nothing was held out. notes: what the holding out itself ran into."""
+    """By either method. held_out: None where nothing was held out. notes: what the holding out
+    itself ran into."""
 
     fit: PaperFit | MeasuredResult
     held_out: HeldOut | None
@@ -36,7 +38,7 @@ def estimate(table: SampleTable, basis: Basis, capture: Capture, name: str) -> S
 
 
 def _measured(table: SampleTable, basis: Basis, capture: Capture, name: str) -> Steps:
-    steps = measured_steps(table, basis)
+    steps = stepped_beside(measured_steps(table, basis))
     while True:
         try:
             yield f"fitting {name}", 0.85 * next(steps)
@@ -57,7 +59,7 @@ def _measured(table: SampleTable, basis: Basis, capture: Capture, name: str) -> 
 def _paper(table: SampleTable, basis: Basis, capture: Capture, name: str) -> Steps:
     yield f"fitting {name}", 0.0
     settings = capture.fit.paper
-    fit = fit_paper(table, basis, settings)
+    fit = yield from beside(lambda: fit_paper(table, basis, settings), (f"fitting {name}", 0.0))
     unseen = photos_to_hold_out(table) if capture.fit.held_out else []
     parts = []
     for done, photo in enumerate(unseen):

@@ -23,6 +23,7 @@ from ..samples.face_votes import FaceVotes
 from ..samples.level import at_typical_level
 from ..scan import Scan
 from . import inputs
+from .beside import beside
 from .estimators import Estimate, estimate
 from .job import Job, Step
 from .lights import Lights, find_lights, refined
@@ -35,13 +36,15 @@ LEAST_RHO, LARGEST_RHO = 1e-6, 1e4  # 1/sr: black velvet has 1e-3, mirrors' peak
 
 @dataclass(frozen=True)
 class MaterialResult:
-    """One fitted material. fit: by the capture's method; samples: number taken; per_photo: samples
-    of every photo; scale: what the photos' reflectance was multiplied by, 1 where the irradiance is
-    known."""
+    """One fitted material. fit: by the capture's method; samples: number taken from the photos;
+    used: those that the fit was given, all unless there are too many; per_photo: taken of every
+    photo; scale: what the photos' reflectance was multiplied by, 1 where the irradiance is known.
+    """
 
     name: str
     fit: PaperFit | MeasuredResult
     samples: int
+    used: int
     per_photo: tuple[int, ...]
     held_out: HeldOut | None
     spread: Spread
@@ -174,22 +177,19 @@ class FitJob(Job):
         if not known:
             table, scale = at_typical_level(table, basis)
         found = yield from self._estimate(index, table, basis, start, 0.8 * share)
-        yield Step(f"Principled material of {name}", start + 0.8 * share)
-        principled = fit_principled(found.fit.brdf.evaluate)
+        step = Step(f"Principled material of {name}", start + 0.8 * share)
+        yield step
+        principled = yield from beside(lambda: fit_principled(found.fit.brdf.evaluate), step)
         warnings = material_warnings(table, found.fit, known)
         warnings += trust_warnings(found, capture)
-        warnings += tuple(
-            f"{capture.photo_name(photo)} is black where its light should reach: is this the "
-            "camera it was taken with, and this its light?"
-            for photo in black_photos(table)
-        )
-        warnings += found.notes
+        warnings += black_photos(table, capture) + found.notes
         if principled.clipped:
             warnings += ("brighter than any base colour: the Principled material is too dark",)
         return MaterialResult(
             name=name,
             fit=found.fit,
             samples=int(taken.counts[name].sum()),
+            used=len(table),
             per_photo=tuple(taken.counts[name].tolist()),
             held_out=found.held_out,
             spread=found.spread,

@@ -23,7 +23,7 @@ def material_warnings(
 ) -> tuple[str, ...]:
     """What an artist should know about this material before trusting it."""
     found = list(fit.warnings)
-    near_peak = int((table.theta_h < np.radians(5)).sum())
+    near_peak = round(float(table.weight[table.theta_h < np.radians(5)].sum(dtype=np.float64)))
     if near_peak < FEW_AT_PEAK:
         found.append(
             f"only {near_peak} samples lie within 5° of the highlight: its height is a guess; "
@@ -81,19 +81,23 @@ def _doubts(fit: MeasuredResult, deviation: float, capture: Capture) -> list[str
     if deviation > POOR:
         off = 100 * np.expm1(NINETY * deviation)
         said.append(
-            f"unsure: for half of all directions the reflectance is known to ± {off:.0f} % at "
-            "best (90 % band); photos under more angles would tell"
+            f"unsure: in half of all directions the reflectance may be off by more than {off:.0f} "
+            "% (90 % interval); photos under more angles would tell"
         )
     return said
 
 
-def black_photos(table: SampleTable) -> list[int]:
+def black_photos(table: SampleTable, capture: Capture) -> tuple[str, ...]:
     """Photos where much of what should be lit is black: they show something else."""
     found = []
     level = table.radiance.mean(axis=1)
-    for photo in np.unique(table.photo):
-        own = level[table.photo == photo]
+    for photo in np.unique(table.photo).tolist():
+        which = table.photo == photo
+        own, weight = level[which], table.weight[which].astype(np.float64)
         dark = own < BLACK * np.percentile(own, 95)
-        if dark.mean() > TOO_MANY_BLACK:
-            found.append(int(photo))
-    return found
+        if weight[dark].sum() > TOO_MANY_BLACK * weight.sum():
+            found.append(
+                f"{capture.photo_name(photo)} is black where its light should reach: is this the "
+                "camera it was taken with, and this its light?"
+            )
+    return tuple(found)

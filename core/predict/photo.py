@@ -21,7 +21,8 @@ def similarity_sums(
     basis: Basis, candidates: NDArray[np.floating], table: SampleTable
 ) -> NDArray[np.float64]:
     """(t,) cosine similarity between the photos and t candidate BRDFs (t, 3, k), all samples
-    and channels as one vector (the paper, section 3.4). Streams: memory does not grow with n."""
+    and channels as one vector (the paper, section 3.4). Streams: memory does not grow with n.
+    Rows that stand for several samples count as so many."""
     t = len(candidates)
     flat = candidates.reshape(3 * t, -1)
     dot, norm, seen = np.zeros(t), np.zeros(t), 0.0
@@ -32,6 +33,9 @@ def similarity_sums(
         scale = table.irradiance[part].astype(np.float64) * table.cos_i[part, None]
         predicted = rho * scale[:, None, :]
         measured = table.radiance[part].astype(np.float64)
+        size = np.sqrt(table.weight[part]).astype(np.float64)
+        predicted *= size[:, None, None]
+        measured *= size[:, None]
         dot += np.einsum("ntc,nc->t", predicted, measured)
         norm += np.einsum("ntc,ntc->t", predicted, predicted)
         seen += float(np.sum(measured**2))

@@ -13,6 +13,7 @@ from ..fit.spread import Spread
 from ..job import MaterialResult
 
 GAIN_WORTH_TELLING = 0.02
+PERCENT = 0.5  # half widths beyond are told as factors
 
 
 def figures(material: MaterialResult, photos: Sequence[str]) -> list[tuple[str, str]]:
@@ -60,21 +61,21 @@ def _measured(
     gains = told_gains(fit)
     odd = " · ".join(f"{photos[p]} {100 * (g - 1):+.0f} %" for p, g in sorted(gains.items()))
     return [
-        ("samples", f"{material.samples:,} lit pixels, every one of them used"),
+        ("samples", _samples(material)),
         (
             "scan's normals",
             f"off by about {fit.normal_deviation:.1f}° (along each tangent), as the photos say",
         ),
         (
             "photos against each other",
-            f"brighter or darker than the others say: {odd}"
+            f"brighter or darker than the fit says: {odd}"
             if odd
             else f"agree to {100 * GAIN_WORTH_TELLING:.0f} %",
         ),
         ("unseen directions", fit.anchoring),
         (
             "90 % interval",
-            f"{reach(material.spread)}; the truth should lie within nine times in ten",
+            f"{reach(material.spread)}: nine times in ten the truth is not farther off",
         ),
     ]
 
@@ -82,10 +83,24 @@ def _measured(
 def reach(spread: Spread) -> str:
     """A measured fit's uncertainty in a phrase."""
     median, wide, peak = (
-        f"± {100 * half_width(d):.0f} %"
-        for d in (spread.median, spread.percentile_90, spread.at_highlight)
+        either_side(d) for d in (spread.median, spread.percentile_90, spread.at_highlight)
     )
     return f"{median} in half of all directions, {wide} in most, {peak} at the highlight"
+
+
+def either_side(deviation: float) -> str:
+    """A 90 % interval in words; a wide one reaches as far down by division as up."""
+    wide = half_width(deviation)
+    return f"± {100 * wide:.0f} %" if wide < PERCENT else f"a factor of {1 + wide:.1f} either way"
+
+
+def _samples(material: MaterialResult) -> str:
+    if material.used >= material.samples:
+        return f"{material.samples:,} lit pixels, every one of them used"
+    return (
+        f"{material.samples:,} lit pixels: {material.used:,} of them, which stand for the others "
+        "of their photo and angles"
+    )
 
 
 def _paper(fit: PaperFit, material: MaterialResult) -> list[tuple[str, str]]:

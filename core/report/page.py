@@ -69,13 +69,14 @@ def _material_section(folder: Path, material: MaterialResult, photos: Sequence[s
         f"<tr><th>{escape(key)}</th><td>{escape(value)}</td></tr>"
         for key, value in figures(material, photos)
     )
-    shaded = "" if interval is None else "<p class='sub'>Shaded: the 90 % interval.</p>"
+    shaded = "" if interval is None else "; shaded: the 90 % interval"
     return (
         f"<h2>{escape(material.name)}</h2><div class='material'><figure>"
         f"<img src='{escape(quote(name))}' alt='lit sphere'>"
         f"<figcaption>Lit sphere, key light π at the upper left</figcaption>"
         f"</figure><div>{warnings}<table>{rows}</table></div></div>"
-        f"<div class='charts'>{charts}</div>{shaded}"
+        f"<div class='charts'>{charts}</div><p class='sub'>Reflectance in the plane of incidence, "
+        f"light from the left; a curve for each of red, green and blue{shaded}.</p>"
     )
 
 

@@ -32,7 +32,9 @@ def slice_angles(incidence: float) -> tuple[NDArray[np.float64], Angles]:
     light = np.array([-np.sin(incidence), 0.0, np.cos(incidence)])
     view = np.stack([np.sin(theta_o), np.zeros_like(theta_o), np.cos(theta_o)], axis=1)
     normal = np.broadcast_to(np.array([0.0, 0.0, 1.0]), view.shape)
-    return theta_o, half_difference(normal, np.broadcast_to(light, view.shape), view)
+    angles = half_difference(normal, np.broadcast_to(light, view.shape), view)
+    # the plane's own azimuth: where θh = 0 none is defined, and a basis may differ between them
+    return theta_o, angles._replace(phi_d=np.zeros_like(angles.phi_d))
 
 
 def polar_chart(curves: Sequence[Curve], incidence_degrees: float) -> str:

@@ -103,7 +103,8 @@ def _material(result: CaptureResult, material: MaterialResult) -> dict[str, Any]
         "scale_known": material.irradiance_known,
         "scale": material.scale,
         "samples": {
-            "used": material.samples,
+            "taken": material.samples,
+            "used": material.used,
             **({} if isinstance(fit, MeasuredResult) else {"on_calm_surface": fit.reliable}),
             "per_photo": dict(zip(names, material.per_photo, strict=True)),
         },
@@ -111,7 +112,8 @@ def _material(result: CaptureResult, material: MaterialResult) -> dict[str, Any]
         "held_out": None
         if held is None
         else {
-            "measure": "relative RMS error of lit pixels, each photo predicted from the others",
+            "measure": "relative RMS error of lit pixels, each photo predicted from the others, "
+            "at the scan's own normals",
             "error": held.error,
             "typical": held.typical,
             "per_photo": {names[i]: e for i, e in held.per_photo.items()},

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..basis import Basis, mapping
 from .table import SampleTable
+from .weighted import median
 
 
 def at_typical_level(table: SampleTable, basis: Basis) -> tuple[SampleTable, float]:
@@ -19,9 +20,9 @@ def at_typical_level(table: SampleTable, basis: Basis) -> tuple[SampleTable, flo
     """
     some = table.select(np.arange(0, len(table), max(1, len(table) // 20_000)))
     centre, _ = basis.rows(some.angles, 0)
-    typical = np.median(np.exp(centre) - mapping.EPSILON)
-    measured = np.median(some.rho.mean(axis=1) * mapping.cos_map(some.angles))
-    factor = float(typical / measured)
+    typical = median(np.exp(centre) - mapping.EPSILON, some.weight)
+    measured = median(some.rho.mean(axis=1) * mapping.cos_map(some.angles), some.weight)
+    factor = typical / measured
     return replace(
         table, rho=table.rho * np.float32(factor), irradiance=table.irradiance / np.float32(factor)
     ), factor

@@ -1,18 +1,22 @@
-"""A uniform part of more samples than fit into memory, the same whoever brings them when.
+"""A uniform part of more samples than an estimator needs, the same whoever brings them when.
 
 Bottom-k sampling (Cohen & Kaplan 2007, "Summarizing data using bottom-k sketches"): every sample
-has a number that looks random, and those with the smallest numbers are kept. The number is a hash
-of photo and pixel, so the choice depends on neither order, pieces nor threads.
+has a number that looks random, a hash of photo and pixel, and those with the smallest are kept. So
+the choice depends on neither order, pieces nor threads. Photos get equal room, and what one does
+not need goes to the others. Within a photo all angles are thinned alike: what is rare by the scan's
+normals is partly what wrong normals make so; keeping more of it did not help.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .table import SampleTable
 
-SIZE = 1_000_000
+SIZE = 500_000
 ALL = np.uint64(2**64 - 1)
 
 
@@ -30,34 +34,47 @@ def sample_hash(photo: NDArray[np.integer], pixel: NDArray[np.integer]) -> NDArr
     return z
 
 
-class SampleReservoir:
-    """At most ``size`` samples of one material from all ``photos``; a SampleSink.
+def water_level(counts: NDArray[np.integer], size: int) -> int:
+    """The most that each may keep so that all together keep no more than ``size``; counts: (c,)
+    what they have."""
+    counts = np.sort(counts[counts > 0])
+    if counts.sum() <= size:
+        return int(counts[-1]) if len(counts) else 0
+    kept = np.concatenate([[0], np.cumsum(counts)[:-1]])  # by the smaller ones, whole
+    left = np.arange(len(counts), 0, -1)
+    full = np.flatnonzero(kept + counts * left > size)[0]  # the first that cannot be kept whole
+    return int((size - kept[full]) // left[full])
 
-    The size // photos samples of smallest hash of every photo are kept in any case (all, where it
-    has fewer); what room is left is filled by the smallest hashes of the others, whosever they are.
-    Where there are no more samples than ``size`` all are kept. The one sample that is brightest for
-    its light (mean of L / E) is kept beyond that: the paper takes it for the specular peak.
+
+class SampleReservoir:
+    """At most ``size`` samples of one material from all ``photos``, but one of every photo in any
+    case; a SampleSink.
+
+    Where there are no more than ``size`` all are kept. Otherwise the rows' ``weight`` says how many
+    samples of their photo each stands for. The one sample that is brightest for its light (mean of
+    L / E) is kept beyond that: the paper takes it for the specular peak.
     """
 
     def __init__(self, photos: int, size: int = SIZE) -> None:
         self.size = size
-        self.share = size // max(photos, 1)
         self._parts: list[SampleTable] = []
         self._hashes: list[NDArray[np.uint64]] = []
         self._waiting = 0
-        self._limit = ALL  # hashes above are out, unless they are in their photo's share
-        self._shares: dict[int, np.uint64] = {}  # largest hash of a photo's share, where it is full
+        self._counts = np.zeros(max(photos, 1), np.int64)  # what came, kept or not
+        self._limits = np.full(max(photos, 1), ALL)  # of a photo: hashes above are out
         self._brightest: tuple[float, int, SampleTable] | None = None  # L / E, −place, the sample
 
     def add(self, photo: int, table: SampleTable) -> None:
         """Some samples of one photo."""
         if not len(table):
             return
-        number = sample_hash(table.photo, table.pixel)
         self._look_for_brighter(table)
-        limit = max(self._limit, self._shares.get(photo, ALL))
-        if limit < ALL:
-            rows = np.flatnonzero(number <= limit)
+        self._counts[photo] += len(table)
+        number = sample_hash(table.photo, table.pixel)
+        if self._limits[photo] < ALL:
+            rows = np.flatnonzero(number <= self._limits[photo])
+            if not len(rows):
+                return
             table, number = table.select(rows), number[rows]
         self._parts.append(table)
         self._hashes.append(number)
@@ -71,7 +88,9 @@ class SampleReservoir:
             return SampleTable.empty()
         self._settle()
         found = SampleTable.concatenate(self._parts)
-        self._parts, self._hashes = [found], [np.concatenate(self._hashes)]
+        kept = np.bincount(found.photo, minlength=len(self._counts))
+        each = (self._counts / np.maximum(kept, 1)).astype(np.float32)
+        found = replace(found, weight=found.weight * each.take(found.photo))
         place = _place(found)
         if self._brightest is not None:
             one = self._brightest[2]
@@ -93,47 +112,25 @@ class SampleReservoir:
             self._brightest = (*found, one)
 
     def _settle(self) -> None:
-        """Drop what is out."""
-        number = np.concatenate(self._hashes)
-        if len(number) > self.size:
-            keep = self._best(np.concatenate([part.photo for part in self._parts]), number)
-            parts, hashes = self._parts, self._hashes
-            self._parts, self._hashes = [], []
-            begin = 0
-            for table, own in zip(parts, hashes, strict=True):
-                rows = np.flatnonzero(keep[begin : begin + len(own)])
-                begin += len(own)
-                if len(rows) == len(own):
-                    self._parts.append(table)
-                    self._hashes.append(own)
-                elif len(rows):
-                    self._parts.append(table.select(rows))
-                    self._hashes.append(own[rows])
+        """Drop what is out. Counts only grow, so a photo's room only shrinks: what is dropped now
+        would be in the end."""
         self._waiting = 0
-
-    def _best(self, photo: NDArray[np.int16], number: NDArray[np.uint64]) -> NDArray[np.bool_]:
-        """Rows to keep; sets the limits for what comes later."""
-        sure = np.zeros(len(number), bool)
-        for one in np.unique(photo).tolist():
-            rows = np.flatnonzero(photo == one)
-            if len(rows) > self.share:
-                if self.share == 0:
-                    self._shares[one] = np.uint64(0)
-                    continue
-                last = np.partition(number[rows], self.share - 1)[self.share - 1]
-                self._shares[one] = last
-                rows = rows[number[rows] <= last]
-            sure[rows] = True
-        others = np.flatnonzero(~sure)
-        room = self.size - int(sure.sum())
-        if room == 0:
-            self._limit = np.uint64(0)
-        elif len(others) > room:
-            self._limit = np.partition(number[others], room - 1)[room - 1]
-            others = others[number[others] <= self._limit]
-        if room:
-            sure[others] = True
-        return sure
+        if self._counts.sum() <= self.size:
+            return
+        room = max(1, water_level(self._counts, self.size))
+        of = np.array([part.photo[0] for part in self._parts])
+        for photo in np.unique(of).tolist():
+            mine = np.concatenate([self._hashes[i] for i in np.flatnonzero(of == photo)])
+            if len(mine) > room:
+                self._limits[photo] = np.partition(mine, room - 1)[room - 1]
+        parts, hashes = self._parts, self._hashes
+        self._parts, self._hashes = [], []
+        for photo, table, number in zip(of.tolist(), parts, hashes, strict=True):
+            rows = np.flatnonzero(number <= self._limits[photo])
+            if len(rows):
+                whole = len(rows) == len(table)
+                self._parts.append(table if whole else table.select(rows))
+                self._hashes.append(number if whole else number[rows])
 
 
 def _place(table: SampleTable) -> NDArray[np.int64]:

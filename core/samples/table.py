@@ -22,6 +22,7 @@ class SampleTable:
     light: (n, 3) float32 unit direction surface → light, scan frame.
     point: (n, 3) float64, where on the surface; normal, view: (n, 3) float32 unit; scan frame.
     curvature: (n,) float32, 1/pixel, NaN unknown.
+    weight: (n,) float32, how many samples the row stands for where not all were kept, else 1.
     """
 
     photo: NDArray[np.int16]
@@ -39,6 +40,7 @@ class SampleTable:
     curvature: NDArray[np.float32]
     light: NDArray[np.float32]
     irradiance: NDArray[np.float32]
+    weight: NDArray[np.float32]
 
     def __len__(self) -> int:
         return len(self.photo)
@@ -86,7 +88,7 @@ class SampleTable:
             photo=np.zeros(0, np.int16), pixel=np.zeros(0, np.int32),
             theta_h=flat, theta_d=flat, phi_d=flat, cos_i=flat, cos_o=flat,
             rho=vectors, radiance=vectors, point=np.zeros((0, 3)), normal=vectors, view=vectors,
-            curvature=flat, light=vectors, irradiance=vectors,
+            curvature=flat, light=vectors, irradiance=vectors, weight=flat,
         )  # fmt: skip
 
     @staticmethod

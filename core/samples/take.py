@@ -123,6 +123,7 @@ def sample_photo(
         curvature=view.curvature.take(rows),
         light=np.broadcast_to(light, (n, 3)),
         irradiance=np.broadcast_to(irradiance, (n, 3)),
+        weight=np.broadcast_to(np.float32(1), n),
     )
 
 

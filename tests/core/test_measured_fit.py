@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from patina.core.angles import Angles, cosines, half_difference
-from patina.core.basis import Basis
+from patina.core.basis import Basis, mapping
 from patina.core.basis.log_table import LogTable
 from patina.core.errors import FitError
 from patina.core.fit.measured import MeasuredSettings, fit_measured
 from patina.core.fit.measured.anchors import Anchors, directions
+from patina.core.fit.measured.caution import cautious
 from patina.core.fit.measured.cells import gather
 from patina.core.fit.measured.forward import CellModel
 from patina.core.fit.measured.lobes import Lobes, fit_lobes
@@ -20,6 +21,7 @@ from patina.core.fit.measured.normals import refine_normals, seen_with
 from patina.core.fit.measured.patches import Patches
 from patina.core.fit.measured.prior import ChannelPrior
 from patina.core.fit.measured.scatter import rings, scattered
+from patina.core.fit.measured.tempering import LARGEST, LEAST, size, tempered
 from patina.core.samples import SampleTable
 from tests import make_capture as made
 from tests.sampled import sampled
@@ -92,21 +94,27 @@ def test_precision_is_the_inverse_of_the_priors_covariance() -> None:
     assert np.allclose(prior.precision() @ covariance, np.eye(12))
 
 
-def test_anchors_pull_an_empty_fit_to_the_lobes() -> None:
+def test_anchors_carry_the_lobes_change_on() -> None:
+    """A BRDF that IS lobes up to the edge goes on halfway between its edge and the lobes."""
     basis = Basis.default()
     lobes = Lobes(np.log([0.1] * 3 + [0.3, 1.0] + [0.05] * 3 + [0.1, 1.0] + [1e-6] * 3), 0.0)
     k = basis.count
-    prior = ChannelPrior.of(basis, k, coupled=False)
-    edge, average = np.radians(60.0), np.zeros((3, k))
-    anchored = prior.anchored(Anchors.of(lobes, basis, average, edge), 0.05)
-    c = np.linalg.solve(anchored.precision(), anchored.pull()).reshape(3, k)
+    grid = Angles(*(a.ravel() for a in basis.grid.nodes()))
+    as_lobes = basis.project(lobes.evaluate(grid), grid, k, 0.3)
+    edge = np.radians(60.0)
+    anchors = Anchors.of(lobes, basis, as_lobes, edge)
+    prior = ChannelPrior.of(basis, k, coupled=False).anchored(anchors, 0.05)
+    c = np.linalg.solve(prior.precision(), prior.pull()).reshape(3, k)
     angles = directions(edge)
     at_edge = Angles(angles.theta_h, np.full_like(angles.theta_d, edge), angles.phi_d)
-    mean = basis.evaluate(average, angles)
-    change = lobes.evaluate(angles) / lobes.evaluate(at_edge)
-    expected, found = basis.evaluate(average, at_edge) * change, basis.evaluate(c, angles)
-    off = np.abs(np.log(found / expected)).mean()
-    assert off < 0.35 * np.abs(np.log(mean / expected)).mean()
+
+    def logs(rho: np.ndarray, where: Angles) -> np.ndarray:
+        return mapping.log_weighted(np.asarray(rho, float), mapping.cos_map(where))
+
+    expected = (logs(lobes.evaluate(at_edge), at_edge) + logs(lobes.evaluate(angles), angles)) / 2
+    off = np.abs(logs(basis.evaluate(c, angles), angles) - expected).mean()
+    mean = np.abs(logs(basis.evaluate(0 * c, angles), angles) - expected).mean()
+    assert off < 0.35 * mean
 
 
 def test_lobes_find_a_lambertian_surface(table: SampleTable) -> None:
@@ -209,3 +217,35 @@ def test_a_log_table_is_the_basis(table: SampleTable) -> None:
     assert np.allclose(
         LogTable.of(basis, c).evaluate(angles), basis.evaluate(c, angles), rtol=2e-3, atol=1e-6
     )
+
+
+def test_cells_of_an_unlikely_material_count_less(table: SampleTable) -> None:
+    """A lobe no measured material has: its coefficients are kept to what measured ones have."""
+    basis = Basis.default()
+    prior = ChannelPrior.of(basis, basis.count, coupled=False)
+    likely = made_brdf(basis).evaluate(table.angles)
+    odd = likely * (1 + 20 * np.exp(-np.square((table.theta_h - 0.35) / 0.05))[:, None])
+    sizes, counts = [], []
+    for rho in (likely, odd):
+        light = rho * table.irradiance * table.cos_i[:, None]
+        cells = gather(replace(table, radiance=light.astype(np.float32)), 0.0)
+        found, together = tempered(CellModel.of(cells, basis), prior, 0.15)
+        sizes.append(size(found.coefficients, prior))
+        counts.append(together)
+    assert counts[0] == LEAST < counts[1]
+    assert sizes[1] < 2 * LARGEST
+
+
+def test_caution_darkens_only_what_is_unsure() -> None:
+    """One component unknown: the BRDF falls where that component matters, and nowhere else."""
+    basis = Basis.default()
+    k = basis.count
+    covariance = np.tile(1e-8 * np.eye(k), (3, 1, 1))
+    covariance[:, 2, 2] = basis.coefficient_variance
+    change = basis.nodes[:, 1 : 1 + k] @ (cautious(basis, np.zeros((3, k)), covariance)[0])
+    variance = basis.coefficient_variance * basis.nodes[:, 3].astype(np.float64) ** 2
+    cos_i, cos_o = cosines(*(Angles(*(a.ravel() for a in basis.grid.nodes()))))
+    seen = np.minimum(cos_i, cos_o) > 0.05
+    unsure, sure = seen & (variance > 0.2), seen & (variance < 0.002)
+    assert change[unsure].mean() < -0.6 * np.minimum(variance, 1.5)[unsure].mean()
+    assert abs(change[sure].mean()) < 0.02

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +15,14 @@ from scipy.ndimage import binary_dilation, generate_binary_structure
 from patina.core.capture import read_capture
 from patina.core.geometry import PixelRays, RayScene, bands, edges, view_surface, view_window
 from patina.core.geometry.window import whole
-from patina.core.job import inputs, sampling
+from patina.core.job import FitJob, inputs, sampling
 from patina.core.job.in_order import in_order
 from patina.core.job.job import drained
 from patina.core.job.lights import find_lights
 from patina.core.job.photos import LitPhotos
 from patina.core.job.sampling import take_samples
-from patina.core.samples import Margins, SampleReservoir, SampleTable, sample_photo
-from patina.core.samples.reservoir import sample_hash
+from patina.core.samples import Margins, SampleReservoir, SampleTable, sample_photo, weighted
+from patina.core.samples.reservoir import sample_hash, water_level
 from patina.core.samples.take import halo, inner_pixels, light_surface, trusted_pixels
 from patina.core.scan import Camera, Mesh
 from patina.core.scan.camera import Pose
@@ -173,6 +174,30 @@ def test_threads_and_bands_change_no_byte(ball: Path, monkeypatch: pytest.Monkey
     assert all(one == found[0] for one in found)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["measured", "paper"])
+def test_the_whole_job_gives_the_same_bytes_on_any_number_of_threads(
+    ball: Path, monkeypatch: pytest.MonkeyPatch, method: str
+) -> None:
+    """Also where the reservoir has to thin."""
+    few = partial(SampleReservoir, size=4000)
+    monkeypatch.setattr(sampling, "SampleReservoir", few)
+    monkeypatch.setattr(
+        sampling, "bands", lambda c, halo, columns: bands(c, halo, columns, pixels=3000)
+    )
+    capture = read_capture(ball)
+    capture = replace(capture, fit=replace(capture.fit, method=method))
+    found = []
+    for threads in (1, 2):
+        job = FitJob(capture, threads=threads)
+        job.drain()
+        assert job.result is not None
+        one = job.result.materials[0]
+        assert one.used <= 4001 < one.samples
+        found.append((one.fit.brdf.coefficients.tobytes(), one.per_photo, one.held_out, one.spread))
+    assert found[0] == found[1]
+
+
 def test_a_sink_gets_every_sample_once_and_in_order(ball: Path) -> None:
     class Sink:
         def __init__(self) -> None:
@@ -200,9 +225,10 @@ def made_up(photo: int, pixels: np.ndarray) -> SampleTable:
     flat, vectors = np.full(n, 0.5, np.float32), np.ones((n, 3), np.float32)
     return replace(
         SampleTable.empty(), photo=np.full(n, photo, np.int16), pixel=pixels.astype(np.int32),
-        theta_h=flat, theta_d=flat, phi_d=flat, cos_i=flat, cos_o=flat, curvature=flat, rho=vectors,
+        theta_h=flat, theta_d=flat, phi_d=flat, cos_i=flat, cos_o=flat, curvature=flat,
         radiance=vectors * pixels[:, None].astype(np.float32), normal=vectors, view=vectors,
-        light=vectors, irradiance=vectors, point=vectors.astype(float),
+        rho=vectors, light=vectors, irradiance=vectors, point=vectors.astype(float),
+        weight=np.ones(n, np.float32),
     )  # fmt: skip
 
 
@@ -233,30 +259,62 @@ def test_the_reservoir_does_not_depend_on_pieces_or_order(counts, size, seed) ->
     everything = SampleTable.concatenate(pieces)
     place = everything.photo.astype(np.int64) << 32 | everything.pixel
     number = sample_hash(everything.photo, everything.pixel)
-    share, expected = size // len(counts), set()
-    for photo in range(len(counts)):
+    if len(place) <= size:
+        assert np.array_equal(kept[0], np.sort(place)) and (table.weight == 1).all()
+        return
+    come = np.bincount(everything.photo)
+    room = max(next(r for r in range(size, -1, -1) if np.minimum(come, r).sum() <= size), 1)
+    expected = set()
+    for photo in np.flatnonzero(come):
         rows = np.flatnonzero(everything.photo == photo)
-        expected |= set(place[rows[np.argsort(number[rows])[:share]]].tolist())
-    for row in np.argsort(number):
-        if len(expected) >= size:
-            break
-        expected.add(int(place[row]))
+        expected |= set(place[rows[np.argsort(number[rows])[:room]]].tolist())
     bright = everything.radiance[:, 0].max()
     expected.add(int(place[everything.radiance[:, 0] == bright].min()))
     assert set(kept[0].tolist()) == expected
+    # every sample is stood for
+    assert len(place) - 1e-3 <= table.weight.sum() <= len(place) + 1 + 1e-3
 
 
 def test_the_reservoir_is_a_fair_sample() -> None:
-    """Kept pixels are spread evenly: a tenth of a photo's from each tenth of its rows."""
-    reservoir = SampleReservoir(2, 4000)
-    for photo in (0, 1):
-        for part in np.array_split(np.arange(50_000), 7):
+    """Kept pixels are spread evenly: a tenth of a photo's from each tenth of its rows. A photo that
+    shows little keeps all of it, and weights say what every row stands for."""
+    reservoir = SampleReservoir(3, 4000)
+    for photo, count in ((0, 50_000), (1, 500), (2, 20_000)):
+        for part in np.array_split(np.arange(count), 7):
             reservoir.add(photo, made_up(photo, part))
     table = reservoir.table()
-    assert 4000 <= len(table) <= 4001
-    share = np.bincount(table.pixel // 5000, minlength=10) / len(table)
-    assert np.abs(share - 0.1).max() < 5 * np.sqrt(0.09 / 4000)
-    assert np.bincount(table.photo).min() >= 2000
+    assert 3998 <= len(table) <= 4001
+    assert np.bincount(table.photo)[1] == 500
+    for photo, count in ((0, 50_000), (1, 500), (2, 20_000)):
+        own = table.select(table.photo == photo)
+        share = np.bincount(own.pixel * 10 // count, minlength=10) / len(own)
+        assert np.abs(share - 0.1).max() < 5 * np.sqrt(0.09 / len(own))
+        assert abs(own.weight.sum() - count) <= 0.001 * count + 1
+    assert weighted.thinned(table)
+
+
+@settings(max_examples=100, deadline=None)
+@given(counts=st.lists(st.integers(0, 50), min_size=1, max_size=9), size=st.integers(0, 300))
+def test_the_water_level_is_the_highest_that_fits(counts: list[int], size: int) -> None:
+    level, array = water_level(np.array(counts), size), np.array(counts)
+    assert np.minimum(array, level).sum() <= size
+    if level < array.max():
+        assert np.minimum(array, level + 1).sum() > size
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    values=st.lists(st.floats(-10, 10), min_size=1, max_size=20),
+    times=st.lists(st.integers(1, 5), min_size=20, max_size=20),
+)
+def test_the_weighted_median_lies_in_the_middle_of_all(values, times) -> None:
+    numbers, weight = np.array(values), np.array(times[: len(values)], float)
+    found = weighted.median(numbers, weight)
+    everything = np.repeat(numbers, weight.astype(int))
+    if weight.min() == weight.max():
+        assert found == np.median(numbers)
+    else:
+        assert (everything < found).mean() <= 0.5 and (everything > found).mean() <= 0.5
 
 
 def test_hashes_of_all_places_differ() -> None:

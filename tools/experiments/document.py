@@ -15,7 +15,7 @@ DOCUMENT = ROOT / "docs" / "experiments.md"
 IMAGES = "images/experiments"
 ESTIMATORS = (
     "paper", "all samples k=20", "ours", "ours, true mesh", "all samples k=40, true mesh",
-    "floor k=20", "floor k=40", "floor k=120",
+    "floor k=20", "floor k=40", "floor k=100",
 )  # fmt: skip
 X_LABELS = {
     "samples": "samples the fit is solved from",

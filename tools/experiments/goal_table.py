@@ -208,13 +208,13 @@ def _picture_row(
         return [float(np.median(r["psnr"])) for r in rows if "psnr" in r]
 
     mine = each(ours)
-    floor = [each(where(records, estimator=f"floor k={k}")) for k in (40, 120)]
+    floor = [each(where(records, estimator=f"floor k={k}")) for k in (40, 100)]
     told = f"{np.median(mine):.1f} dB" if mine else NOT
     theirs = each(paper)
     best = [f"{np.median(each(oracle)):.1f} with the true mesh"] if each(oracle) else []
     best += [
         f"{np.median(x):.1f} the truth on {k} components"
-        for k, x in zip((40, 120), floor, strict=True)
+        for k, x in zip((40, 100), floor, strict=True)
         if x
     ]
     return [

@@ -1,7 +1,10 @@
-"""Weak observations towards grazing light, where no photo looked, of what lobes expect there.
+"""Weak observations towards grazing light, where no photo looked.
 
-The BRDF at the most grazing angle that photos saw is carried on by the lobes' own change from
-there: their Fresnel and shadowing, not their idea of the highlight's shape.
+Two guesses meet halfway there, in the logarithm: that ρ·cosMap stays what it is at the most grazing
+angle that photos saw, which is what measured materials do on average; and that the BRDF goes on as
+the lobes do, whose Fresnel term and shadowing know how glossy materials grow, but overdo it. The
+lobes are first brought to the level of the BRDF over the last angles seen, not at the edge alone,
+where samples are few.
 """
 
 from __future__ import annotations
@@ -23,6 +26,9 @@ LIMIT = 83.0  # of light and view
 INDEPENDENT = 50.0  # their errors go together: all of them count as so many
 NEAR_HIGHLIGHT = 15.0  # degrees of θh: cells that say how far highlights were seen
 SEEN = 0.97  # of those cells
+INSIDE = 2.0  # degrees: the edge that is carried on lies so far inside
+LEVELS = (0.0, 10.0)  # degrees inside it, where the lobes' level is found
+HALFWAY = 0.5  # of the lobes' change; all of it is too much, none too little
 
 
 @dataclass(frozen=True)
@@ -39,17 +45,29 @@ class Anchors:
     ) -> Anchors:
         """coefficients: (3, k) of the BRDF that is carried on from θd = edge (radians)."""
         k = coefficients.shape[1]
+        edge = max(edge - np.radians(INSIDE), 0.0)
         angles = directions(edge)
         if not len(angles.theta_h):
             return cls(np.zeros((k, k)), np.zeros((3, k)))
-        at_edge = Angles(angles.theta_h, np.full_like(angles.theta_d, edge), angles.phi_d)
-        known = basis.evaluate(coefficients, at_edge).astype(np.float64)
-        change = lobes.evaluate(angles) / np.maximum(lobes.evaluate(at_edge), 1e-9)
+
+        def at(theta_d: float) -> Angles:
+            same = np.full_like(angles.theta_d, max(theta_d, 0.0))
+            return Angles(angles.theta_h, same, angles.phi_d)
+
+        def known(where: Angles) -> NDArray[np.float64]:
+            return _logs(basis.evaluate(coefficients, where), where)
+
+        def of_lobes(where: Angles) -> NDArray[np.float64]:
+            return _logs(lobes.evaluate(where), where)
+
+        seen = [at(edge - np.radians(inside)) for inside in LEVELS]
+        level = np.mean([known(where) - of_lobes(where) for where in seen], axis=0)
+        expected = (1 - HALFWAY) * known(at(edge)) + HALFWAY * (of_lobes(angles) + level)
         centre, rows = basis.rows(angles, k)
         q = rows.astype(np.float64)
-        mapped = mapping.log_weighted(known * change, mapping.cos_map(angles))
+        mapped = expected - centre[:, None]
         weight = INDEPENDENT / len(q)
-        return cls(weight * q.T @ q, weight * (q.T @ (mapped - centre[:, None])).T)
+        return cls(weight * q.T @ q, weight * (mapped.T @ q))
 
 
 def seen_edge(cells: AngleCells) -> float:
@@ -67,3 +85,8 @@ def directions(edge: float) -> Angles:
     cos_i, cos_o = cosines(*flat)
     seen = np.minimum(cos_i, cos_o) > np.cos(np.radians(LIMIT))
     return Angles(*(a[seen] for a in flat))
+
+
+def _logs(rho: NDArray[np.floating], angles: Angles) -> NDArray[np.float64]:
+    """(n, 3) ln(ρ·cosMap + ε)."""
+    return mapping.log_weighted(rho.astype(np.float64), mapping.cos_map(angles))

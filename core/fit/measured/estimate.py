@@ -14,18 +14,21 @@ from ...basis.log_table import LogTable
 from ...errors import FitError
 from ...samples import SampleTable
 from . import held_out
+from .caution import cautious
 from .cells import gather
 from .forward import CellModel
-from .normals import refine_normals
+from .normals import TOLERANCE, refine_normals
 from .patches import Patches
 from .posterior import Posterior, solve
 from .prior import ChannelPrior
+from .tempering import LEAST, tempered
 
 FEWEST = 50  # samples
-WARM = 4  # steps of the solver between refinements of the normals
 CLEARLY = 0.98  # of the first choice's held-out misfit
 SETTLED = 0.02  # RMS change of ln ρ, all directions alike: the normals are refined enough
 CHUNK = 1 << 15
+WIDER = 1.5  # bands, than the posterior: no material is a draw from the measured ones' distribution
+ALWAYS = 0.03  # of ln ρ: nothing is known better
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class MeasuredSettings:
     normal_deviation: float = 1.0
     rounds: int = 8
     coupled: bool = False
-    trusts: tuple[float, ...] = (0.7,)
+    trusts: tuple[float, ...] = (1.0,)
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,8 @@ class MeasuredFit:
     """brdf: the most probable one. samples: number used. normal_deviation: degrees per tangent,
     what the scan's normals are off by. gains: photo → its own gain. trust: of the anchors that was
     chosen. without: photo → the BRDF had it not been there. refined: the samples under corrected
-    normals. covariance: (3, k, k) of each channel's coefficients."""
+    normals. covariance: (3, k, k) of each channel's coefficients. together: how many cells count
+    as one observation."""
 
     brdf: PrincipalBRDF
     samples: int
@@ -63,10 +67,12 @@ class MeasuredFit:
     floor: float
     posterior: Posterior
     model: CellModel
+    together: float
     warnings: tuple[str, ...] = ()
 
     def band(self, angles: Angles) -> NDArray[np.float64]:
-        """(n, 3) standard deviation of ln(ρ·cosMap + ε) at n directions."""
+        """(n, 3) standard deviation of ln(ρ·cosMap + ε) at n directions: the posterior's, widened
+        to what `run.py experiments` finds it to be off by."""
         basis, k = self.brdf.basis, self.covariance.shape[1]
         n = len(angles.theta_h)
         out = np.empty((n, 3))
@@ -75,7 +81,7 @@ class MeasuredFit:
             part = slice(start, start + CHUNK)
             q = basis.rows(Angles(*(a[part] for a in angles)), k)[1].astype(np.float64)
             for c in range(3):
-                out[part, c] = np.sqrt(np.sum((q @ root[c]) ** 2, axis=1))
+                out[part, c] = np.sqrt(WIDER**2 * np.sum((q @ root[c]) ** 2, axis=1) + ALWAYS**2)
         return out
 
 
@@ -106,39 +112,48 @@ def measured_steps(
     deviation = float(np.radians(s.normal_deviation))
     yield 0.0
     model = CellModel.of(gather(table, deviation), basis)
-    found = solve(model, prior, s.floor, leave_out=False)
+    found, together = tempered(model, prior, s.floor)
     refined = table
     patches = Patches.of_points(table.point) if s.rounds else None
     for done in range(s.rounds if patches is not None else 0):
         yield 0.1 + 0.6 * done / s.rounds
         brdf = LogTable.of(basis, found.coefficients)
         assert patches is not None
-        normals = refine_normals(table, patches, brdf, deviation)
+        # a BRDF unlike measured ones is itself in doubt: normals must not explain what it cannot
+        tolerance = TOLERANCE * float(np.sqrt(together / LEAST))
+        normals = refine_normals(table, patches, brdf, deviation, tolerance)
         deviation, refined = normals.deviation, normals.table
         yield 0.1 + 0.6 * (done + 0.5) / s.rounds
         model = CellModel.of(gather(refined, normals.error), basis)
         before = brdf.values
-        found = solve(model, prior, s.floor, found.coefficients, leave_out=False, iterations=WARM)
+        together = max(LEAST, together / 2)
+        found, together = tempered(model, prior, s.floor, found.coefficients, together)
         change = LogTable.of(basis, found.coefficients).values - before
         if np.sqrt(np.mean(change**2)) < SETTLED:
             break
     yield 0.7
     final = yield from _preferred(model, s, found, prior)
     yield 0.95
-    found = solve(model, final, s.floor, found.coefficients)
+    found = solve(model, final, s.floor, found.coefficients, together=together)
+    covariance = found.covariance()
+
+    def careful(c: NDArray[np.float64]) -> NDArray[np.float64]:
+        return cautious(basis, c, covariance)
+
     return MeasuredFit(
-        brdf=PrincipalBRDF(basis, found.coefficients),
+        brdf=PrincipalBRDF(basis, careful(found.coefficients)),
         samples=len(table),
         normal_deviation=float(np.degrees(deviation)),
         gains=found.gains,
         trust=final.trust,
         anchoring=_told(final.trust),
-        without={p: PrincipalBRDF(basis, c) for p, c in found.without.items()},
+        without={p: PrincipalBRDF(basis, careful(c)) for p, c in found.without.items()},
         refined=refined,
-        covariance=found.covariance(),
+        covariance=covariance,
         floor=s.floor,
         posterior=found,
         model=model,
+        together=together,
     )
 
 
@@ -168,5 +183,5 @@ def _told(trust: float) -> str:
         return "directions that no photo saw follow measured materials"
     return (
         "directions that no photo saw follow measured materials and microfacet lobes, the lobes "
-        f"trusted to {100 * np.expm1(trust):.0f} %"
+        f"trusted to a factor of {np.exp(trust):.1f}"
     )

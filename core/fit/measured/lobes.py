@@ -20,7 +20,7 @@ from .cells import AngleCells
 Array = NDArray[np.float64]
 
 LOBES = 2
-ENOUGH = 2500  # cells
+ENOUGH = 1500  # cells
 GRAZING = 0.05  # cosines below count as this: the microfacet formula has poles there
 STARTS = ((0.05, 0.3), (0.01, 0.1), (0.2, 0.6))  # roughnesses to start from
 SOFT = 0.2  # log residuals beyond it count less

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 ROUNDS = 3  # the model is linearised at each
 NUDGE = 2e-3  # radians, for slopes
 DARK = 2e-3  # of the reflected light: below, photos show noise
-TOLERANCE = 0.05  # log-relative, what the BRDF itself may be off by
+TOLERANCE = 0.05  # log-relative, of a BRDF that is like measured ones
 SMOOTH = 0.3  # a patch's difference to a neighbour costs so much of its own size
 DEGREES = 4.0  # of freedom of the Student t
 LARGEST = np.radians(12.0)
@@ -42,10 +42,15 @@ class RefinedNormals:
 
 
 def refine_normals(
-    scanned: SampleTable, patches: Patches, brdf: LogTable, deviation: float
+    scanned: SampleTable,
+    patches: Patches,
+    brdf: LogTable,
+    deviation: float,
+    tolerance: float = TOLERANCE,
 ) -> RefinedNormals:
     """scanned: samples with the scan's normals; brdf: its LogTable; deviation: radians along each
-    tangent that the scan's normals are expected to be off by."""
+    tangent that the scan's normals are expected to be off by; tolerance: log-relative, what the
+    BRDF itself may be off by."""
     grey = brdf.grey()
     normal = scanned.normal.astype(np.float64)
     seen = (scanned.radiance / scanned.irradiance).mean(axis=1, dtype=np.float64)
@@ -54,7 +59,7 @@ def refine_normals(
     for _ in range(ROUNDS):
         turned = _unit(normal + turn[patches.of])
         slope, misfit = _linearised(grey, turned, scanned, observed)
-        weight = (DEGREES + 1) / (DEGREES + (misfit / TOLERANCE) ** 2) / TOLERANCE**2
+        weight = (DEGREES + 1) / (DEGREES + (misfit / tolerance) ** 2) / tolerance**2
         # samples of one patch and photo share the model's error: they count once, not each
         weight = weight / _crowd(scanned.photo, patches)
         turn, left, again = _solve(patches, slope, misfit, weight, turn, deviation)
@@ -133,7 +138,7 @@ def _solve(
     block[:, range(3), range(3)] += stiff
     laplacian = SMOOTH * stiff * patches.neighbours
     degree = laplacian.diagonal()
-    near = np.linalg.inv(block + degree[:, None, None] * np.eye(3))
+    near = _inverse(block + degree[:, None, None] * np.eye(3))
 
     def apply(x: Array) -> Array:
         each = x.reshape(p, 3)
@@ -158,9 +163,21 @@ def _solve(
     share = 1.0 + degree / stiff
     again = float(np.sqrt(np.mean(cost + share * trace) / 2))
     # neighbours tell something of each other: half of what they would if they were known
-    alone = np.linalg.inv(block + 0.5 * degree[:, None, None] * np.eye(3))
+    alone = _inverse(block + 0.5 * degree[:, None, None] * np.eye(3))
     spread = np.trace(alone, axis1=1, axis2=2) - 1.0 / (stiff + 0.5 * degree)
     return found, np.sqrt(np.maximum(spread, 0.0) / 2), again
+
+
+def _inverse(blocks: Array) -> Array:
+    """Of (p, 3, 3) symmetric positive definite matrices, by cofactors: LAPACK takes them one by
+    one, which is most of the time there are so many."""
+    first, second, third = blocks[:, 0], blocks[:, 1], blocks[:, 2]
+    cofactors = np.stack(
+        [np.cross(second, third), np.cross(third, first), np.cross(first, second)], axis=2
+    )
+    determinant = np.einsum("px,px->p", first, cofactors[:, :, 0])
+    inverse: Array = cofactors / determinant[:, None, None]
+    return inverse
 
 
 def _unit(v: Array) -> Array:

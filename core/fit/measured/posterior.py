@@ -53,8 +53,10 @@ def solve(
     start: NDArray[np.float64] | None = None,
     leave_out: bool = True,
     iterations: int = ITERATIONS,
+    together: float = 1.0,
 ) -> Posterior:
-    """floor: log-relative deviation that the model is granted everywhere."""
+    """floor: log-relative deviation that the model is granted everywhere. together: so many cells
+    count as one observation (tempering.py)."""
     k = len(prior.own)
     photos = np.unique(model.cells.photo)
     place = np.searchsorted(photos, model.cells.photo)
@@ -70,6 +72,7 @@ def solve(
     for _ in range(iterations):
         prediction = model.predict(state[: 3 * k].reshape(3, k))
         residual, weight = _residuals(model, prediction, state[3 * k :][place], floor)
+        weight = weight / together
         hessian, gradient = _normal_equations(prediction, residual, weight, place, p)
         pull = gradient.sum(axis=0) - precision @ state
         pull[: 3 * k] += prior_pull

@@ -1,0 +1,46 @@
+"""Work in a thread of its own while the job goes on yielding: ESC is heard within a moment, however
+long a piece of the work takes. What is dropped ends its piece unheard, and touches nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from concurrent.futures import ThreadPoolExecutor, wait
+from typing import TypeVar
+
+Value = TypeVar("Value")
+Result = TypeVar("Result")
+
+MOMENT = 0.05  # seconds between yields
+
+
+def beside(work: Callable[[], Result], value: Value) -> Generator[Value, None, Result]:
+    """What ``work`` returns; yields ``value`` while it goes on. Errors of the work pass through."""
+    pool = ThreadPoolExecutor(1, "patina")
+    try:
+        future = pool.submit(work)
+        while wait([future], MOMENT).not_done:
+            yield value
+        return future.result()
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def stepped_beside(
+    steps: Generator[float, None, Result],
+) -> Generator[float, None, Result]:
+    """The fractions and the result of ``steps``; the latest fraction again and again while the next
+    is on its way."""
+    done = 0.0
+
+    def following() -> tuple[float, None] | tuple[None, Result]:
+        try:
+            return next(steps), None
+        except StopIteration as end:
+            return None, end.value
+
+    while True:
+        fraction, result = yield from beside(following, done)
+        if fraction is None:
+            return result  # type: ignore[return-value]
+        done = fraction
+        yield done

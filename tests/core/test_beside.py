@@ -1,0 +1,65 @@
+"""Work beside the job: values, results and errors arrive, and nobody waits long to be heard."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Generator
+
+import pytest
+
+from patina.core.errors import FitError
+from patina.core.job.beside import beside, stepped_beside
+from patina.core.job.job import drained
+
+
+def slow_steps(seconds: float, seen: list[str]) -> Generator[float, None, str]:
+    yield 0.0
+    time.sleep(seconds)
+    seen.append("first")
+    yield 0.5
+    seen.append("second")
+    return "result"
+
+
+def test_the_result_and_every_value_arrive_in_order() -> None:
+    seen: list[str] = []
+    values = []
+    steps = stepped_beside(slow_steps(0.3, seen))
+    while True:
+        try:
+            values.append(next(steps))
+        except StopIteration as end:
+            assert end.value == "result"
+            break
+    assert sorted(set(values)) == [0.0, 0.5] and values == sorted(values)
+    assert values.count(0.0) > 3  # a yield every twentieth of a second
+    assert seen == ["first", "second"]
+
+
+def test_who_leaves_need_not_wait_and_the_rest_is_not_done() -> None:
+    seen: list[str] = []
+    steps = stepped_beside(slow_steps(0.5, seen))
+    next(steps)
+    next(steps)  # the half second has begun
+    since = time.perf_counter()
+    steps.close()
+    assert time.perf_counter() - since < 0.3
+    for thread in [t for t in threading.enumerate() if t.name.startswith("patina")]:
+        thread.join(5)
+    assert seen == ["first"]
+
+
+def test_errors_pass_through() -> None:
+    def fails() -> Generator[float, None, None]:
+        yield 0.1
+        raise FitError("too few samples")
+
+    with pytest.raises(FitError, match="too few"):
+        drained(stepped_beside(fails()))
+    with pytest.raises(TimeoutError):  # the work's own, not the waiting's
+
+        def late() -> None:
+            raise TimeoutError
+
+        drained(beside(late, 0.0))
