@@ -64,7 +64,7 @@ def predicted(table: SampleTable, photo: int, brdf: PrincipalBRDF) -> LeftOut:
     held = table.select(table.photo == photo)
     difference = predict_radiance(brdf, held) - held.radiance
     level = held.radiance.mean(axis=1)
-    bright = level > DARK * weighted.median(level, held.weight)
+    bright = level > max(DARK * weighted.median(level, held.weight), 0.0)
     weight = held.weight[:, None]
     return LeftOut(
         photo=photo,
@@ -76,7 +76,8 @@ def predicted(table: SampleTable, photo: int, brdf: PrincipalBRDF) -> LeftOut:
 
 
 def summarise(parts: Sequence[LeftOut]) -> HeldOut | None:
-    """All held-out photos together; None where there are none."""
+    """All held-out photos together; None where there are none, or none with any light."""
+    parts = [p for p in parts if p.size > 0]  # of a black photo no error is a fraction
     if not parts:
         return None
     relative = np.concatenate([p.relative for p in parts])
@@ -90,4 +91,4 @@ def summarise(parts: Sequence[LeftOut]) -> HeldOut | None:
 
 
 def _ratio(missed: float, size: float) -> float:
-    return float(np.sqrt(missed / max(size, 1e-300)))
+    return float(np.sqrt(missed / size))

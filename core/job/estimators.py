@@ -49,8 +49,9 @@ def _measured(table: SampleTable, basis: Basis, capture: Capture, name: str) -> 
     parts = []
     for done, photo in enumerate(unseen):
         yield f"predicting unseen photos of {name}", 0.85 + 0.1 * done / len(unseen)
-        if photo in fit.without:
-            parts.append(predicted(table, photo, fit.without[photo]))
+        other = fit.without.pop(photo, None)  # let go: once evaluated each is a megabyte
+        if other is not None:
+            parts.append(predicted(table, photo, other))
     yield f"how sure {name} is", 0.95
     kept = MeasuredResult.of(fit)
     return Estimate(kept, summarise(parts), kept.band.spread())

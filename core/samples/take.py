@@ -15,6 +15,8 @@ from ..light import Incidence, Light
 from ..scan import Camera
 from .table import SampleTable
 
+DARKEST = 1e-30  # irradiance
+
 
 @dataclass(frozen=True)
 class Margins:
@@ -93,12 +95,18 @@ def sample_photo(
     """ρ = L / (E · n·l) for the pixels of ``view`` marked in ``keep`` (n,).
 
     radiance: (h, w, 3) of the whole photo, linear, in the units of the light's irradiance / sr.
-    photo: the number that the table says.
+    photo: the number that the table says. Pixels that their light all but misses (beside a narrow
+    beam) have no reflectance that single precision holds, and are left out.
     """
     rows = np.flatnonzero(keep)
     normal, towards = (_kept(_single(v), rows) for v in (view.normal, view.view))
     incidence = lighting.incidence.select(rows)
     light, irradiance = _single(incidence.towards), _single(incidence.irradiance)
+    reached = (irradiance > DARKEST).all(axis=1)
+    if len(rows) and not reached.all():
+        kept = np.zeros(len(keep), bool)
+        kept[rows] = reached
+        return sample_photo(view, lighting, radiance, keep & kept, photo)
     angles = half_difference(normal, light, towards)
     cos_i = lighting.cos_i.take(rows)
     pixel = view.pixel.take(rows)

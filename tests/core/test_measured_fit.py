@@ -13,9 +13,9 @@ from patina.core.basis.log_table import LogTable
 from patina.core.errors import FitError
 from patina.core.fit.measured import MeasuredSettings, fit_measured
 from patina.core.fit.measured.anchors import Anchors, directions
-from patina.core.fit.measured.caution import cautious
+from patina.core.fit.measured.caution import CAUTION, cautious
 from patina.core.fit.measured.cells import gather
-from patina.core.fit.measured.forward import CellModel
+from patina.core.fit.measured.forward import CellModel, _distinct
 from patina.core.fit.measured.lobes import Lobes, fit_lobes
 from patina.core.fit.measured.normals import refine_normals, seen_with
 from patina.core.fit.measured.patches import Patches
@@ -247,5 +247,14 @@ def test_caution_darkens_only_what_is_unsure() -> None:
     cos_i, cos_o = cosines(*(Angles(*(a.ravel() for a in basis.grid.nodes()))))
     seen = np.minimum(cos_i, cos_o) > 0.05
     unsure, sure = seen & (variance > 0.2), seen & (variance < 0.002)
-    assert change[unsure].mean() < -0.6 * np.minimum(variance, 1.5)[unsure].mean()
+    assert change[unsure].mean() < -0.6 * CAUTION * np.minimum(variance, 1.5)[unsure].mean()
     assert abs(change[sure].mean()) < 0.02
+
+
+def test_distinct_nodes_of_each_cell() -> None:
+    index = np.random.default_rng(1).integers(0, 9, (40, 12))
+    slot, indptr, node = _distinct(index)
+    for i, row in enumerate(index):
+        own = node[indptr[i] : indptr[i + 1]]
+        assert np.array_equal(own, np.unique(row))
+        assert np.array_equal(node[slot.reshape(index.shape)[i]], row)

@@ -111,12 +111,12 @@ def bunny_scene(tool: str) -> Scene:
 
 
 SCENES: dict[str, Callable[[], Scene]] = {
-    "bunny-openmvs": lambda: bunny_scene("OpenMVS"),
-    "bunny-refined": lambda: bunny_scene("OpenMVS refined"),
     "bunny-mve": lambda: bunny_scene("MVE"),
-    "jar-bumpy": lambda: own_scene("jar", "bumpy", 1.5),
-    "knot-blurred": lambda: own_scene("knot", "blurred", 1.0),
+    "bunny-openmvs": lambda: bunny_scene("OpenMVS"),
     "pebble-wavy": lambda: own_scene("pebble", "wavy", 1.0),
+    "jar-bumpy": lambda: own_scene("jar", "bumpy", 1.5),
+    "bunny-refined": lambda: bunny_scene("OpenMVS refined"),
+    "knot-blurred": lambda: own_scene("knot", "blurred", 1.0),
 }
 """The captures of the table of goals."""
 

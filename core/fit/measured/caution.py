@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...angles import Angles, cosines
 from ...basis import Basis
 
-CAUTION = 1.0  # times the variance; 1.5 is the least E(ρ̂/ρ − 1)² of a log-normal ρ
+CAUTION = 0.5  # times the variance; 1.5 is the least E(ρ̂/ρ − 1)² of a log-normal ρ, 0 its median
 MOST = 1.5  # of the variance
 SURE = 0.02  # variance: directions that are surer keep their value alike
 NODES = 6000
@@ -26,15 +26,20 @@ def cautious(
 ) -> NDArray[np.float64]:
     """Coefficients (3, k) of ln(ρ·cosMap + ε) less CAUTION times its variance; covariance:
     (3, k, k) of the coefficients."""
-    k = coefficients.shape[1]
+    return np.asarray(coefficients + caution(basis, covariance, seed))
+
+
+def caution(basis: Basis, covariance: NDArray[np.float64], seed: int = 0) -> NDArray[np.float64]:
+    """(3, k) what :func:`cautious` adds to any coefficients of this covariance."""
+    k = covariance.shape[1]
     cos_i, cos_o = cosines(*(Angles(*(a.ravel() for a in basis.grid.nodes()))))
     visible = np.flatnonzero(np.minimum(cos_i, cos_o) > 0.01)
     some = np.random.default_rng(seed).choice(visible, min(NODES, len(visible)), replace=False)
     q = basis.nodes[np.sort(some), 1 : 1 + k].astype(np.float64)
-    out = np.empty_like(coefficients)
-    for c in range(3):
-        variance = np.sum((q @ covariance[c]) * q, axis=1)
+    out = np.empty((len(covariance), k))
+    for c, own in enumerate(covariance):
+        variance = np.sum((q @ own) * q, axis=1)
         weighted = (q / (variance + SURE)[:, None]).T
         down = weighted @ (-CAUTION * np.minimum(variance, MOST))
-        out[c] = coefficients[c] + np.linalg.solve(weighted @ q + STIFF * np.eye(k), down)
+        out[c] = np.linalg.solve(weighted @ q + STIFF * np.eye(k), down)
     return out

@@ -1,4 +1,4 @@
-"""Samples → BRDF: every sample, all components, normals along, chosen by held-out photos."""
+"""Samples → BRDF: every sample, all components, the scan's normals along."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...basis.log_table import LogTable
 from ...errors import FitError
 from ...samples import SampleTable
 from . import held_out
-from .caution import cautious
+from .caution import caution
 from .cells import gather
 from .forward import CellModel
 from .normals import TOLERANCE, refine_normals
@@ -44,7 +44,7 @@ class MeasuredSettings:
     normal_deviation: float = 1.0
     rounds: int = 8
     coupled: bool = False
-    trusts: tuple[float, ...] = (1.0,)
+    trusts: tuple[float, ...] = (1.5,)
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class MeasuredFit:
     """brdf: the most probable one. samples: number used. normal_deviation: degrees per tangent,
     what the scan's normals are off by. gains: photo → its own gain. trust: of the anchors that was
     chosen. without: photo → the BRDF had it not been there. refined: the samples under corrected
-    normals. covariance: (3, k, k) of each channel's coefficients. together: how many cells count
-    as one observation."""
+    normals. covariance: (3, k, k) of each channel's coefficients. together: how many regions'
+    votes count as one (crowding.py, tempering.py)."""
 
     brdf: PrincipalBRDF
     samples: int
@@ -103,6 +103,7 @@ def measured_steps(
 ) -> Generator[float, None, MeasuredFit]:
     """The same in steps: yields the fraction done."""
     s = settings or MeasuredSettings()
+    table = _finite(table)
     if len(table) < FEWEST:
         raise FitError(
             f"{len(table)} lit samples, at least {FEWEST} are needed: more light or larger masks"
@@ -132,22 +133,19 @@ def measured_steps(
         if np.sqrt(np.mean(change**2)) < SETTLED:
             break
     yield 0.7
-    final = yield from _preferred(model, s, found, prior)
+    final = yield from _preferred(model, s, found, prior, together)
     yield 0.95
     found = solve(model, final, s.floor, found.coefficients, together=together)
     covariance = found.covariance()
-
-    def careful(c: NDArray[np.float64]) -> NDArray[np.float64]:
-        return cautious(basis, c, covariance)
-
+    careful = caution(basis, covariance)
     return MeasuredFit(
-        brdf=PrincipalBRDF(basis, careful(found.coefficients)),
+        brdf=PrincipalBRDF(basis, found.coefficients + careful),
         samples=len(table),
         normal_deviation=float(np.degrees(deviation)),
         gains=found.gains,
         trust=final.trust,
         anchoring=_told(final.trust),
-        without={p: PrincipalBRDF(basis, careful(c)) for p, c in found.without.items()},
+        without={p: PrincipalBRDF(basis, c + careful) for p, c in found.without.items()},
         refined=refined,
         covariance=covariance,
         floor=s.floor,
@@ -157,13 +155,26 @@ def measured_steps(
     )
 
 
+def _finite(table: SampleTable) -> SampleTable:
+    """Without rows that are not numbers: one of them would make every coefficient one of them."""
+    light = table.irradiance
+    good = (light > 0).all(axis=1) & np.isfinite(table.radiance).all(axis=1)
+    with np.errstate(all="ignore"):
+        good &= np.isfinite(table.radiance / light).all(axis=1)
+    for values in (table.normal, table.view, table.light, table.point):
+        good &= np.isfinite(values).all(axis=1)
+    for values in (*table.angles, table.cos_i):
+        good &= np.isfinite(values)
+    return table if good.all() else table.select(good)
+
+
 def _preferred(
-    model: CellModel, s: MeasuredSettings, found: Posterior, prior: ChannelPrior
+    model: CellModel, s: MeasuredSettings, found: Posterior, prior: ChannelPrior, together: float
 ) -> Generator[float, None, ChannelPrior]:
     """The prior with the trust in anchors that predicts held-out photos best."""
     trust = s.trusts[0]
     if len(s.trusts) > 1:
-        steps = held_out.scores(model, prior, s.trusts, s.floor, found.coefficients)
+        steps = held_out.scores(model, prior, s.trusts, s.floor, found.coefficients, together)
         while True:
             try:
                 yield 0.75 + 0.2 * next(steps)

@@ -58,9 +58,7 @@ class CellModel:
         weight = np.ascontiguousarray(weight.T).reshape(m, j, 8)
         cos_map = np.clip(cos_i * np.maximum(cos_o, LEAST_COSINE), 0.01, 1.0)
         lit = np.maximum(cos_i, 0.0) / cos_map
-        flat = (np.arange(m, dtype=np.int64)[:, None, None] * basis.grid.size + index).ravel()
-        pairs, slot = np.unique(flat, return_inverse=True)
-        cell, node = np.divmod(pairs, basis.grid.size)
+        slot, indptr, node = _distinct(index.reshape(m, -1))
         own_i, own_o = cosines(*cells.angles)
         scale = np.clip(own_i * own_o, 0.01, 1.0) / np.maximum(own_i, LEAST_COSINE)
         observed = np.maximum(cells.reflected, 0.0) * scale[:, None] + mapping.EPSILON
@@ -73,8 +71,8 @@ class CellModel:
             factor=(share * lit).astype(np.float32),
             index=index,
             weight=weight,
-            slot=slot.ravel(),
-            indptr=np.searchsorted(cell, np.arange(m + 1)),
+            slot=slot,
+            indptr=indptr,
             node=node,
         )
 
@@ -123,3 +121,19 @@ class CellModel:
                 rise = matrix @ self.basis.nodes[:, 1 : 1 + k]
                 found.append(rise * (self.scale / level[:, channel]).astype(np.float32)[:, None])
         return Prediction(level, spread, found)
+
+
+def _distinct(
+    index: NDArray[np.integer],
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """(slot (m·j,), indptr (m + 1,), node) of the distinct nodes in each row of index (m, j), in
+    order: row i's are node[indptr[i]:indptr[i + 1]], its entry's place there is its slot."""
+    order = np.argsort(index, axis=1)
+    ordered = np.take_along_axis(index, order, axis=1)
+    fresh = np.ones(index.shape, bool)
+    fresh[:, 1:] = ordered[:, 1:] != ordered[:, :-1]
+    place = np.cumsum(fresh.ravel(), dtype=np.int64).reshape(index.shape) - 1
+    slot = np.empty_like(place)
+    np.put_along_axis(slot, order, place, axis=1)
+    indptr = np.concatenate([[0], np.cumsum(fresh.sum(axis=1, dtype=np.int64))])
+    return slot.ravel(), indptr, ordered[fresh].astype(np.int64)

@@ -36,20 +36,22 @@ def scores(
     trusts: Sequence[float],
     floor: float,
     start: NDArray[np.float64],
+    together: float = 1.0,
 ) -> Generator[float, None, list[float]]:
     """RMS log misfit of the most grazing photos' cells for every trust in anchors, all of it found
-    from the other photos alone. Yields the fraction done; nothing where no photo can be spared."""
+    from the other photos alone; together: as solve() takes it. Yields the fraction done; nothing
+    where no photo can be spared."""
     out = np.isin(model.cells.photo, grazing_photos(model))
     if not out.any() or out.all():
         return []
     rest, held = model.select(~out), model.select(out)
-    base = solve(rest, prior, floor, start, leave_out=False, iterations=ROUNDS)
+    base = solve(rest, prior, floor, start, False, ROUNDS, together)
     anchors = carried_on(rest, base.coefficients)
     found = []
     for done, trust in enumerate(trusts):
         yield done / len(trusts)
         tried = prior.anchored(anchors, trust)
-        fit = solve(rest, tried, floor, base.coefficients, leave_out=False, iterations=ROUNDS)
+        fit = solve(rest, tried, floor, base.coefficients, False, ROUNDS, together)
         level = held.predict(fit.coefficients, slopes=False).level
         misfit = np.minimum(np.abs(np.log(held.observed / level)), ROBUST)
         found.append(float(np.sqrt(np.mean(misfit**2))))

@@ -29,6 +29,7 @@ TOLERANCE = 0.05  # log-relative, of a BRDF that is like measured ones
 SMOOTH = 0.3  # a patch's difference to a neighbour costs so much of its own size
 DEGREES = 4.0  # of freedom of the Student t
 LARGEST = np.radians(12.0)
+SURE = np.radians(0.01)  # no scan is nearer to the surface
 
 
 @dataclass(frozen=True)
@@ -161,7 +162,8 @@ def _solve(
     trace = np.trace(near, axis1=1, axis2=2) - 1.0 / (stiff + degree)
     cost = np.sum(found**2, axis=1) + SMOOTH * np.sum(found * (patches.neighbours @ found), axis=1)
     share = 1.0 + degree / stiff
-    again = float(np.sqrt(np.mean(cost + share * trace) / 2))
+    # few large patches are curved: they see all three axes, and the prior's is not the widest then
+    again = float(max(np.sqrt(max(np.mean(cost + share * trace), 0.0) / 2), SURE))
     # neighbours tell something of each other: half of what they would if they were known
     alone = _inverse(block + 0.5 * degree[:, None, None] * np.eye(3))
     spread = np.trace(alone, axis1=1, axis2=2) - 1.0 / (stiff + 0.5 * degree)

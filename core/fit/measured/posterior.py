@@ -9,11 +9,14 @@ pulling.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .crowding import crowding
+from .equations import Arrow, PhotoEquations, add_blocks
 from .forward import CellModel, Prediction
 from .prior import ChannelPrior
 
@@ -28,21 +31,26 @@ GAIN = 0.03  # prior deviation of a photo's own gain
 
 @dataclass(frozen=True)
 class Posterior:
-    """coefficients: (3, k). hessian: (3k + p, 3k + p), the precision at the optimum, channels one
-    after the other, then the photos' log gains. gains: {photo: gain}. residual: (m, 3) relative.
+    """coefficients: (3, k). precision: at the optimum, of the coefficients, channels one after the
+    other, and of the photos' log gains. gains: {photo: gain}. residual: (m, 3) relative.
     weight: (m, 3). without: {photo: (3, k)} coefficients had the photo not been there."""
 
     coefficients: NDArray[np.float64]
-    hessian: NDArray[np.float64]
+    precision: Arrow
     gains: dict[int, float]
     residual: NDArray[np.float64]
     weight: NDArray[np.float64]
     without: dict[int, NDArray[np.float64]]
 
+    @property
+    def hessian(self) -> NDArray[np.float64]:
+        """(3k + p, 3k + p), the precision as one matrix."""
+        return self.precision.dense()
+
     def covariance(self) -> NDArray[np.float64]:
         """(3, k, k) of each channel's coefficients, the gains integrated out."""
         k = self.coefficients.shape[1]
-        full = np.linalg.inv(self.hessian)[: 3 * k, : 3 * k].reshape(3, k, 3, k)
+        full = np.linalg.inv(self.precision.marginal()).reshape(3, k, 3, k)
         return np.stack([full[c, :, c] for c in range(3)])
 
 
@@ -58,38 +66,39 @@ def solve(
     """floor: log-relative deviation that the model is granted everywhere. together: so many cells
     count as one observation (tempering.py)."""
     k = len(prior.own)
-    photos = np.unique(model.cells.photo)
-    place = np.searchsorted(photos, model.cells.photo)
+    crowd = crowding(model.cells)[:, None]
+    photos, place = np.unique(model.cells.photo, return_inverse=True)
     p = len(photos)
-    precision = np.zeros((3 * k + p, 3 * k + p))
-    precision[: 3 * k, : 3 * k] = prior.precision()
-    precision[3 * k :, 3 * k :] = np.eye(p) / GAIN**2
-    prior_pull = prior.pull()
+    prior_precision, prior_pull = prior.precision(), prior.pull()
     state = np.zeros(3 * k + p)
     if start is not None:
         state[: 3 * k] = start.ravel()
     size = np.concatenate([np.tile(np.sqrt(prior.own + prior.shared), 3), np.full(p, GAIN)])
+    order = np.argsort(place, kind="stable")
+    cells = np.split(order, np.cumsum(np.bincount(place, minlength=p))[:-1])
     for _ in range(iterations):
         prediction = model.predict(state[: 3 * k].reshape(3, k))
         residual, weight = _residuals(model, prediction, state[3 * k :][place], floor)
-        weight = weight / together
-        hessian, gradient = _normal_equations(prediction, residual, weight, place, p)
-        pull = gradient.sum(axis=0) - precision @ state
-        pull[: 3 * k] += prior_pull
-        step = np.linalg.solve(hessian.sum(axis=0) + precision, pull)
+        weight = weight / (together * crowd)
+        each = (_equations(prediction, residual, weight, own) for own in cells)
+        total, pull = _summed(each, prior_precision, p)
+        pull[: 3 * k] += prior_pull - prior_precision @ state[: 3 * k]
+        pull[3 * k :] -= state[3 * k :] / GAIN**2
+        step = total.solve(pull)
         far = np.abs(step / size).max()
         state = state + step * min(1.0, STEP / max(far, 1e-12))
         if far < CLOSE:
             break
-    total = hessian.sum(axis=0) + precision
     without = {}
     if leave_out and p > 1:
-        for i, photo in enumerate(photos):
-            shift = np.linalg.solve(total - hessian[i], -gradient[i] + 0.0)
-            without[int(photo)] = (state + shift)[: 3 * k].reshape(3, k)
+        everything = total.marginal()
+        for i, (photo, own) in enumerate(zip(photos.tolist(), cells, strict=True)):
+            one = _equations(prediction, residual, weight, own)
+            shift = _left_out(everything, one, total.coupling[:, i], total.gains[i])
+            without[photo] = state[: 3 * k].reshape(3, k) + shift
     return Posterior(
         coefficients=state[: 3 * k].reshape(3, k),
-        hessian=total,
+        precision=total,
         gains={
             int(photo): float(np.exp(g)) for photo, g in zip(photos, state[3 * k :], strict=True)
         },
@@ -117,29 +126,38 @@ def _residuals(
     return residual, weight
 
 
-def _normal_equations(
+def _equations(
     prediction: Prediction,
     residual: NDArray[np.float64],
     weight: NDArray[np.float64],
-    place: NDArray[np.intp],
-    photos: int,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(hessians (p, 3k + p, 3k + p), gradients (p, 3k + p)) of every photo's cells."""
-    k = prediction.slopes[0].shape[1]
-    hessian = np.zeros((photos, 3 * k + photos, 3 * k + photos))
-    gradient = np.zeros((photos, 3 * k + photos))
-    for photo in range(photos):
-        own = place == photo
-        gain = 3 * k + photo
-        for c in range(3):
-            part = slice(c * k, (c + 1) * k)
-            w = weight[own, c].astype(np.float32)
-            rows = prediction.slopes[c][own]
-            weighted = rows * w[:, None]
-            hessian[photo, part, part] = weighted.T @ rows
-            gradient[photo, part] = weighted.T @ residual[own, c].astype(np.float32)
-            hessian[photo, part, gain] = weighted.sum(axis=0)
-            hessian[photo, gain, part] = weighted.sum(axis=0)
-            hessian[photo, gain, gain] += w.sum()
-            gradient[photo, gain] += w @ residual[own, c]
-    return hessian, gradient
+    own: NDArray[np.intp],
+) -> PhotoEquations:
+    """Of the cells ``own`` of one photo."""
+    return PhotoEquations.of([s[own] for s in prediction.slopes], residual[own], weight[own])
+
+
+def _summed(
+    each: Iterable[PhotoEquations], prior_precision: NDArray[np.float64], photos: int
+) -> tuple[Arrow, NDArray[np.float64]]:
+    """(precision of all cells and the prior, right-hand side (3k + p,) of the cells alone)."""
+    n = len(prior_precision)
+    total = Arrow(prior_precision.copy(), np.zeros((n, photos)), np.full(photos, GAIN**-2))
+    pull = np.zeros(n + photos)
+    for i, one in enumerate(each):
+        add_blocks(total.coefficients, one.blocks)
+        total.coupling[:, i] = one.coupling.ravel()
+        total.gains[i] += one.gain
+        pull[:n] += one.pull.ravel()
+        pull[n + i] = one.gain_pull
+    return total, pull
+
+
+def _left_out(
+    everything: NDArray[np.float64], one: PhotoEquations, coupling: NDArray[np.float64], gain: float
+) -> NDArray[np.float64]:
+    """(3, k) step of the coefficients from the optimum of all photos to that without one: without
+    its cells its gain says nothing of them. everything: (3k, 3k) precision with its gain integrated
+    out; coupling (3k,), gain: that gain's row of the whole precision."""
+    rest = everything + np.outer(coupling, coupling) / gain
+    add_blocks(rest, one.blocks, -1.0)
+    return np.linalg.solve(rest, -one.pull.ravel().astype(np.float64)).reshape(one.pull.shape)

@@ -1,9 +1,7 @@
-"""How many cells count as one observation.
+"""How much all cells count.
 
-Cells err together: the components' own error, and what is wrong with the scan, is alike in
-neighbouring cells. Taken for independent they would move coefficients that hardly matter where
-photos looked, and run wild where none did. Cells of a material unlike all measured ones would need
-coefficients larger than measured materials have; then more of them are taken for one.
+Cells of a material unlike all measured ones would need coefficients larger than measured materials
+have, and run wild where no photo looked; then they are believed less, all of them alike.
 """
 
 from __future__ import annotations
@@ -15,7 +13,7 @@ from .forward import CellModel
 from .posterior import Posterior, solve
 from .prior import ChannelPrior
 
-LEAST, MOST = 10.0, 40.0  # cells for one observation
+LEAST, MOST = 1.0, 4.0  # regions' votes (crowding.py) for one
 LARGEST = 0.4  # mean square of the coefficients, in units of the prior's variance
 TRIES = 4
 STEPS = 5  # of the solver, of each try

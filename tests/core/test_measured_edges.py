@@ -1,0 +1,375 @@
+"""Captures at the edge of what the measured fit is for: few, odd, broken, very many samples."""
+
+from __future__ import annotations
+
+import json
+import tracemalloc
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from patina.core.angles import Angles, half_difference
+from patina.core.basis import Basis
+from patina.core.basis.log_table import LogTable
+from patina.core.capture import read_capture
+from patina.core.errors import FitError
+from patina.core.fit.held_out import LeftOut, predicted, summarise
+from patina.core.fit.measured import MeasuredFit, MeasuredSettings, fit_measured
+from patina.core.fit.measured.cells import AngleCells, gather
+from patina.core.fit.measured.equations import Arrow
+from patina.core.fit.measured.crowding import crowding
+from patina.core.fit.measured.forward import CellModel
+from patina.core.fit.measured.held_out import carried_on
+from patina.core.fit.measured.normals import refine_normals
+from patina.core.fit.measured.patches import Patches
+from patina.core.fit.measured.posterior import GAIN, STEP, _residuals, solve
+from patina.core.fit.measured.prior import ChannelPrior
+from patina.core.fit.measured_result import MeasuredResult
+from patina.core.geometry import RayScene, view_surface
+from patina.core.job import inputs
+from patina.core.light import MountedLight
+from patina.core.samples import SampleTable, sample_photo
+from patina.core.samples.take import light_surface
+from tests import make_capture as made
+
+QUICK = MeasuredSettings(components=30, rounds=2)
+BALL, PLANE = "ball", "plane"
+
+
+def directions(count: int, seed: int) -> np.ndarray:
+    """Unit vectors (count, 3) around +z."""
+    v = np.random.default_rng(seed).normal(size=(count, 3)) * [1.0, 1.0, 0.5] + [0, 0, 1.2]
+    v[:, 2] = np.abs(v[:, 2]) + 0.1
+    return v / np.linalg.norm(v, axis=1, keepdims=True)
+
+
+def samples(
+    count: int,
+    photos: int = 3,
+    shape: str = BALL,
+    flash: bool = False,
+    grazing: bool = False,
+    rho: tuple[float, float, float] | None = None,
+) -> SampleTable:
+    """``count`` lit samples of all photos together, of a glossy material of the basis, or of a
+    Lambertian one; flash: the light at the camera; grazing: light and view within 15° of the
+    surface."""
+    rng = np.random.default_rng(7)
+    n = 40 * count
+    photo = rng.integers(0, photos, n)
+    view = directions(photos, 1)[photo]
+    light = view if flash else directions(photos, 2)[photo]
+    if grazing:
+        view, light = (
+            v / np.linalg.norm(v, axis=1, keepdims=True)
+            for v in (view * [1, 1, 0.1], light * [1, 1, 0.1])
+        )
+    normal = directions(n, 3) if shape == BALL else np.tile([0.0, 0.0, 1.0], (n, 1))
+    cos_i, cos_o = (np.sum(normal * v, axis=1) for v in (light, view))
+    seen = (cos_i > 0.1) & (cos_o > 0.1)
+    if grazing:
+        seen = (np.minimum(cos_i, cos_o) > 0.02) & (np.maximum(cos_i, cos_o) < 0.27)
+    rows = np.flatnonzero(seen)[:count]
+    assert len(rows) == count
+    photo = np.sort(photo[rows])
+    normal, view, light = (v[rows].astype(np.float32) for v in (normal, view, light))
+    angles = half_difference(normal, light, view)
+    cos_i, cos_o = cos_i[rows].astype(np.float32), cos_o[rows].astype(np.float32)
+    value = truth().evaluate(angles) if rho is None else np.tile(np.float32(rho), (count, 1))
+    point = normal if shape == BALL else rng.uniform(-1, 1, (count, 3)) * [1, 1, 0]
+    irradiance = np.full((count, 3), np.pi, np.float32)
+    return SampleTable(
+        photo=photo.astype(np.int16),
+        pixel=np.arange(count, dtype=np.int32),
+        theta_h=angles.theta_h.astype(np.float32),
+        theta_d=angles.theta_d.astype(np.float32),
+        phi_d=angles.phi_d.astype(np.float32),
+        cos_i=cos_i,
+        cos_o=cos_o,
+        rho=value,
+        radiance=value * irradiance * cos_i[:, None],
+        point=point.astype(np.float64),
+        normal=normal,
+        view=view,
+        curvature=np.full(count, np.nan, np.float32),
+        light=light,
+        irradiance=irradiance,
+        weight=np.ones(count, np.float32),
+    )
+
+
+def truth() -> LogTable:
+    c = np.zeros((3, 6))
+    c[:, 0], c[:, 1] = 0.04, [0.03, 0.02, 0.01]
+    return LogTable.of(Basis.default(), c)
+
+
+def is_whole(fit: MeasuredFit) -> None:
+    """Every number that is kept or told is one, and the report can write it."""
+    basis = fit.brdf.basis
+    nodes = Angles(*(a.ravel()[::97] for a in basis.grid.nodes()))
+    rho = fit.brdf.evaluate(nodes)
+    assert np.isfinite(rho).all() and (rho >= 0).all()
+    kept = MeasuredResult.of(fit)
+    assert np.isfinite(kept.band.values).all() and (kept.band.values > 0).all()
+    told = [
+        kept.normal_deviation,
+        fit.together,
+        *kept.gains.values(),
+        *vars(kept.band.spread()).values(),
+    ]
+    json.dumps([float(x) for x in told], allow_nan=False)
+    for other in fit.without.values():
+        assert np.isfinite(other.coefficients).all()
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        {"count": 50, "photos": 1},
+        {"count": 50, "photos": 25},
+        {"count": 300, "photos": 2},
+        {"count": 400, "shape": PLANE},
+        {"count": 400, "flash": True},
+        {"count": 400, "grazing": True},
+        {"count": 400, "rho": (0.0, 0.0, 0.0)},
+        {"count": 400, "rho": (0.3, 0.3, 0.3)},
+        {"count": 400, "rho": (0.3, 0.0, 0.0)},
+        {"count": 400, "rho": (1e6, 1e6, 1e6)},
+    ],
+    ids=lambda case: " ".join(str(v) for v in case.values()),
+)
+def test_odd_captures_give_whole_numbers(case: dict) -> None:
+    table = samples(**case)
+    fit = fit_measured(table, Basis.default(), QUICK)
+    is_whole(fit)
+    photos = np.unique(table.photo).tolist()
+    assert sorted(fit.without) == (photos if len(photos) > 1 else [])
+
+
+def test_a_grey_material_stays_grey() -> None:
+    fit = fit_measured(samples(400, rho=(0.3, 0.3, 0.3)), Basis.default(), QUICK)
+    c = fit.brdf.coefficients
+    assert np.allclose(c[0], c[1]) and np.allclose(c[0], c[2])
+
+
+def test_a_black_material_is_black() -> None:
+    table = samples(1000, rho=(0.0, 0.0, 0.0))
+    fit = fit_measured(table, Basis.default(), QUICK)
+    assert np.median(fit.brdf.evaluate(table.angles)) < 2e-3
+
+
+def test_all_samples_in_one_place() -> None:
+    table = samples(200)
+    patches = Patches.of_points(np.ones((200, 3)))
+    assert patches.count == 1 and patches.neighbours.shape == (1, 1)
+    is_whole(fit_measured(replace(table, point=np.ones((200, 3))), Basis.default(), QUICK))
+
+
+def test_broken_samples_are_left_out() -> None:
+    """NaN, infinity, no light: as if they had not been there."""
+    table = samples(600)
+    radiance, irradiance, point = (
+        np.array(a) for a in (table.radiance, table.irradiance, table.point)
+    )
+    radiance[3, 1], radiance[17] = np.nan, np.inf
+    irradiance[40, 2], irradiance[41] = 0.0, 1e-45
+    point[77, 0] = np.nan
+    bad = [3, 17, 40, 41, 77]
+    broken = replace(table, radiance=radiance, irradiance=irradiance, point=point)
+    fit = fit_measured(broken, Basis.default(), QUICK)
+    expected = fit_measured(table.select(np.delete(np.arange(600), bad)), Basis.default(), QUICK)
+    assert fit.samples == 595
+    assert fit.brdf.coefficients.tobytes() == expected.brdf.coefficients.tobytes()
+
+
+def test_too_few_whole_samples_are_refused() -> None:
+    table = samples(60)
+    radiance = np.array(table.radiance)
+    radiance[:20] = np.nan
+    with pytest.raises(FitError, match="40 lit samples"):
+        fit_measured(replace(table, radiance=radiance), Basis.default(), QUICK)
+
+
+def test_large_curved_patches_leave_a_normal_deviation() -> None:
+    """Patches that see all three axes: what is left of the prior's is no negative variance."""
+    table = samples(3000, photos=8)
+    octant = (table.normal > 0) @ np.array([1, 2, 4])
+    _, of = np.unique(octant, return_inverse=True)
+    patches = Patches.of_points(table.point[:60])
+    count = int(of.max()) + 1
+    few = replace(patches, of=of, count=count, neighbours=0.0 * patches.neighbours[:count, :count])
+    found = refine_normals(table, few, truth(), np.radians(1.0), 1e-3)
+    assert np.isfinite(found.deviation) and found.deviation > 0
+    assert np.isfinite(found.error).all()
+
+
+def model_of(photos: int, cells: int, basis: Basis) -> CellModel:
+    """Cells without a surface: random angles, radiance that disagrees by 30 %."""
+    rng = np.random.default_rng(5)
+    angles = Angles(*(rng.uniform(0, high, cells) for high in (0.6, 0.7, 6.2)))
+    return CellModel.of(
+        AngleCells(
+            np.sort(rng.integers(0, photos, cells)).astype(np.int16),
+            rng.integers(1, 40, cells),
+            angles,
+            np.exp(rng.normal(-2, 0.3, (cells, 3))),
+            np.zeros(cells),
+        ),
+        basis,
+    )
+
+
+def whole_matrices(
+    model: CellModel, prior: ChannelPrior, start: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, dict[int, np.ndarray]]:
+    """One step by whole matrices (3k + p)² of every photo: (precision, covariance, without)."""
+    k, (photos, place) = len(prior.own), np.unique(model.cells.photo, return_inverse=True)
+    p, n = len(photos), 3 * k
+    prediction = model.predict(start)
+    residual, weight = _residuals(model, prediction, np.zeros(len(place)), 0.15)
+    weight = weight / (10.0 * crowding(model.cells)[:, None])
+    each, pulls = np.zeros((p, n + p, n + p)), np.zeros((p, n + p))
+    for i in range(p):
+        own = place == i
+        for c in range(3):
+            part = slice(c * k, (c + 1) * k)
+            w, rows = weight[own, c].astype(np.float32), prediction.slopes[c][own]
+            weighted = rows * w[:, None]
+            each[i, part, part] = weighted.T @ rows
+            each[i, part, n + i] = each[i, n + i, part] = weighted.sum(axis=0)
+            each[i, n + i, n + i] += w.sum()
+            pulls[i, part] = weighted.T @ residual[own, c].astype(np.float32)
+            pulls[i, n + i] += w @ residual[own, c]
+    own_precision = np.zeros((n + p, n + p))
+    own_precision[:n, :n] = prior.precision()
+    own_precision[range(n, n + p), range(n, n + p)] = GAIN**-2
+    total = each.sum(axis=0) + own_precision
+    state = np.concatenate([start.ravel(), np.zeros(p)])
+    pull = pulls.sum(axis=0) - own_precision @ state
+    pull[:n] += prior.pull()
+    step = np.linalg.solve(total, pull)
+    size = np.concatenate([np.tile(np.sqrt(prior.own + prior.shared), 3), np.full(p, GAIN)])
+    state = state + step * min(1.0, STEP / np.abs(step / size).max())
+    full = np.linalg.inv(total)[:n, :n].reshape(3, k, 3, k)
+    out = {}
+    for i, photo in enumerate(photos.tolist()):
+        shift = np.linalg.solve(total - each[i], -pulls[i])
+        out[photo] = (state + shift)[:n].reshape(3, k)
+    return total, np.stack([full[c, :, c] for c in range(3)]), out
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+def test_leaving_out_agrees_with_whole_matrices(coupled: bool) -> None:
+    basis = Basis.default()
+    model = model_of(5, 600, basis)
+    prior = ChannelPrior.of(basis, 12, coupled)
+    prior = prior.anchored(carried_on(model, np.zeros((3, 12))), 1.0)
+    start = solve(model, prior, 0.15, None, False, 30, 10.0).coefficients
+    found = solve(model, prior, 0.15, start, True, 1, 10.0)
+    precision, covariance, without = whole_matrices(model, prior, start)
+    assert np.allclose(found.hessian, precision, rtol=1e-8, atol=1e-8)
+    assert np.allclose(found.covariance(), covariance, rtol=1e-8, atol=1e-8 * covariance.max())
+    size = np.sqrt(basis.coefficient_variance)
+    for photo, c in found.without.items():
+        assert np.abs(c - found.coefficients).max() > 0.05 * size  # or nothing is tested
+        assert np.abs(c - without[photo]).max() < 1e-8 * size
+
+
+@pytest.mark.parametrize("photos", [2, 4])
+def test_leaving_out_is_near_a_fit_without(photos: int) -> None:
+    """Photos that disagree by a tenth: one step goes to what the others alone say."""
+    basis = Basis.default()
+    table = samples(4000, photos)
+    colour = np.exp(np.random.default_rng(0).normal(0, 0.1, (photos, 3))).astype(np.float32)
+    table = replace(table, radiance=table.radiance * colour[table.photo])
+    model = CellModel.of(gather(table, 0.0), basis)
+    prior = ChannelPrior.of(basis, 20, coupled=False)
+    whole = solve(model, prior, 0.15, None, True, 60, 10.0)
+    for photo, c in whole.without.items():
+        rest = model.select(model.cells.photo != photo)
+        alone = solve(rest, prior, 0.15, whole.coefficients, False, 60, 10.0).coefficients
+        missed, moved = np.linalg.norm(c - alone), np.linalg.norm(whole.coefficients - alone)
+        assert missed < 0.15 * moved
+
+
+def test_an_arrow_is_its_matrix() -> None:
+    rng = np.random.default_rng(6)
+    n, p = 7, 5
+    root = rng.normal(size=(n, n))
+    arrow = Arrow(root @ root.T + 9 * np.eye(n), 0.5 * rng.normal(size=(n, p)), 4 + rng.random(p))
+    pull = rng.normal(size=n + p)
+    assert np.allclose(arrow.dense() @ arrow.solve(pull), pull)
+    inverse = np.linalg.inv(arrow.dense())[:n, :n]
+    assert np.allclose(np.linalg.inv(arrow.marginal()), inverse)
+
+
+def test_memory_does_not_grow_with_the_photos() -> None:
+    """Whole matrices of 400 photos would take 400 × 490² numbers, 770 MB; blocks 10 MB."""
+    basis = Basis.default()
+    prior = ChannelPrior.of(basis, 30, coupled=False)
+    peaks = []
+    for photos in (2, 400):
+        model = model_of(photos, 1200, basis)
+        assert len(basis.nodes)  # kept, and no part of what is measured
+        tracemalloc.start()
+        found = solve(model, prior, 0.15, iterations=1, together=10.0)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        assert len(found.without) == len(np.unique(model.cells.photo))
+    assert peaks[1] < peaks[0] + 20e6
+
+
+def test_cells_of_very_many_photos_stay_few() -> None:
+    table = samples(20_000, photos=2000)
+    cells = gather(table, 0.01)
+    assert len(cells) <= 60_000 and cells.count.sum() == 20_000
+    assert np.array_equal(np.unique(cells.photo), np.unique(table.photo))
+
+
+def test_a_black_photo_has_no_relative_error() -> None:
+    """A lens cap: its error is no fraction of its light, and drowns no other."""
+    table = samples(600)
+    dark = table.photo == 1
+    radiance = np.where(dark[:, None], np.float32(0), table.radiance)
+    table = replace(table, radiance=radiance)
+    fit = fit_measured(table, Basis.default(), QUICK)
+    held = summarise([predicted(table, p, fit.brdf) for p in (0, 1, 2)])
+    assert held is not None and sorted(held.per_photo) == [0, 2]
+    assert np.isfinite([held.error, held.typical]).all() and held.typical < 1.0
+    one = LeftOut(1, 2.0, 0.0, np.zeros(0), np.zeros(0, np.float32))
+    assert summarise([one]) is None
+
+
+def test_noise_below_black_divides_nothing() -> None:
+    """Most of a photo at and below zero, as dark raw frames are: no infinite relative error."""
+    table = samples(400, photos=1)
+    radiance = np.full_like(table.radiance, -1e-3)
+    radiance[:100] = 0.0
+    radiance[100:180] = table.radiance[100:180]
+    found = predicted(
+        replace(table, radiance=radiance), 0, fit_measured(table, Basis.default(), QUICK).brdf
+    )
+    assert np.isfinite(found.relative).all() and (found.relative >= 0).all()
+    assert len(found.relative) == 80
+
+
+def test_pixels_beside_a_narrow_beam_are_left_out(tmp_path: Path) -> None:
+    """A torch lights the middle of a photo that is black elsewhere: 0/0 is no reflectance."""
+    capture = read_capture(made.make_capture(tmp_path))
+    scan = inputs.open_scan(capture)
+    camera, rays = inputs.camera_of(capture, scan, 0), RayScene.build(scan.mesh)
+    view = view_surface(rays, camera)
+    torch = MountedLight("torch", np.zeros(3), np.full(3, 50.0), beam=np.radians(1.0))
+    lighting = light_surface(rays, view, torch, camera)
+    black = np.zeros((camera.height, camera.width, 3), np.float32)
+    lit = lighting.cos_i > 0.1
+    with np.errstate(all="raise", under="ignore"):
+        table = sample_photo(view, lighting, black, lit)
+    assert 0 < len(table) < lit.sum()
+    assert np.isfinite(table.rho).all()
+    towards = (view.point - camera.pose.centre) @ camera.pose.rotation[2]
+    angle = np.arccos(towards / np.linalg.norm(view.point - camera.pose.centre, axis=1))
+    assert np.isin(view.pixel[lit & (angle < np.radians(5))], table.pixel).all()
