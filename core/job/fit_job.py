@@ -246,7 +246,7 @@ class FitJob(Job):
     def _check_samples(self, index: int, table: SampleTable, marked: int, known: bool) -> None:
         name = self.capture.materials[index].name
         if len(table):
-            level = float(np.median(table.rho))
+            level = float(np.median(table.rho.mean(axis=1)))
             if level <= 0 or (known and not LEAST_RHO < level < LARGEST_RHO):
                 raise self.capture.error(
                     f"the typical reflectance of {name!r} is {level:.3g} / sr, which no surface "

@@ -99,7 +99,7 @@ def _samples(material: MaterialResult) -> str:
         return f"{material.samples:,} lit pixels, every one of them used"
     return (
         f"{material.samples:,} lit pixels: {material.used:,} of them, which stand for the others "
-        "of their photo and angles"
+        "of their photo"
     )
 
 
