@@ -45,9 +45,9 @@ def test_recovers_a_coat():
 
 def test_the_mean_material_is_nearer_than_a_diffuse_one_and_quick():
     basis = Basis.default()
-    start = time.perf_counter()
+    start = time.process_time()
     fit = fit_principled(PrincipalBRDF(basis, np.zeros((3, 5))).evaluate)
-    assert time.perf_counter() - start < 10  # 1 s on a quiet machine
+    assert time.process_time() - start < 10  # of the processor; 1 s on a quiet machine
     assert fit.error < 0.5 * fit.diffuse_error
     assert fit.error < 0.2  # its lobe is no GGX
     assert set(fit.errors) >= {"diffuse", "glossy", "metal"}
