@@ -7,12 +7,12 @@ from pathlib import Path
 from patina.core.capture import read_capture
 from patina.core.geometry import RayScene, SurfaceView, view_surface
 from patina.core.job import inputs
-from patina.core.job.job import drained
 from patina.core.job.lights import find_lights
 from patina.core.job.photos import LitPhotos
 from patina.core.job.sampling import take_samples
 from patina.core.samples import Margins, SampleTable, sample_photo
 from patina.core.samples.take import light_surface, trusted_pixels
+from patina.core.steps import drained
 
 
 def sampled(path: Path) -> tuple[SampleTable, list[SurfaceView]]:

@@ -69,13 +69,13 @@ def _samples(path: Path) -> _Case:
     from patina.core.capture import read_capture
     from patina.core.geometry import RayScene, view_surface
     from patina.core.job import inputs
-    from patina.core.job.job import drained
     from patina.core.job.lights import find_lights, refined
     from patina.core.job.photos import LitPhotos
     from patina.core.photo.transfer import Transfer
     from patina.core.samples import SampleTable, sample_photo
     from patina.core.samples.level import at_typical_level
     from patina.core.samples.take import light_surface, trusted_pixels
+    from patina.core.steps import drained
 
     capture, basis = read_capture(path), Basis.default()
     scan = inputs.open_scan(capture)

@@ -5,11 +5,8 @@ from __future__ import annotations
 import sys
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, TypeVar
-
-Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -28,15 +25,6 @@ class Step:
 
     stage: str
     fraction: float
-
-
-def drained(steps: Generator[Any, None, Result]) -> Result:
-    """What a stepped piece of work returns, all of it at once."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return end.value
 
 
 class Job(ABC):

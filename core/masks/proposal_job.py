@@ -12,13 +12,14 @@ from ..capture import Capture
 from ..errors import FitError
 from ..geometry import RayScene, view_surface
 from ..job import inputs
-from ..job.job import Job, Step, drained
+from ..job.job import Job, Step
 from ..job.lights import Lights, find_lights, refined
 from ..job.photos import LitPhotos
 from ..samples import sample_photo
 from ..samples.level import at_typical_level
 from ..samples.take import light_surface, trusted_pixels
 from ..scan import Scan
+from ..steps import drained
 from .proposal import Proposal, propose_materials
 from .proposal_cells import Cells
 

@@ -42,7 +42,7 @@ def polar_chart(curves: Sequence[Curve], incidence_degrees: float) -> str:
     theta_o, angles = slice_angles(np.radians(incidence_degrees))
     values = [np.maximum(np.asarray(c.evaluate(angles), np.float64), 0) for c in curves]
     top = max(float(v.max()) for v in values)
-    ring = _round_up(top)
+    ring = round_up(top)
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {CENTRE_Y + 26}" '
         f'role="img" aria-label="polar slice at {incidence_degrees:g} degrees">',
@@ -107,7 +107,7 @@ def _shaded(
     ]
 
 
-def _round_up(x: float) -> float:
+def round_up(x: float) -> float:
     """The next of 1, 2, 5 × 10ⁿ."""
     power = 10.0 ** np.floor(np.log10(max(x, 1e-9)))
     return next(m * power for m in (1, 2, 5, 10) if m * power >= x * (1 - 1e-9))

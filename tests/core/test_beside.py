@@ -10,7 +10,7 @@ import pytest
 
 from patina.core.errors import FitError
 from patina.core.job.beside import beside, stepped_beside
-from patina.core.job.job import drained
+from patina.core.steps import drained
 
 
 def slow_steps(seconds: float, seen: list[str]) -> Generator[float, None, str]:

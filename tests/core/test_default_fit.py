@@ -17,9 +17,9 @@ from patina.core.capture import read_capture
 from patina.core.fit.held_out import predicted, summarise
 from patina.core.fit.measured_result import MeasuredResult
 from patina.core.job.estimators import Estimate, estimate
-from patina.core.job.job import drained
 from patina.core.job.warnings import trust_warnings
 from patina.core.samples import SampleTable
+from patina.core.steps import drained
 from tests import make_capture as made
 from tests.sampled import sampled, sampled_materials
 

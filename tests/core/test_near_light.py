@@ -15,11 +15,11 @@ from patina.core.capture import read_capture
 from patina.core.errors import InputError
 from patina.core.geometry import RayScene
 from patina.core.job import inputs
-from patina.core.job.job import drained
 from patina.core.job.lights import find_lights, refined
 from patina.core.job.photos import LitPhotos
 from patina.core.light import DistantLight, MountedLight, NearLight
 from patina.core.scan import Camera, Pose
+from patina.core.steps import drained
 from tests import make_capture as made
 from tests.sampled import sampled
 

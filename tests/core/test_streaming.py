@@ -17,7 +17,6 @@ from patina.core.geometry import PixelRays, RayScene, bands, edges, view_surface
 from patina.core.geometry.window import whole
 from patina.core.job import FitJob, inputs, sampling
 from patina.core.job.in_order import in_order
-from patina.core.job.job import drained
 from patina.core.job.lights import find_lights
 from patina.core.job.photos import LitPhotos
 from patina.core.job.sampling import take_samples
@@ -26,6 +25,7 @@ from patina.core.samples.reservoir import sample_hash, water_level
 from patina.core.samples.take import halo, inner_pixels, light_surface, trusted_pixels
 from patina.core.scan import Camera, Mesh
 from patina.core.scan.camera import Pose
+from patina.core.steps import drained
 from tests import make_capture as made
 
 VIEW = ("pixel", "face", "point", "normal", "view", "curvature")

@@ -22,7 +22,6 @@ X_LABELS = {
     "curvature": "largest curvature allowed, 1/pixel",
     "photos": "lit photos",
     "mesh error, bumpy": "median normal error, degrees",
-    "mesh error, wavy": "median normal error, degrees",
     "mesh error, blurred": "median normal error, degrees",
     "stereo tool": "mesh of",
 }

@@ -8,7 +8,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from patina.core.report.polar import COLOURS, slice_angles
+from patina.core.report.polar import COLOURS, round_up, slice_angles
 
 from .svg import FAINT
 
@@ -25,7 +25,7 @@ def half_circle(
     panels of one material can share it. Light from the left at ``incidence`` degrees.
     """
     theta, _ = slice_angles(np.radians(incidence))
-    ring, centre = _round_up(top), WIDTH / 2
+    ring, centre = round_up(top), WIDTH / 2
     out = [f'<text x="8" y="13" class="t">{escape(title)}</text>']
     for part in (1.0, 0.1, 0.01):
         r = RADIUS * np.cbrt(part)
@@ -66,8 +66,3 @@ def _simplified(xs: NDArray, ys: NDArray) -> list[int]:
         if np.hypot(xs[k] - xs[keep[-1]], ys[k] - ys[keep[-1]]) >= 1.5:
             keep.append(k)
     return [*keep, len(xs) - 1]
-
-
-def _round_up(x: float) -> float:
-    power = 10.0 ** np.floor(np.log10(max(x, 1e-9)))
-    return float(next(m * power for m in (1, 2, 5, 10) if m * power >= x * (1 - 1e-9)))

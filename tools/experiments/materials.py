@@ -39,12 +39,6 @@ FLAT = frozenset(
 )  # fmt: skip
 """Fabric, latex, felt and paper: materials without a highlight to speak of."""
 
-OUT_OF_SPAN = frozenset(
-    ("cc_blue_agat_rgb", "cc_iris_purple_gem_rgb", "chm_orange_rgb", "irid_flake_paint1_fine_rgb",
-     "irid_flake_paint1_rgb", "irid_flake_paint2_rgb")
-)  # fmt: skip
-"""Sharp coats and flakes, which no material of MERL resembles."""
-
 
 @dataclass(frozen=True)
 class Material:
@@ -53,11 +47,6 @@ class Material:
     name: str
     weights: NDArray[np.float32]
     trained: bool
-
-    @property
-    def flat(self) -> bool:
-        """True for fabric, latex, felt and paper."""
-        return self.name in FLAT
 
     def evaluate(self, angles: Angles) -> NDArray[np.float32]:
         """True ρ (..., 3) in 1/sr, from the network itself."""

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from ...angles import Angles, cosines
 from ...basis import Basis, mapping
 from .cells import AngleCells
-from .lobes import Lobes
+from .forward import CellModel
+from .lobes import Lobes, fit_lobes
 
 THETA_H = (0.2, 0.6, 1.2, 2.0, 4.0, 7.0, 12.0, 20.0, 30.0, 45.0)  # degrees
 BEYOND = 3.0  # degrees between rows of anchors, the first so far from what was seen
@@ -68,6 +69,12 @@ class Anchors:
         mapped = expected - centre[:, None]
         weight = INDEPENDENT / len(q)
         return cls(weight * q.T @ q, weight * (mapped.T @ q))
+
+
+def carried_on(model: CellModel, coefficients: NDArray[np.float64]) -> Anchors:
+    """Anchors beyond what a model's cells saw, from the BRDF found there."""
+    edge = seen_edge(model.cells)
+    return Anchors.of(fit_lobes(model.cells), model.basis, coefficients, edge)
 
 
 def seen_edge(cells: AngleCells) -> float:

@@ -55,7 +55,8 @@ def gather(
     table: SampleTable, normal_error: NDArray[np.floating] | float, wider: float = 1.0
 ) -> AngleCells:
     """Cells of a table; normal_error: (n,) radians of each sample, or one for all."""
-    key = _keys(table, wider)
+    phi = unfolded_phi_d(table)
+    key = _keys(table, phi, wider)
     _, where, count = np.unique(key, return_inverse=True, return_counts=True)
     m = len(count)
     if m > MOST:
@@ -65,7 +66,6 @@ def gather(
     def mean(values: NDArray[np.floating]) -> NDArray[np.float64]:
         return np.bincount(where, values, m) / count
 
-    phi = unfolded_phi_d(table)
     phi_d = np.mod(np.arctan2(mean(np.sin(phi)), mean(np.cos(phi))), 2 * np.pi)
     angles = Angles(mean(table.theta_h), mean(table.theta_d), phi_d)
     # mean angles stand for the cell: the cosine's own change within it is taken out
@@ -97,11 +97,11 @@ def theta_h_edges(wider: float = 1.0) -> NDArray[np.float64]:
     return np.radians(edges)
 
 
-def _keys(table: SampleTable, wider: float) -> NDArray[np.int64]:
+def _keys(table: SampleTable, phi_d: NDArray[np.float64], wider: float) -> NDArray[np.int64]:
     ih = np.searchsorted(theta_h_edges(wider), table.theta_h, side="right").astype(np.int64)
     i_d = (np.degrees(table.theta_d) / (wider * THETA_D)).astype(np.int64)
     width = np.full(len(table), PHI_D[-1][1])
     for below, degrees in reversed(PHI_D[:-1]):
         width[table.theta_h < np.radians(below)] = degrees
-    ip = (np.degrees(unfolded_phi_d(table)) / (wider * width)).astype(np.int64)
+    ip = (np.degrees(phi_d) / (wider * width)).astype(np.int64)
     return ((table.photo.astype(np.int64) * 512 + ih) * 64 + i_d) * 64 + ip

@@ -13,18 +13,18 @@ from ...basis import Basis, PrincipalBRDF
 from ...basis.log_table import LogTable
 from ...errors import FitError
 from ...samples import SampleTable
-from . import held_out
+from ...steps import drained
+from .anchors import carried_on
 from .caution import caution
 from .cells import gather
 from .forward import CellModel
 from .normals import TOLERANCE, refine_normals
 from .patches import Patches
-from .posterior import Posterior, solve
+from .posterior import solve
 from .prior import ChannelPrior
 from .tempering import LEAST, tempered
 
 FEWEST = 50  # samples
-CLEARLY = 0.98  # of the first choice's held-out misfit
 SETTLED = 0.02  # RMS change of ln ρ, all directions alike: the normals are refined enough
 CHUNK = 1 << 15
 WIDER = 1.5  # bands, than the posterior: no material is a draw from the measured ones' distribution
@@ -36,37 +36,32 @@ class MeasuredSettings:
     """components: how many of the basis, None for all. floor: log-relative deviation granted to
     the components themselves. normal_deviation: degrees per tangent that the scan's normals are
     off by, to begin with. rounds: of refining normals at most, 0 for none. coupled: the
-    channels share what measured materials' channels share. trusts: log-relative deviations of the
-    anchors in unseen directions (infinite: no anchors); what held-out photos prefer is taken."""
+    channels share what measured materials' channels share. trust: log-relative deviation of the
+    anchors in unseen directions (infinite: no anchors)."""
 
     components: int | None = None
     floor: float = 0.15
     normal_deviation: float = 1.0
     rounds: int = 8
     coupled: bool = False
-    trusts: tuple[float, ...] = (1.5,)
+    trust: float = 1.5
 
 
 @dataclass(frozen=True)
 class MeasuredFit:
-    """brdf: the most probable one. samples: number used. normal_deviation: degrees per tangent,
-    what the scan's normals are off by. gains: photo → its own gain. trust: of the anchors that was
-    chosen. without: photo → the BRDF had it not been there. refined: the samples under corrected
-    normals. covariance: (3, k, k) of each channel's coefficients. together: how many regions'
-    votes count as one (crowding.py, tempering.py)."""
+    """brdf: the most probable one, cautious where that is unsure (caution.py). samples: how many.
+    normal_deviation: degrees per tangent, what the scan's normals are off by. gains: photo → its
+    own gain. anchoring: what unseen directions rest on, in words. without: photo → the BRDF had it
+    not been there. covariance: (3, k, k) of each channel's coefficients. together: how many
+    regions' votes count as one (crowding.py, tempering.py)."""
 
     brdf: PrincipalBRDF
     samples: int
     normal_deviation: float
     gains: dict[int, float]
-    trust: float
     anchoring: str
     without: dict[int, PrincipalBRDF]
-    refined: SampleTable
     covariance: NDArray[np.float64]
-    floor: float
-    posterior: Posterior
-    model: CellModel
     together: float
     warnings: tuple[str, ...] = ()
 
@@ -89,13 +84,7 @@ def fit_measured(
     table: SampleTable, basis: Basis, settings: MeasuredSettings | None = None
 ) -> MeasuredFit:
     """Fit one material. Raises FitError where there are too few samples."""
-    steps = measured_steps(table, basis, settings)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            found: MeasuredFit = end.value
-            return found
+    return drained(measured_steps(table, basis, settings))
 
 
 def measured_steps(
@@ -114,7 +103,6 @@ def measured_steps(
     yield 0.0
     model = CellModel.of(gather(table, deviation), basis)
     found, together = tempered(model, prior, s.floor)
-    refined = table
     patches = Patches.of_points(table.point) if s.rounds else None
     for done in range(s.rounds if patches is not None else 0):
         yield 0.1 + 0.6 * done / s.rounds
@@ -123,9 +111,9 @@ def measured_steps(
         # a BRDF unlike measured ones is itself in doubt: normals must not explain what it cannot
         tolerance = TOLERANCE * float(np.sqrt(together / LEAST))
         normals = refine_normals(table, patches, brdf, deviation, tolerance)
-        deviation, refined = normals.deviation, normals.table
+        deviation = normals.deviation
         yield 0.1 + 0.6 * (done + 0.5) / s.rounds
-        model = CellModel.of(gather(refined, normals.error), basis)
+        model = CellModel.of(gather(normals.table, normals.error), basis)
         before = brdf.values
         together = max(LEAST, together / 2)
         found, together = tempered(model, prior, s.floor, found.coefficients, together)
@@ -133,9 +121,10 @@ def measured_steps(
         if np.sqrt(np.mean(change**2)) < SETTLED:
             break
     yield 0.7
-    final = yield from _preferred(model, s, found, prior, together)
+    if np.isfinite(s.trust):
+        prior = prior.anchored(carried_on(model, found.coefficients), s.trust)
     yield 0.95
-    found = solve(model, final, s.floor, found.coefficients, together=together)
+    found = solve(model, prior, s.floor, found.coefficients, together=together)
     covariance = found.covariance()
     careful = caution(basis, covariance)
     return MeasuredFit(
@@ -143,14 +132,9 @@ def measured_steps(
         samples=len(table),
         normal_deviation=float(np.degrees(deviation)),
         gains=found.gains,
-        trust=final.trust,
-        anchoring=_told(final.trust),
+        anchoring=_told(s.trust),
         without={p: PrincipalBRDF(basis, c + careful) for p, c in found.without.items()},
-        refined=refined,
         covariance=covariance,
-        floor=s.floor,
-        posterior=found,
-        model=model,
         together=together,
     )
 
@@ -166,27 +150,6 @@ def _finite(table: SampleTable) -> SampleTable:
     for values in (*table.angles, table.cos_i):
         good &= np.isfinite(values)
     return table if good.all() else table.select(good)
-
-
-def _preferred(
-    model: CellModel, s: MeasuredSettings, found: Posterior, prior: ChannelPrior, together: float
-) -> Generator[float, None, ChannelPrior]:
-    """The prior with the trust in anchors that predicts held-out photos best."""
-    trust = s.trusts[0]
-    if len(s.trusts) > 1:
-        steps = held_out.scores(model, prior, s.trusts, s.floor, found.coefficients, together)
-        while True:
-            try:
-                yield 0.75 + 0.2 * next(steps)
-            except StopIteration as end:
-                scores = end.value
-                break
-        if scores:
-            scores[0] *= CLEARLY  # the first is the safest: another must predict clearly better
-            trust = s.trusts[int(np.argmin(scores))]
-    if not np.isfinite(trust):
-        return prior
-    return prior.anchored(held_out.carried_on(model, found.coefficients), trust)
 
 
 def _told(trust: float) -> str:

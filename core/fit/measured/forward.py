@@ -32,9 +32,10 @@ class Prediction:
 class CellModel:
     """The forward model of one set of cells in one basis.
 
-    observed: (m, 3) like Prediction.level. factor: (m, j) what exp(log) − ε of a scattered normal
+    observed: (m, 3) like Prediction.level. scale: (m,) cosMap/cos θi of the cells. share: (j,)
+    weights of the scattered normals. factor: (m, j) what exp(log) − ε of a scattered normal
     adds to ρ·cos θi. index, weight: (m, j, 8) nodes and their weights. slot: (m·j·8,) where each
-    falls in the distinct (cell, node) pairs, whose rows and columns are ``cell`` and ``node``.
+    falls in the distinct (cell, node) pairs: those of cell i are node[indptr[i]:indptr[i + 1]].
     """
 
     basis: Basis

@@ -32,20 +32,13 @@ GAIN = 0.03  # prior deviation of a photo's own gain
 @dataclass(frozen=True)
 class Posterior:
     """coefficients: (3, k). precision: at the optimum, of the coefficients, channels one after the
-    other, and of the photos' log gains. gains: {photo: gain}. residual: (m, 3) relative.
-    weight: (m, 3). without: {photo: (3, k)} coefficients had the photo not been there."""
+    other, and of the photos' log gains. gains: {photo: gain}. without: {photo:
+    (3, k)} coefficients had the photo not been there."""
 
     coefficients: NDArray[np.float64]
     precision: Arrow
     gains: dict[int, float]
-    residual: NDArray[np.float64]
-    weight: NDArray[np.float64]
     without: dict[int, NDArray[np.float64]]
-
-    @property
-    def hessian(self) -> NDArray[np.float64]:
-        """(3k + p, 3k + p), the precision as one matrix."""
-        return self.precision.dense()
 
     def covariance(self) -> NDArray[np.float64]:
         """(3, k, k) of each channel's coefficients, the gains integrated out."""
@@ -63,8 +56,8 @@ def solve(
     iterations: int = ITERATIONS,
     together: float = 1.0,
 ) -> Posterior:
-    """floor: log-relative deviation that the model is granted everywhere. together: so many cells
-    count as one observation (tempering.py)."""
+    """floor: log-relative deviation that the model is granted everywhere. together: so many votes
+    of a region (crowding.py) count as one (tempering.py)."""
     k = len(prior.own)
     crowd = crowding(model.cells)[:, None]
     photos, place = np.unique(model.cells.photo, return_inverse=True)
@@ -102,8 +95,6 @@ def solve(
         gains={
             int(photo): float(np.exp(g)) for photo, g in zip(photos, state[3 * k :], strict=True)
         },
-        residual=residual,
-        weight=weight,
         without=without,
     )
 

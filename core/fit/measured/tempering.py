@@ -32,8 +32,8 @@ def tempered(
     start: NDArray[np.float64] | None = None,
     together: float = LEAST,
 ) -> tuple[Posterior, float]:
-    """(solution without held-out photos, how many cells count as one observation); together: to
-    begin with."""
+    """(solution without held-out photos, how many of a region's votes count as one); together:
+    to begin with."""
     for _ in range(TRIES):
         found = solve(
             model, prior, floor, start, leave_out=False, iterations=STEPS, together=together
