@@ -75,9 +75,15 @@ def test_rank_correlation_of_a_known_order() -> None:
 def test_only_some_estimators_replace_their_own_records() -> None:
     old = [record("paper", "a", 1.0), record("ours", "a", 2.0)]
     new = [record("ours", "a", 0.5)]
-    kept = runs.merged(old, new, ["ours"])
+    kept = runs.merged(old, new, ["ours"], ended=True)
     assert [(r["estimator"], r["log_rms"]) for r in kept] == [("paper", 1.0), ("ours", 0.5)]
-    assert runs.merged(old, new, None) == new
+    assert runs.merged(old, new, None, ended=True) == new
+
+
+def test_a_run_that_is_broken_off_loses_none_of_the_last() -> None:
+    old = [record("ours", "a", 2.0), record("ours", "b", 3.0)]
+    kept = runs.merged(old, [record("ours", "a", 0.5)], None, ended=False)
+    assert [(r["material"], r["log_rms"]) for r in kept] == [("b", 3.0), ("a", 0.5)]
 
 
 def test_only_the_marked_part_is_replaced() -> None:

@@ -52,11 +52,12 @@ def main() -> int:
             old = store.load(name, told.quick) or []
 
             def keep(records: Records, name: str = name, old: Records = old) -> None:
-                store.save(name, merged(old, records, told.only), told.quick)
+                store.save(name, merged(old, records, told.only, ended=False), told.quick)
 
             records = run_all(
                 name, module.work, module.tasks(told.quick), told.workers, told.only, keep
             )
+            store.save(name, merged(old, records, told.only, ended=True), told.quick)
             say(f"{name}: {len(records)} records, {time.perf_counter() - since:.0f} s")
     if told.quick:
         print(document.summary())

@@ -44,12 +44,27 @@ def run_all(
     return _in_order(results)
 
 
-def merged(old: Records, new: Records, only: Sequence[str] | None) -> Records:
-    """New records in place of those of the same estimators; everything where all were run."""
+IDENTITY = (
+    "sweep", "where", "value", "label", "variant", "kind",
+    "scene", "material", "estimator", "in_basis", "seed",
+)  # fmt: skip
+"""What tells one record from another, where it has it."""
+
+
+def merged(old: Records, new: Records, only: Sequence[str] | None, ended: bool) -> Records:
+    """New records in place of the old: until a run has ended, in place of the same cases alone (one
+    that is broken off loses nothing); then of all, or of the estimators that were run."""
+    if not ended:
+        made = {_identity(record) for record in new}
+        return [record for record in old if _identity(record) not in made] + new
     if only is None:
         return new
-    made = {record.get("estimator") for record in new}
-    return [record for record in old if record.get("estimator") not in made] + new
+    names = {record.get("estimator") for record in new}
+    return [record for record in old if record.get("estimator") not in names] + new
+
+
+def _identity(record: dict[str, Any]) -> tuple[Any, ...]:
+    return tuple(str(record.get(key)) for key in IDENTITY)
 
 
 def _start(only: Sequence[str] | None) -> None:
