@@ -31,6 +31,9 @@ def main() -> int:
         "--only", nargs="+", metavar="ESTIMATOR",
         help='run these estimators alone ("ours", "paper" ...), keep the other results',
     )  # fmt: skip
+    parser.add_argument(
+        "--scenes", nargs="+", metavar="SCENE", help="these scenes alone, keep the other results"
+    )
     told = parser.parse_args()
     unknown = [name for name in told.names if name not in NAMES]
     if unknown:
@@ -54,10 +57,12 @@ def main() -> int:
             def keep(records: Records, name: str = name, old: Records = old) -> None:
                 store.save(name, merged(old, records, told.only, ended=False), told.quick)
 
-            records = run_all(
-                name, module.work, module.tasks(told.quick), told.workers, told.only, keep
-            )
-            store.save(name, merged(old, records, told.only, ended=True), told.quick)
+            tasks = module.tasks(told.quick)
+            if told.scenes:
+                tasks = [t for t in tasks if not set(told.scenes).isdisjoint(map(str, t))]
+            records = run_all(name, module.work, tasks, told.workers, told.only, keep)
+            all_made = merged(old, records, told.only, ended=not told.scenes)
+            store.save(name, all_made, told.quick)
             say(f"{name}: {len(records)} records, {time.perf_counter() - since:.0f} s")
     if told.quick:
         print(document.summary())
