@@ -10,6 +10,7 @@ MODULES: tuple[str, ...] = (
     "scene.properties",
     "scene.osl_files",
     "scene.lamps",
+    "scene.worlds",
     "operators.import_capture",
     "operators.solve",
     "operators.masks",

@@ -21,12 +21,14 @@ COMMANDS = {
     "fit": "fit",
     "import": "import_",
     "masks": "masks",
+    "maps": "maps",
     "solve": "solve",
     "localise": "localise",
     "demo": "demo",
     "basis": "basis",
     "build-basis": "build_basis",
     "compare": "compare",
+    "material": "material",
 }
 
 

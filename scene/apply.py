@@ -32,7 +32,7 @@ def apply_result(
         old = next((m for m in measured_materials() if _is(m, fitted.name, capture)), None)
         brdf = fitted.fit.brdf
         files = osl_files.ensure_files(brdf) if with_osl else None
-        new = materials.create_material(fitted.name, brdf, fitted.principled, files)
+        new = materials.create_material(fitted.name, brdf, fitted.principled, files, fitted.lobes)
         new[MEASURED], new[CAPTURE] = fitted.name, capture
         if old is not None:
             name = old.name

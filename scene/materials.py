@@ -1,8 +1,8 @@
 """A BRDF as a Blender material: measured in Cycles, portable everywhere else.
 
-Two outputs: the OSL shader goes to one with target CYCLES, the Principled to one with target ALL
-that is the active one. Cycles renders the first; EEVEE shows, and glTF, USD and MaterialX export,
-the second.
+Three outputs: the OSL shader goes to one with target CYCLES, the lobe stack to one with target
+EEVEE, the Principled to one with target ALL that is the active one. Cycles renders the first (where
+OSL is missing, the lobe stack); EEVEE shows the second; glTF, USD and MaterialX export the third.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import importlib.util
 import logging
 import os
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,12 +21,15 @@ import bpy
 import numpy as np
 
 from ..core.appearance import osl_atlas, osl_source
+from ..core.appearance.lobe_fit import LobeStackFit
 from ..core.appearance.principled import Principled
 from ..core.appearance.principled_fit import PrincipledFit
 from ..core.basis import Basis, PrincipalBRDF
 from ..core.errors import PatinaError
 from .lamps import update_lamps
-from .osl_files import PROPERTIES, pack
+from .lobe_group import add_lobe_stack
+from .osl_files import PROPERTIES, ShaderFiles, pack
+from .worlds import update_worlds
 
 log = logging.getLogger(__name__)
 
@@ -50,6 +53,8 @@ PRINCIPLED_SOCKETS = {
     "coat_weight": "Coat Weight",
     "coat_roughness": "Coat Roughness",
     "coat_ior": "Coat IOR",
+    "coat_tint": "Coat Tint",
+    "diffuse_roughness": "Diffuse Roughness",  # Blender 4.2 has none
 }
 
 
@@ -65,11 +70,16 @@ def osl_missing() -> str | None:
 
 
 def create_material(
-    name: str, brdf: PrincipalBRDF, principled: PrincipledFit, files: Mapping[str, Path] | None
+    name: str,
+    brdf: PrincipalBRDF,
+    principled: PrincipledFit,
+    files: ShaderFiles | None,
+    lobes: LobeStackFit | None = None,
 ) -> bpy.types.Material:
-    """A material of both kinds; without OSL only the portable one, and the material says why.
+    """A material of every kind; without OSL only the portable ones, and the material says why.
 
-    files: the shader's EXRs by socket (osl_files.ensure_files); None without OSL.
+    files: the shader's EXRs by socket (osl_files.ensure_files); None without OSL. lobes: what
+    EEVEE shows; None: the Principled.
     """
     material = bpy.data.materials.new(name)
     if material.node_tree is None:
@@ -77,6 +87,7 @@ def create_material(
     tree = material.node_tree
     tree.nodes.clear()
     _portable_branch(tree, principled)
+    stack = None if lobes is None else _lobe_branch(tree, lobes)
     seen = principled.principled  # in Solid mode
     material.diffuse_color = (*(float(c) for c in np.clip(seen.base_color, 0, 1)), 1.0)
     material.metallic, material.roughness = seen.metallic, seen.roughness
@@ -88,19 +99,22 @@ def create_material(
     elif reason is None:
         try:
             text = osl_text(brdf.basis, osl_atlas.traits(brdf.coefficients.shape[1]))
-            _osl_branch(tree, text, brdf, principled.principled, files)
+            _osl_branch(tree, text, brdf, files)
         except OslError as error:
             reason = str(error)
     if reason is not None or files is None:
         material[REASON_PROPERTY] = reason
+        if stack is not None:
+            _output(tree, stack, "CYCLES", "Cycles")
         return material
-    for socket, path in files.items():
+    for socket, path in files.paths.items():
         material[PROPERTIES[socket]] = path.name
         pack(path)
     # lamps evaluated in the shader leave it as emission; the mesh is no lamp to aim at
     material.cycles.emission_sampling = "NONE"
     bpy.context.view_layer.update()  # lamps just made have no world matrix yet
     update_lamps(bpy.context.scene)
+    update_worlds(bpy.context.scene)
     return material
 
 
@@ -143,16 +157,33 @@ def _compile(source: str) -> str:
 
 
 def _portable_branch(tree: bpy.types.NodeTree, fit: PrincipledFit) -> None:
-    frame = _frame(tree, "Portable: EEVEE and exporters", (0, -420))
+    frame = _frame(tree, "Portable: exporters", (0, -420))
     node = tree.nodes.new("ShaderNodeBsdfPrincipled")
     node.label = f"Principled fit (error {100 * fit.error:.1f} %)"
     node.parent, node.location = frame, (0, -40)
     fill_principled(node, fit.principled)
+    _output(tree, node, "ALL", "Portable").is_active_output = True
+
+
+def _lobe_branch(tree: bpy.types.NodeTree, fit: LobeStackFit) -> bpy.types.Node:
+    frame = _frame(tree, "Lobe stack: EEVEE, and Cycles without OSL", (0, -1120))
+    node = add_lobe_stack(tree, fit.stack, (0, -40))
+    node.label = f"Lobe stack (error {100 * fit.error:.1f} %)"
+    node.parent = frame
+    _output(tree, node, "EEVEE", "EEVEE")
+    return node
+
+
+def _output(
+    tree: bpy.types.NodeTree, node: bpy.types.Node, target: str, label: str
+) -> bpy.types.Node:
+    """An output beside the node, for renderers of one kind; not the active one."""
     output = tree.nodes.new("ShaderNodeOutputMaterial")
-    output.label, output.target = "Portable", "ALL"
-    output.parent, output.location = frame, (320, -40)
+    output.label, output.target, output.is_active_output = label, target, False
+    taken = sum(link.from_node == node for link in tree.links)
+    output.parent, output.location = node.parent, (320, -40 - 160 * taken)
     tree.links.new(node.outputs["BSDF"], output.inputs["Surface"])
-    output.is_active_output = True
+    return output
 
 
 def fill_principled(node: bpy.types.Node, principled: Principled) -> None:
@@ -160,6 +191,8 @@ def fill_principled(node: bpy.types.Node, principled: Principled) -> None:
     node.distribution = "GGX"
     for field, socket in PRINCIPLED_SOCKETS.items():
         value = getattr(principled, field)
+        if socket not in node.inputs:
+            continue
         if np.ndim(value):
             node.inputs[socket].default_value = (*(float(v) for v in value), 1.0)
         else:
@@ -170,8 +203,7 @@ def _osl_branch(
     tree: bpy.types.NodeTree,
     compiled: CompiledText,
     brdf: PrincipalBRDF,
-    principled: Principled,
-    files: Mapping[str, Path],
+    files: ShaderFiles,
 ) -> None:
     frame = _frame(tree, "Measured: Cycles with OSL on the CPU", (0, 420))
     node = tree.nodes.new("ShaderNodeScript")
@@ -185,14 +217,9 @@ def _osl_branch(
     count = osl_atlas.traits(brdf.coefficients.shape[1])
     ensure_sockets(node, count)
     sockets = {socket.identifier: socket for socket in node.inputs}
-    for name, path in files.items():
+    for name, path in files.paths.items():
         sockets[name].default_value = path.resolve().as_posix()
-    lobe = principled.roughness
-    if principled.coat_weight > 0.05:
-        lobe = min(lobe, principled.coat_roughness)
-    # directions are drawn from a lobe somewhat wider than the fit's: measured tails are long
-    sockets["lobe_roughness"].default_value = float(min(1.1 * lobe, 1.0))
-    sockets["lobe_share"].default_value = 0.5
+    sockets[osl_source.ALPHAS].default_value = files.alphas
     for i, rgb in enumerate(np.asarray(brdf.coefficients).T[:count]):
         socket = sockets[osl_source.coefficient_name(i)]
         socket.default_value = tuple(float(v) for v in rgb)
@@ -226,7 +253,7 @@ def ensure_sockets(node: bpy.types.Node, count: int) -> None:
         socket = node.inputs.new(SOCKET_TYPES[item.kind], item.label, identifier=item.name)
         value = item.default
         socket.default_value = (*value, 1.0) if item.kind == "color" else value
-        socket.hide = item.lamp  # written by scene/lamps, not by hand
+        socket.hide = item.hidden  # written by scene/lamps or with the files, not by hand
         socket.hide_value = item.name == "shading_normal"
     node.outputs.new("NodeSocketShader", "BSDF", identifier="BSDF")
 

@@ -10,13 +10,15 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 from bpy.app.handlers import persistent
 
-from ..core.appearance import osl_atlas
-from ..core.appearance.osl_source import COMPONENTS, REMAINDER
+from ..core.appearance import osl_atlas, sampling_table
+from ..core.appearance.closure_split import split
+from ..core.appearance.osl_source import COMPONENTS, REMAINDER, SAMPLING
 from ..core.basis import PrincipalBRDF
 from .folders import blend_folder
 
@@ -24,12 +26,32 @@ log = logging.getLogger(__name__)
 
 SOCKET = COMPONENTS
 FILE_PROPERTY = "patina_components"  # on the material: the name of its components' file
-PROPERTIES = {COMPONENTS: FILE_PROPERTY, REMAINDER: "patina_remainder"}  # socket → property
+PROPERTIES = {
+    COMPONENTS: FILE_PROPERTY,
+    REMAINDER: "patina_remainder",
+    SAMPLING: "patina_sampling",
+}
+"""Socket → property of the material that names its file."""
+OWN_PREFIXES = (osl_atlas.REMAINDER_PREFIX, osl_atlas.SAMPLING_PREFIX)
 
 
-def ensure_files(brdf: PrincipalBRDF) -> dict[str, Path]:
-    """Socket → EXR of a BRDF: on disk where this .blend expects them, and packed into it."""
-    return {
+@dataclass(frozen=True)
+class ShaderFiles:
+    """paths: socket → EXR; alphas: of the GGX lobes that Cycles samples."""
+
+    paths: dict[str, Path]
+    alphas: tuple[float, float, float]
+
+
+def ensure_files(brdf: PrincipalBRDF) -> ShaderFiles:
+    """A BRDF's EXRs: on disk where this .blend expects them, and packed into it."""
+    parts = split(brdf.evaluate)
+
+    def write_sampling(path: Path) -> None:
+        table = sampling_table.sampling_table(brdf.evaluate, parts)
+        osl_atlas.write_picture(path, sampling_table.texels(parts, table))
+
+    paths = {
         COMPONENTS: _ensure(
             osl_atlas.components_name(brdf.basis),
             lambda path: osl_atlas.write_components(path, brdf.basis),
@@ -37,7 +59,10 @@ def ensure_files(brdf: PrincipalBRDF) -> dict[str, Path]:
         REMAINDER: _ensure(
             osl_atlas.remainder_name(brdf), lambda path: osl_atlas.write_remainder(path, brdf)
         ),
+        SAMPLING: _ensure(osl_atlas.sampling_name(brdf), write_sampling),
     }
+    first, second, third = (float(a) for a in parts.alpha)
+    return ShaderFiles(paths, (first, second, third))
 
 
 def _ensure(name: str, write: Callable[[Path], object]) -> Path:
@@ -56,9 +81,9 @@ def file_sockets(node: bpy.types.Node) -> list[bpy.types.NodeSocket]:
 
 
 def drop_unused() -> None:
-    """Forget the packed remainders of materials that are gone; files on disk stay."""
-    needed = {m.get(PROPERTIES[REMAINDER]) for m in bpy.data.materials}
-    for image in [i for i in bpy.data.images if i.name.startswith(osl_atlas.REMAINDER_PREFIX)]:
+    """Forget the packed files of materials that are gone; files on disk stay."""
+    needed = {m.get(key) for m in bpy.data.materials for key in PROPERTIES.values()}
+    for image in [i for i in bpy.data.images if i.name.startswith(OWN_PREFIXES)]:
         if image.name not in needed and image.users <= int(image.use_fake_user):
             bpy.data.images.remove(image)
 

@@ -22,6 +22,9 @@ TEST_TOOLS = [
     "hypothesis==6.140.3",
     "rawpy==0.28.0",  # camera RAW is optional: the zips do not carry it
     "trimesh==5.2.0",  # writes meshes that are not ours
+    "usd-core==26.11",  # these three judge what is exported
+    "MaterialX==1.39.5",
+    "mitsuba==3.9.1",
     "ruff==0.13.3",
     "mypy==1.18.2",
 ]

@@ -27,6 +27,7 @@ from ..photo import write_exr
 TRAITS = 8
 BORDER = 1
 COMPONENTS_PREFIX, REMAINDER_PREFIX = "patina_components_", "patina_brdf_"
+SAMPLING_PREFIX = "patina_sampling_"
 
 
 def traits(count: int) -> int:
@@ -71,15 +72,16 @@ def _blocks(slots: NDArray, channels: int) -> NDArray:
 
 def write_components(path: Path, basis: Basis) -> Path:
     """Write the components' picture; the file appears whole or not at all."""
-    return _write(path, component_texels(basis), half=True)
+    return write_picture(path, component_texels(basis), half=True)
 
 
 def write_remainder(path: Path, brdf: PrincipalBRDF) -> Path:
     """Write the remainder's picture; the file appears whole or not at all."""
-    return _write(path, remainder_texels(brdf), half=False)
+    return write_picture(path, remainder_texels(brdf))
 
 
-def _write(path: Path, pixels: NDArray, half: bool) -> Path:
+def write_picture(path: Path, pixels: NDArray, half: bool = False) -> Path:
+    """Write an EXR (height, width, channels), row 0 on top; it appears whole or not at all."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -95,9 +97,18 @@ def components_name(basis: Basis) -> str:
 
 def remainder_name(brdf: PrincipalBRDF) -> str:
     """A name of its own for every BRDF: renderers keep what they have read by its name."""
+    return f"{REMAINDER_PREFIX}{_digest(brdf)}.exr"
+
+
+def sampling_name(brdf: PrincipalBRDF) -> str:
+    """Likewise, of the picture of sampling_table.py."""
+    return f"{SAMPLING_PREFIX}{_digest(brdf)}.exr"
+
+
+def _digest(brdf: PrincipalBRDF) -> str:
     digest = hashlib.sha256(brdf.basis.version.encode())
     digest.update(np.ascontiguousarray(brdf.coefficients, np.float64).tobytes())
-    return f"{REMAINDER_PREFIX}{digest.hexdigest()[:12]}.exr"
+    return digest.hexdigest()[:12]
 
 
 def lookup(

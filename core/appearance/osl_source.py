@@ -5,24 +5,31 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from ..basis import Basis
 from ..basis.mapping import EPSILON
-from . import osl_atlas
+from . import closure_split, osl_atlas, sampling_table
+from .hemisphere import KNEE as CELL_KNEE
 
 TEMPLATE = Path(__file__).parents[2] / "assets" / "osl" / "patina_brdf.osl"
 LAMPS = 8
-COMPONENTS, REMAINDER = "components", "remainder"  # inputs that name a picture
+# inputs that name a picture
+COMPONENTS, REMAINDER, SAMPLING = "components", "remainder", "sampling"
+ALPHAS = "alphas"  # of the lobes that Cycles samples
+# the world's table, and the rows of the rotation from world space to its picture
+WORLD = ("world", "world_x", "world_y", "world_z")
 
 
 @dataclass(frozen=True)
 class Input:
-    """One input of the shader. kind: string, float, int, vector or color; lamp: written by us."""
+    """One input of the shader. kind: string, float, int, vector or color; hidden: written by us."""
 
     name: str
     label: str
     kind: str
     default: object
-    lamp: bool = False
+    hidden: bool = False
 
 
 def coefficient_name(component: int) -> str:
@@ -44,7 +51,7 @@ def lamp_inputs() -> list[Input]:
              ("axis", "vector", (0.0,) * 3), ("side", "vector", (0.0,) * 3),
              ("form", "vector", (0.0,) * 3))  # fmt: skip
     return [
-        Input(f"lamp{i + 1}_{part}", f"Lamp {i + 1} {part}", kind, default, lamp=True)
+        Input(f"lamp{i + 1}_{part}", f"Lamp {i + 1} {part}", kind, default, hidden=True)
         for i in range(LAMPS)
         for part, kind, default in parts
     ]
@@ -55,11 +62,16 @@ def inputs(count: int) -> list[Input]:
     return [
         Input(COMPONENTS, "Components", "string", ""),
         Input(REMAINDER, "Remainder", "string", ""),
+        Input(SAMPLING, "Sampling", "string", ""),
         Input("shading_normal", "Normal", "vector", (0.0, 0.0, 0.0)),
         Input("scale", "Reflectance Scale", "float", 1.0),
-        Input("lobe_roughness", "Sampling Roughness", "float", 0.3),
-        Input("lobe_share", "Sampling Share", "float", 0.5),
+        Input(ALPHAS, "Lobes", "vector", (0.02, 0.1, 0.5), hidden=True),
         *coefficient_inputs(count),
+        Input(WORLD[0], "World", "string", "", hidden=True),
+        *(
+            Input(name, f"World {axis}", "vector", tuple(row), hidden=True)
+            for name, axis, row in zip(WORLD[1:], "XYZ", np.eye(3).tolist(), strict=True)
+        ),
         *lamp_inputs(),
     ]
 
@@ -77,6 +89,14 @@ def source(basis: Basis, count: int) -> str:
         "GROUPS": str(osl_atlas.groups(count)),
         "HEIGHT_GROUPS": str(osl_atlas.groups(osl_atlas.traits(basis.count))),
         "EPSILON": repr(EPSILON),
+        "VIEWS": str(closure_split.VIEWS),
+        "GRAZING": repr(float(closure_split.GRAZING)),
+        "KNOTS": str(closure_split.KNOTS),
+        "LOBES": str(closure_split.LOBES),
+        "CELLS_H": str(sampling_table.CELLS[0]),
+        "CELLS_P": str(sampling_table.CELLS[1]),
+        "CELL_KNEE": repr(float(CELL_KNEE)),
+        "WIDTH": str(sampling_table.WIDTH),
         "COEFFICIENT_INPUTS": _parameters(coefficient_inputs(count)),
         "LAMP_INPUTS": _parameters(lamp_inputs()),
         "COEFFICIENT_NAMES": ", ".join(i.name for i in coefficient_inputs(count)),

@@ -1,10 +1,10 @@
 """Blender's Principled BSDF as a BRDF: what Cycles 4.2 to 5.x computes with distribution 'GGX'.
 
 Layers from the top: coat (dielectric GGX), metal (GGX with F82 tint, Kutz et al. 2021) mixed with a
-dielectric of GGX over Lambert. Every layer darkens what lies below by 1 − its albedo seen from the
-viewer, so the model is not quite reciprocal. α = roughness², Smith's height-correlated masking
+dielectric of GGX over Oren–Nayar. Every layer darkens what lies below by 1 − its albedo seen from
+the viewer, so the model is not quite reciprocal. α = roughness², Smith's height-correlated masking
 (Heitz 2014). Left out: transmission, subsurface, sheen, thin film, anisotropy, multiple scattering
-(distribution 'MULTI_GGX'), coat tint.
+(distribution 'MULTI_GGX').
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from .layer_albedo import (
     rescaled_albedo,
     rescaled_fresnel,
 )
+from .oren_nayar import oren_nayar
 
 Array = NDArray[np.floating]
 # Below it Cycles 4.2 takes the lobe for a mirror and evaluates nothing (its test: α² > 5e-7)
@@ -33,8 +34,9 @@ MIN_ROUGHNESS = 0.03
 class Principled:
     """Inputs of the Principled BSDF node, by the names of its sockets.
 
-    base_color, specular_tint: (3,) linear RGB. roughness, metallic, coat_weight, coat_roughness in
-    [0, 1]; specular_ior_level 0.5 leaves the reflectance at normal incidence as ior has it.
+    base_color, specular_tint, coat_tint: (3,) linear RGB. roughness, diffuse_roughness, metallic,
+    coat_weight, coat_roughness in [0, 1]; specular_ior_level 0.5 leaves the reflectance at normal
+    incidence as ior has it. Blender 4.2 has no diffuse roughness.
     """
 
     base_color: Array = field(default_factory=lambda: np.full(3, 0.8))
@@ -46,6 +48,8 @@ class Principled:
     coat_weight: float = 0.0
     coat_roughness: float = 0.03
     coat_ior: float = 1.5
+    coat_tint: Array = field(default_factory=lambda: np.ones(3))
+    diffuse_roughness: float = 0.0
 
     def evaluate(self, angles: Angles) -> Array:
         """f (..., 3) in 1/sr at half/difference angles (radians) of any shape."""
@@ -59,32 +63,42 @@ class Principled:
     def at(self, where: Configuration) -> Array:
         """f (..., 3) in 1/sr."""
         total = np.zeros((*where.cos_i.shape, 3))
-        below = np.ones(where.cos_i.shape)  # what the layers above leave
+        below = np.ones((*where.cos_i.shape, 1))  # what the layers above leave
         if self.coat_weight > 0:
             lobe = where.ggx(self.coat_roughness)
             fresnel = fresnel_dielectric(where.cos_d, self.coat_ior)
             total += (self.coat_weight * lobe * fresnel)[..., None]
             f0 = f0_from_ior(self.coat_ior)
             s = rescaled_albedo(self.coat_roughness, where.cos_o, self.coat_ior)
-            below = below * np.clip(1.0 - self.coat_weight * (f0 + (1.0 - f0) * s), 0.0, 1.0)
+            dark = np.clip(1.0 - self.coat_weight * (f0 + (1.0 - f0) * s), 0.0, 1.0)
+            below = below * dark[..., None] * self._through_coat(where.cos_o)
         lobe = where.ggx(self.roughness)
         tint = np.asarray(self.specular_tint, float)
         if self.metallic > 0:
             fresnel_f82 = _f82(where.cos_d, np.clip(self.base_color, 0, 1), np.minimum(tint, 1.0))
-            total += self.metallic * (below * lobe)[..., None] * fresnel_f82
+            total += self.metallic * below * lobe[..., None] * fresnel_f82
             below = below * (1.0 - self.metallic)
         if self.metallic < 1:
-            total += below[..., None] * self._dielectric(where, lobe, tint)
+            total += below * self._dielectric(where, lobe, tint)
         return np.where(where.seen[..., None], total, 0.0)
+
+    def _through_coat(self, cos_o: Array) -> Array:
+        """What the coat's colour leaves (..., 3): absorption along the refracted ray out."""
+        tint = np.asarray(self.coat_tint, float)
+        sine2 = (1.0 - np.minimum(cos_o, 1.0) ** 2) / self.coat_ior**2
+        depth = 1.0 / np.sqrt(np.maximum(1.0 - sine2, 1e-9))
+        return 1.0 + self.coat_weight * (tint ** depth[..., None] - 1.0)
 
     def _dielectric(self, where: Configuration, lobe: Array, tint: Array) -> Array:
         ior, scalar_f0 = self.ior, f0_from_ior(self.ior)
         if self.specular_ior_level != 0.5:
             scalar_f0 *= 2.0 * self.specular_ior_level
             ior = ior_from_f0(scalar_f0)
-        diffuse = np.asarray(self.base_color, float) / np.pi
+        diffuse = oren_nayar(
+            self.base_color, self.diffuse_roughness, where.cos_i, where.cos_o, where.cos_io
+        )
         if ior == 1.0:  # Cycles makes no specular lobe at all
-            return np.broadcast_to(diffuse, (*lobe.shape, 3))
+            return diffuse
         f0 = np.clip(scalar_f0 * tint, 0.0, 1.0)
         s = rescaled_fresnel(where.cos_d, ior)[..., None]
         specular = lobe[..., None] * (f0 + (1.0 - f0) * s)
@@ -104,6 +118,15 @@ class Configuration:
     cos_d: Array
 
     @classmethod
+    def around(cls, normal: Array, light: Array, view: Array) -> Configuration:
+        """From unit vectors (..., 3) in any common frame."""
+        half = light + view
+        half = half / np.maximum(np.linalg.norm(half, axis=-1, keepdims=True), 1e-12)
+        cosines = [np.sum(a * b, axis=-1) for a, b in
+                   ((normal, light), (normal, view), (normal, half), (light, half))]  # fmt: skip
+        return cls(*np.broadcast_arrays(*cosines))
+
+    @classmethod
     def of(cls, light: Array, view: Array) -> Configuration:
         """From unit vectors (..., 3) in a frame whose z is the normal."""
         light, view = np.broadcast_arrays(light, view)
@@ -111,6 +134,20 @@ class Configuration:
         half = half / np.maximum(np.linalg.norm(half, axis=-1, keepdims=True), 1e-12)
         cos_d = np.einsum("...i,...i->...", light, half)
         return cls(light[..., 2], view[..., 2], half[..., 2], cos_d)
+
+    def followed_by(self, other: Configuration) -> Configuration:
+        """Both, one after the other."""
+        return Configuration(
+            *(
+                np.concatenate([getattr(part, name) for part in (self, other)])
+                for name in ("cos_i", "cos_o", "cos_h", "cos_d")
+            )
+        )
+
+    @property
+    def cos_io(self) -> Array:
+        """Light against view."""
+        return 2.0 * self.cos_d**2 - 1.0
 
     @cached_property
     def seen(self) -> NDArray[np.bool_]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..appearance.lobe_fit import LobeStackFit, fit_lobe_stack
 from ..appearance.principled_fit import PrincipledFit, fit_principled
 from ..basis import Basis
 from ..capture import Capture, LightEntry
@@ -49,6 +50,7 @@ class MaterialResult:
     held_out: HeldOut | None
     spread: Spread
     principled: PrincipledFit
+    lobes: LobeStackFit
     scale: float
     irradiance_known: bool
     warnings: tuple[str, ...]
@@ -180,6 +182,9 @@ class FitJob(Job):
         step = Step(f"Principled material of {name}", start + 0.8 * share)
         yield step
         principled = yield from beside(lambda: fit_principled(found.fit.brdf.evaluate), step)
+        step = Step(f"lobe stack of {name}", start + 0.9 * share)
+        yield step
+        lobes = yield from beside(lambda: fit_lobe_stack(found.fit.brdf.evaluate), step)
         warnings = material_warnings(table, found.fit, known)
         warnings += trust_warnings(found, capture)
         warnings += black_photos(table, capture) + found.notes
@@ -194,6 +199,7 @@ class FitJob(Job):
             held_out=found.held_out,
             spread=found.spread,
             principled=principled,
+            lobes=lobes,
             scale=scale,
             irradiance_known=known,
             warnings=warnings,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..appearance.energy import directional_albedo
+from ..basis import PrincipalBRDF
 from ..capture import Capture
 from ..fit import PaperFit
 from ..fit.measured_result import NINETY, MeasuredResult
@@ -15,6 +17,8 @@ POOR = 0.2  # typical held-out error, and spread of the trials, that deserve a w
 ODD_PHOTO = 5.0  # times the median held-out error of the photos
 ODD_GAIN = 0.1  # of a photo against the others
 BAD_NORMALS = 5.0  # degrees along each tangent
+VIEWS = (0.0, 20.0, 40.0, 60.0, 70.0, 80.0)  # degrees from the normal
+TOO_MUCH = 1.01  # of the light that falls on a surface: within the quadrature's error
 BLACK, TOO_MANY_BLACK = 0.002, 0.1  # of the bright end; fraction of a photo's samples
 
 
@@ -35,9 +39,22 @@ def material_warnings(
             f"no photo has the light more than {2 * np.degrees(far):.0f}° from the camera: "
             "grazing reflection comes from the basis, not from this object"
         )
-    if not irradiance_known:
+    if irradiance_known:
+        found += _too_much_light(fit.brdf)
+    else:
         found.append("irradiance unknown: the BRDF is known up to one scale")
     return tuple(found)
+
+
+def _too_much_light(brdf: PrincipalBRDF) -> list[str]:
+    albedo = directional_albedo(brdf.evaluate, np.radians(VIEWS)).max(axis=1)
+    most = int(albedo.argmax())
+    if albedo[most] <= TOO_MUCH:
+        return []
+    return [
+        f"seen from {VIEWS[most]:.0f}° it reflects {100 * albedo[most]:.0f} % of the light that "
+        "falls on it; its material in Cycles is held to 100 %: check the irradiance of the lights"
+    ]
 
 
 def trust_warnings(found: Estimate, capture: Capture) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from ..predict.compose import predict_photo
 from . import display
 from .figures import figures
 from .polar import Curve, polar_chart
-from .sphere import lit_sphere
+from .sphere import Reflector, lit_sphere
 
 STYLE = Path(__file__).parents[2] / "assets" / "report" / "style.css"
 LONGEST = 640
@@ -55,11 +55,7 @@ def write_report(folder: Path, result: CaptureResult) -> Iterator[float]:
 def _material_section(folder: Path, material: MaterialResult, photos: Sequence[str]) -> str:
     fit, brdf = material.fit, material.fit.brdf
     interval = fit.interval if isinstance(fit, MeasuredResult) else None
-    sphere, coverage = lit_sphere(brdf.evaluate)
-    picture = display.srgb(sphere)
-    alpha = (coverage * 255 + 0.5).astype(np.uint8)
-    name = f"sphere_{material.name}.png"
-    write_png(folder / name, np.dstack([picture, alpha]))
+    spheres = _spheres(folder, material)
     charts = "".join(
         f"<figure>{polar_chart([Curve('fit', brdf.evaluate, interval)], incidence)}</figure>"
         for incidence in (15, 45, 70)
@@ -71,13 +67,37 @@ def _material_section(folder: Path, material: MaterialResult, photos: Sequence[s
     )
     shaded = "" if interval is None else "; shaded: the 90 % interval"
     return (
-        f"<h2>{escape(material.name)}</h2><div class='material'><figure>"
-        f"<img src='{escape(quote(name))}' alt='lit sphere'>"
-        f"<figcaption>Lit sphere, key light π at the upper left</figcaption>"
-        f"</figure><div>{warnings}<table>{rows}</table></div></div>"
+        f"<h2>{escape(material.name)}</h2>{warnings}<div class='triple'>{spheres}</div>"
+        f"<p class='sub'>Lit spheres, key light π at the upper left. Error: of the cube root of "
+        f"ρ cos θ over all directions.</p><table>{rows}</table>"
         f"<div class='charts'>{charts}</div><p class='sub'>Reflectance in the plane of incidence, "
         f"light from the left; a curve for each of red, green and blue{shaded}.</p>"
     )
+
+
+def _spheres(folder: Path, material: MaterialResult) -> str:
+    """Figures of the measured BRDF, its lobe stack and its Principled, side by side."""
+    lobes, principled = material.lobes, material.principled
+    shown: list[tuple[str, str, Reflector]] = [
+        ("", "measured: Cycles with OSL", material.fit.brdf.evaluate),
+        ("_lobes", f"lobe stack: EEVEE, error {100 * lobes.error:.1f} %", lobes.stack),
+        (
+            "_principled",
+            f"Principled: exports, error {100 * principled.error:.1f} %",
+            principled.principled,
+        ),
+    ]
+    cells = []
+    for suffix, label, reflector in shown:
+        sphere, coverage = lit_sphere(reflector)
+        alpha = (coverage * 255 + 0.5).astype(np.uint8)
+        name = f"sphere_{material.name}{suffix}.png"
+        write_png(folder / name, np.dstack([display.srgb(sphere), alpha]))
+        cells.append(
+            f"<figure><img src='{escape(quote(name))}' alt='lit sphere, {label}'>"
+            f"<figcaption>{label}</figcaption></figure>"
+        )
+    return "".join(cells)
 
 
 def _photo_row(folder: Path, result: CaptureResult, place: int) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..appearance.lobe_stack import LobeStack
 from ..fit import PaperFit
 from ..fit.measured_result import MeasuredResult
 from ..fit.spread import Spread
@@ -130,8 +131,34 @@ def _material(result: CaptureResult, material: MaterialResult) -> dict[str, Any]
             "cube_root_error": principled.error,
             "lambertian_cube_root_error": principled.diffuse_error,
         },
+        "lobe_stack": _lobe_stack(material.lobes.plain, material.lobes.plain_error),
+        "turning_lobe_stack": _lobe_stack(material.lobes.stack, material.lobes.error),
         "warnings": list(material.warnings),
     }
+
+
+def _lobe_stack(stack: LobeStack, error: float) -> dict[str, Any]:
+    return {
+        "diffuse": stack.diffuse.tolist(),
+        **_turned("diffuse", stack.diffuse_mid, stack.diffuse_edge),
+        "diffuse_roughness": stack.diffuse_roughness,
+        "lobes": [
+            {
+                "f0": lobe.f0.tolist(),
+                **_turned("f0", lobe.f0_mid, lobe.f0_edge),
+                "f90": lobe.f90.tolist(),
+                "exponent": lobe.exponent,
+                "roughness": lobe.roughness,
+            }
+            for lobe in stack.lobes
+        ],
+        "cube_root_error": error,
+    }
+
+
+def _turned(name: str, mid: np.ndarray | None, edge: np.ndarray | None) -> dict[str, Any]:
+    told = {f"{name}_mid": mid, f"{name}_edge": edge}
+    return {key: color.tolist() for key, color in told.items() if color is not None}
 
 
 def _measured(fit: MeasuredResult, names: Sequence[str]) -> dict[str, Any]:

@@ -8,18 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import Angles, half_difference
+from ..appearance.lobe_stack import LobeStack
+from ..appearance.principled import Configuration, Principled
 
 KEY = np.array([-0.5, 0.6, 0.62])  # left, above, in front
 RIM = np.array([0.85, 0.25, -0.30])
 RIM_STRENGTH = 0.7
 
+Reflector = Callable[[Angles], NDArray[np.floating]] | Principled | LobeStack
+"""A table (angles -> ρ (n, 3) in 1/sr), or a model of which light and view are not alike."""
+
 
 def lit_sphere(
-    evaluate: Callable[[Angles], NDArray[np.floating]], size: int = 320, oversample: int = 2
+    reflector: Reflector, size: int = 320, oversample: int = 2
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """(radiance (size, size, 3), coverage (size, size)) of a sphere under two distant lights.
 
-    evaluate(angles) -> ρ (n, 3). Orthographic view along −z; key light of irradiance π, so that a
+    Orthographic view along −z; key light of irradiance π, so that a
     white matte sphere reaches 1.
     """
     n = size * oversample
@@ -33,10 +38,22 @@ def lit_sphere(
         light = direction / np.linalg.norm(direction)
         cos_i = normal @ light
         lit = cos_i > 0
-        angles = half_difference(normal[lit], light[None, :], view[lit])
-        radiance[lit] += (strength * np.pi * cos_i[lit, None] * evaluate(angles)).astype(np.float32)
+        rho = _reflectance(reflector, normal[lit], light[None, :], view[lit])
+        radiance[lit] += (strength * np.pi * cos_i[lit, None] * rho).astype(np.float32)
     image = np.zeros((n, n, 3), np.float32)
     image[inside] = radiance
     blocks = image.reshape(size, oversample, size, oversample, 3).mean(axis=(1, 3))
     coverage = inside.reshape(size, oversample, size, oversample).mean(axis=(1, 3))
     return blocks, coverage.astype(np.float32)
+
+
+def _reflectance(
+    reflector: Reflector,
+    normal: NDArray[np.floating],
+    light: NDArray[np.floating],
+    view: NDArray[np.floating],
+) -> NDArray[np.floating]:
+    """ρ (n, 3) in 1/sr for unit vectors (n, 3)."""
+    if isinstance(reflector, (Principled, LobeStack)):
+        return reflector.at(Configuration.around(normal, light, view))
+    return reflector(half_difference(normal, light, view))

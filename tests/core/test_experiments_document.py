@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -94,13 +95,21 @@ def test_only_the_marked_part_is_replaced() -> None:
         document.replaced(text, "z", "")
 
 
-def test_the_document_has_every_part() -> None:
-    text = document.DOCUMENT.read_text("utf-8")
-    for marker in document.sections():
+@pytest.mark.parametrize(
+    ("file", "markers"),
+    [
+        (document.DOCUMENT, document.sections()),
+        (document.APPEARANCE, document.appearance_sections()),
+    ],
+    ids=["experiments", "appearance"],
+)
+def test_the_document_has_every_part(file: Path, markers: dict[str, object]) -> None:
+    text = file.read_text("utf-8")
+    for marker in markers:
         assert f"<!-- begin {marker} -->" in text and f"<!-- end {marker} -->" in text
     for line in text.splitlines():
         if line.startswith("!["):
-            picture = document.DOCUMENT.parent / line[line.index("](") + 2 : -1]
+            picture = file.parent / line[line.index("](") + 2 : -1]
             assert picture.is_file()
             if picture.suffix == ".svg":
                 ElementTree.parse(picture)

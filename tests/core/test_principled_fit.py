@@ -7,8 +7,9 @@ import time
 import numpy as np
 import pytest
 
+from patina.core.appearance.cube_root import quadrature
 from patina.core.appearance.principled import Principled
-from patina.core.appearance.principled_fit import fit_principled, quadrature
+from patina.core.appearance.principled_fit import fit_principled
 from patina.core.basis import Basis, PrincipalBRDF
 from patina.core.errors import FitError
 

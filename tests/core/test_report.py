@@ -42,7 +42,7 @@ def test_the_page_shows_every_picture_it_names(result: CaptureResult, tmp_path: 
     assert fractions == sorted(fractions) and len(fractions) == 4
     page = (tmp_path / "report" / "index.html").read_text()
     pictures = {p.name for p in (tmp_path / "report").glob("*.png")}
-    assert len(pictures) == 3 * 3 + 1
+    assert len(pictures) == 3 * 3 + 3
     assert all(f"src='{name}'" in page for name in pictures)
     assert "http" not in page.replace("http://www.w3.org/2000/svg", "")
     assert read_encoded(tmp_path / "report" / "photo_00_predicted.png").mean() > 0.05
@@ -59,6 +59,10 @@ def test_result_json_says_what_was_measured(result: CaptureResult, job: FitJob) 
     photos = {f"lit_{i}.exr" for i in (1, 2, 3)}
     assert set(material["held_out"]["per_photo"]) == photos >= set(material["gains"])
     assert 0 < material["normal_deviation"] < 3
+    lobes, turning = material["lobe_stack"], material["turning_lobe_stack"]
+    assert 1 <= len(lobes["lobes"]) <= 3 and lobes["lobes"][0].keys() >= {"f0", "f90", "roughness"}
+    assert not any(key.endswith(("_mid", "_edge")) for key in (*lobes, *lobes["lobes"][0]))
+    assert 0 < turning["cube_root_error"] < 0.3
     doubt = material["uncertainty"]
     for key, value in doubt["interval_90"].items():
         assert value == pytest.approx(np.exp(1.645 * doubt[key]) - 1, rel=1e-3) and value > 0

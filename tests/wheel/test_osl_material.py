@@ -24,6 +24,8 @@ VIEW = np.array([0.0, 0.0, 1.0])
 LIGHT = np.array([0.6, 0.2, 0.77]) / np.linalg.norm([0.6, 0.2, 0.77])
 MATERIALS = [("analytic", 5), ("dark-red-paint", 5), ("alum-bronze", 10), ("pink-fabric", 20),
              ("gold-metallic-paint", 100)]  # fmt: skip
+MORE = [("chrome", 100), ("steel", 100), ("white-fabric", 100), ("fruitwood-241", 100),
+        ("green-latex", 100), ("blue-acrylic", 100), ("black-phenolic", 100)]  # fmt: skip
 
 if materials.osl_missing():
     pytest.skip(f"{materials.osl_missing()}", allow_module_level=True)
@@ -75,18 +77,60 @@ def _relative_rms(image: np.ndarray, expected: np.ndarray) -> float:
     return float(np.sqrt(np.sum((image - expected) ** 2) / np.sum(expected**2)))
 
 
-def test_under_the_sun(brdf, tmp_path):
-    sphere = cycles_sphere.new_scene(size=80, osl=True)
+@pytest.mark.parametrize("named", [*MATERIALS, *MORE], ids=lambda m: f"{m[0]}-{m[1]}")
+def test_under_the_sun(named, request, tmp_path):
+    """From the highlight to grazing light and view, matte to mirror."""
+    name, count = named
+    brdf = _brdf(name, count, None if name == "analytic" else request.getfixturevalue("shared"))
+    sphere = cycles_sphere.new_scene(size=120, osl=True)
     cycles_sphere.sun(LIGHT, 2.0)
     _material(brdf, sphere)
     image = cycles_sphere.render(tmp_path)
     normal, inside = cycles_sphere.normals()
-    kept = inside & (normal @ LIGHT > 0.1) & (normal @ VIEW > 0.1)
-    assert _relative_rms(image[kept], 2.0 * _expected(brdf, LIGHT)[kept]) < 0.003
+    kept = inside & (normal @ LIGHT > 0.01) & (normal @ VIEW > 0.05)
+    expected = 2.0 * _expected(brdf, LIGHT)
+    assert _relative_rms(image[kept], expected[kept]) < 0.005
+    grazing = kept & (normal @ LIGHT < 0.2)
+    assert _relative_rms(image[grazing], expected[grazing]) < 0.01
+    assert np.all(image[inside & (normal @ LIGHT < -0.01)] == 0)
+
+
+def test_another_object_casts_its_shadow(tmp_path):
+    """Where Cycles' own diffuse surface is lit, and nowhere else."""
+    sphere = cycles_sphere.new_scene(size=80, osl=True)
+    cycles_sphere.sun(LIGHT, 2.0)
+    bpy.ops.mesh.primitive_cube_add(size=0.5, location=tuple(1.6 * LIGHT))
+    bpy.context.object.visible_camera = False
+    sphere.data.materials.append(_white())
+    lambert = cycles_sphere.render(tmp_path)
+    brdf = _brdf("analytic", 5, None)
+    _material(brdf, sphere)
+    image = cycles_sphere.render(tmp_path)
+    normal, inside = cycles_sphere.normals()
+    kept = inside & (normal @ LIGHT > 0.05) & (normal @ VIEW > 0.05)
+    lit = lambert[..., 0] > 0
+    assert 0.05 < np.mean(~lit[kept]) < 0.6
+    expected = 2.0 * _expected(brdf, LIGHT)
+    # rays may meet the edge of a shadow a pixel apart
+    wrong = np.abs(image - np.where(lit[..., None], expected, 0)).max(axis=-1) > 0.01
+    assert np.mean(wrong[kept]) < 0.01
+    assert np.mean(image[kept & ~lit] == 0) > 0.97
+
+
+def _white() -> bpy.types.Material:
+    white = bpy.data.materials.new("white")
+    white.use_nodes = True
+    tree = white.node_tree
+    tree.nodes.clear()
+    diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    diffuse.inputs["Color"].default_value = (1, 1, 1, 1)
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(diffuse.outputs[0], output.inputs[0])
+    return white
 
 
 def test_under_a_uniform_sky(brdf, tmp_path):
-    sphere = cycles_sphere.new_scene(size=64, samples=64, osl=True)
+    sphere = cycles_sphere.new_scene(size=48, samples=300, osl=True)
     bpy.context.scene.cycles.filter_width = 1.0
     cycles_sphere.sky(1.0)
     _material(brdf, sphere)
@@ -141,15 +185,7 @@ def test_other_lamps_bring_what_they_bring_to_a_diffuse_surface(kind, tmp_path):
     brdf = _brdf("analytic", 5, None)
     _material(brdf, sphere)
     image = cycles_sphere.render(tmp_path)
-    white = bpy.data.materials.new("white")
-    white.use_nodes = True
-    tree = white.node_tree
-    tree.nodes.clear()
-    diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
-    diffuse.inputs["Color"].default_value = (1, 1, 1, 1)
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(diffuse.outputs[0], output.inputs[0])
-    sphere.data.materials[0] = white
+    sphere.data.materials[0] = _white()
     lambert = cycles_sphere.render(tmp_path) * np.pi  # E cosθ
     normal, inside = cycles_sphere.normals()
     light = np.array([2.0, 1.0, 3.0]) - normal
@@ -185,8 +221,8 @@ def test_the_files_come_back_when_the_blend_moves(tmp_path):
     second.mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(first / "a.blend"))
     _material(brdf, sphere)
-    files = osl_files.ensure_files(brdf)
-    assert {path.parent for path in files.values()} == {first} and len(files) == 2
+    files = osl_files.ensure_files(brdf).paths
+    assert {path.parent for path in files.values()} == {first} and len(files) == 3
     bpy.ops.wm.save_mainfile()
     (first / "a.blend").rename(second / "a.blend")
     original = {socket: path.read_bytes() for socket, path in files.items()}

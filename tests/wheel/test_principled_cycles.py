@@ -23,6 +23,8 @@ SOCKETS = {
     "coat_weight": "Coat Weight",
     "coat_roughness": "Coat Roughness",
     "coat_ior": "Coat IOR",
+    "coat_tint": "Coat Tint",
+    "diffuse_roughness": "Diffuse Roughness",
 }
 GOLD, TINT = np.array([0.9, 0.6, 0.2]), np.array([0.2, 0.5, 1.0])
 CASES = [
@@ -36,6 +38,9 @@ CASES = [
     {"metallic": 1.0, "base_color": GOLD, "roughness": 0.5, "specular_tint": TINT},
     {"metallic": 0.5, "base_color": GOLD, "roughness": 0.4, "specular_ior_level": 0.9},
     {"coat_weight": 0.7, "coat_roughness": 0.1, "roughness": 0.6},
+    {"coat_weight": 0.7, "coat_roughness": 0.1, "roughness": 0.6, "coat_tint": TINT},
+    {"diffuse_roughness": 1.0, "base_color": GOLD, "specular_ior_level": 0.0},
+    {"diffuse_roughness": 0.4, "base_color": GOLD, "roughness": 0.7},
 ]
 
 

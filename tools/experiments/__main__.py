@@ -1,4 +1,5 @@
-"""`run.py experiments [NAME ...]`: what docs/experiments.md states, measured and drawn again."""
+"""`run.py experiments [NAME ...]`: what docs/experiments.md and docs/appearance.md state, measured
+and drawn again."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from ..common import say
 from ..package import load_patina
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-NAMES = ("check", "ablation", "sweeps", "goals")
+NAMES = ("check", "ablation", "sweeps", "goals", "appearance")
 
 
 def main() -> int:
@@ -67,7 +68,7 @@ def main() -> int:
     if told.quick:
         print(document.summary())
     else:
-        document.write()
+        document.write(told.names or NAMES)
     return 0
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 
 from ..common import ROOT, say
-from . import figures, goal_table, store, tables
+from . import appearance, figures, goal_table, store, tables
 from .ablation import SCENES
 from .records import Record, distinct, where
 
 DOCUMENT = ROOT / "docs" / "experiments.md"
+APPEARANCE = ROOT / "docs" / "appearance.md"
 IMAGES = "images/experiments"
 ESTIMATORS = (
     "paper", "all samples k=20", "ours", "ours, true mesh", "all samples k=40, true mesh",
@@ -45,25 +47,41 @@ def sections() -> dict[str, tuple[str, Section]]:
     return found
 
 
-def write() -> None:
-    """Fill every marked part whose results are there; the rest stays as it was."""
-    text = DOCUMENT.read_text("utf-8")
-    for marker, (experiment, make) in sections().items():
+def appearance_sections() -> dict[str, tuple[str, Section]]:
+    """The same of docs/appearance.md."""
+    return {
+        "models": ("appearance", appearance.summary),
+        "models by material": ("appearance", appearance.by_material),
+        "worst": ("appearance", appearance.worst),
+    }
+
+
+def write(names: Sequence[str]) -> None:
+    """Fill the marked parts of these experiments whose results are there; the rest stays."""
+    for document, found in ((DOCUMENT, sections()), (APPEARANCE, appearance_sections())):
+        mine = {marker: part for marker, part in found.items() if part[0] in names}
+        if mine:
+            _fill(document, mine)
+
+
+def _fill(document: Path, found: dict[str, tuple[str, Section]]) -> None:
+    text = document.read_text("utf-8")
+    for marker, (experiment, make) in found.items():
         records = store.load(experiment)
         if not records:
             say(f"{marker}: no results of {experiment!r} yet, left as it was")
             continue
         if content := make(records):
             text = replaced(text, marker, content)
-    DOCUMENT.write_text(text, "utf-8")
-    say(f"wrote {DOCUMENT.relative_to(ROOT)}")
+    document.write_text(text, "utf-8")
+    say(f"wrote {document.relative_to(ROOT)}")
 
 
 def summary() -> str:
     """The tables of the quick runs, for the terminal."""
     parts = []
-    for marker in ("check", "goals", "by scene"):
-        experiment, make = sections()[marker]
+    for marker in ("check", "goals", "by scene", "models", "models by material"):
+        experiment, make = (sections() | appearance_sections())[marker]
         if records := store.load(experiment, quick=True):
             parts.append(f"## {marker}\n\n{make(records)}")
     runs = store.load("ablation", quick=True) or []

@@ -1,0 +1,101 @@
+"""``maps CAPTURE RESULT --out DIR``: what varies over the surface, as maps over the mesh's UVs."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..core.brdf import merl_file
+from ..core.capture import read_capture
+from ..core.maps import MapsJob, MapsSettings
+from ..core.maps.maps_job import REFITS, MapsResult
+from ..core.maps.texels import check_size
+from ..core.maps.write import write_maps
+from ..core.report import result_json
+from ..core.result import read_result
+from .fit import timed
+from .progress import Progress
+from .staging import check_out, staged_folder
+
+HELP = "base colour without light, roughness and coverage maps over the mesh's UVs"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("capture", type=Path, help="the capture file (*.capture.toml)")
+    parser.add_argument("result", type=Path, help="the folder that `fit` left, or its result.json")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the maps")
+    parser.add_argument(
+        "--size", type=int, default=2048, help="texels a side (default %(default)s)"
+    )
+    parser.add_argument(
+        "--keep-fit",
+        action="store_true",
+        help="do not fit again where the colour varies (faster; the highlight is less exact)",
+    )
+    parser.add_argument(
+        "--normal",
+        action="store_true",
+        help="a normal map too, of what the mesh's normals are off by",
+    )
+    parser.add_argument(
+        "--format", choices=("exr", "png"), default="exr", help="of the maps (default %(default)s)"
+    )
+
+
+def run(arguments: argparse.Namespace) -> None:
+    check_size(arguments.size)
+    out = check_out(arguments.out)
+    capture, fitted = read_capture(arguments.capture), read_result(arguments.result)
+    from ..scene.unwrap import unwrapped  # needs bpy
+
+    settings = MapsSettings(arguments.size, 0 if arguments.keep_fit else REFITS, arguments.normal)
+    job = MapsJob(capture, fitted, settings, unwrapped)
+    progress = Progress(share=0.9)
+    job.drain(progress)
+    result = job.result
+    if result is None:  # pragma: no cover - drain raises or finishes
+        raise RuntimeError("the job ended without a result")
+    progress.share = 1.0
+    with staged_folder(out) as folder:
+        stages = [*job.stages]
+        with timed(stages, "maps", progress, 0.92):
+            files = write_maps(folder, result, arguments.format)
+        with timed(stages, "scene.blend", progress, 0.96):
+            from ..scene.maps import write_mapped_blend
+
+            scene = folder / "scene.blend"
+            notes = write_mapped_blend(scene, out / scene.name, result, files, fitted.scene, stages)
+        written = scene.is_file()
+        if result.refit is not None:
+            for material in result.refit.materials:
+                merl_file.write(folder / f"{material.name}.binary", material.fit.brdf.table())
+            result_json.write(folder / "result.json", result.refit, stages, result.notes)
+    _tell(result)
+    for note in (*result.notes, *notes):
+        print(f"  note: {note}")
+    print(f"wrote {len(files)} maps and {out / 'maps.json'}")
+    for name in ("scene.blend",) * written + ("result.json",) * (result.refit is not None):
+        print(f"      {out / name}")
+
+
+def _tell(result: MapsResult) -> None:
+    maps = result.maps
+    seen = maps.photos > 0
+    print(
+        f"{len(result.texels):,} texels of {result.texels.size} × {result.texels.size}; "
+        f"{100 * seen.mean():.0f} % are seen lit by a photo"
+    )
+    for index, level in enumerate(result.levels):
+        own = seen & (maps.material == index)
+        if not own.any():
+            print(
+                f"{level.name}: seen by no photo in the light; its maps are the fitted material's"
+            )
+            continue
+        error = float(sorted(maps.error[own])[int(own.sum()) // 2])
+        scale = sorted(maps.materials[index].scale[own] @ level.channels)
+        low, middle, high = (scale[int(q * len(scale))] for q in (0.16, 0.5, 0.84))
+        print(
+            f"{level.name}: varies by ± {50 * (high - low) / middle:.0f} %, known to "
+            f"± {100 * error:.0f} % (typical texel)"
+        )

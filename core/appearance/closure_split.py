@@ -1,0 +1,128 @@
+"""A BRDF as closures that Cycles samples towards lights, and a rest that it does not.
+
+A ray portal carries any BRDF, but knows no lights: it finds a small bright sun by chance alone. So
+for every direction of view the largest part goes to closures of Cycles' own, a ramp over cos θi and
+three GGX lobes, and only what is left, of either sign, to the portal. The sum is the BRDF whatever
+the weights are; they are chosen such that the absolute rest, which is what the portal's noise grows
+with, is smallest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from ..angles import Angles
+from .hemisphere import Hemisphere
+
+Array = NDArray[np.floating]
+
+KNOTS = 8  # of OSL's diffuse_ramp
+LOBES = 3
+VIEWS = 24  # directions of view, evenly over θo
+GRAZING = np.radians(89.0)
+CELLS = (48, 16)  # of half vectors
+ALPHAS = np.geomspace(0.006, 0.8, 16)
+ROUNDS = 6  # of weighted least squares towards the least absolute rest
+FEW = (2, 8, 14, 19)  # views that choose the lobes' widths
+
+
+@dataclass(frozen=True)
+class ClosureSplit:
+    """theta_o: (v,) radians, directions of view. alpha: (LOBES,) of the GGX lobes. ramp:
+    (v, KNOTS, 3) of ρ·cos θi at cos θi = 0 … 1. lobes: (v, LOBES, 3) weights of the GGX lobes.
+    rest: share of the reflected light that is left to the portal, absolute, mean over views."""
+
+    theta_o: Array
+    alpha: Array
+    ramp: Array
+    lobes: Array
+    rest: float
+
+
+def view_angles(count: int = VIEWS) -> Array:
+    """(count,) θo in radians, from the normal to all but the horizon."""
+    return np.linspace(0.0, GRAZING, count)
+
+
+def split(evaluate: Callable[[Angles], Array]) -> ClosureSplit:
+    """The split of ``evaluate(angles) -> (n, 3)``, ρ in 1/sr."""
+    theta_o = view_angles()
+    spheres = [Hemisphere.of(t, *CELLS) for t in theta_o]
+    reflected = [np.asarray(evaluate(s.angles), float) * s.cos_i[:, None] for s in spheres]
+    few = [(spheres[i], reflected[i].mean(axis=1, keepdims=True)) for i in FEW]
+    chosen: list[float] = []
+    for place in (*range(LOBES), *range(LOBES)):  # one after the other, then each once more
+        kept = chosen[:place] + chosen[place + 1 :] if len(chosen) == LOBES else list(chosen)
+        trials = [
+            (sum(float(_least_rest(s, y, (*kept, a))[1][0]) for s, y in few), a)
+            for a in ALPHAS
+            if a not in kept
+        ]
+        found = min(trials)[1]
+        chosen = [*kept[:place], found, *kept[place:]]
+    alpha = np.array(sorted(chosen))
+    ramp, lobes = np.zeros((VIEWS, KNOTS, 3)), np.zeros((VIEWS, LOBES, 3))
+    left, total = 0.0, 0.0
+    for v, (sphere, y) in enumerate(zip(spheres, reflected, strict=True)):
+        found, rest = _least_rest(sphere, y, tuple(alpha))
+        ramp[v], lobes[v] = found[:KNOTS], found[KNOTS:]
+        left += float(rest.sum())
+        total += float(np.sum(sphere.solid[:, None] * y))
+    return ClosureSplit(theta_o, alpha, ramp, lobes, left / max(total, 1e-12))
+
+
+def closures(sphere: Hemisphere, alpha: tuple[float, ...]) -> Array:
+    """(n, KNOTS + lobes) what each closure of weight 1 reflects, ρ·cos θi."""
+    at = sphere.cos_i * (KNOTS - 1)
+    low = np.minimum(at.astype(int), KNOTS - 2)
+    columns = np.zeros((at.size, KNOTS + len(alpha)))
+    every = np.arange(at.size)
+    columns[every, low] = 1 - (at - low)
+    columns[every, low + 1] = at - low
+    cos_o = np.cos(sphere.theta_o)
+    for j, a in enumerate(alpha):
+        columns[:, KNOTS + j] = ggx(sphere.cos_i, cos_o, sphere.cos_h, a) * sphere.cos_i
+    columns[sphere.cos_i <= 0] = 0
+    return columns
+
+
+def ggx(cos_i: Array, cos_o: Array | float, cos_h: Array, alpha: float) -> Array:
+    """D·G/(4 cos θi cos θo) of GGX, Smith's height-correlated masking (Heitz 2014), no Fresnel."""
+    a2 = alpha * alpha
+    d = a2 / (np.pi * (1 + (a2 - 1) * cos_h**2) ** 2)
+
+    def masked(c: Array | float) -> Array:
+        squared = np.maximum(np.asarray(c, float), 1e-9) ** 2
+        return (np.sqrt(1 + a2 * (1 / squared - 1)) - 1) / 2
+
+    safe = np.maximum(cos_i, 1e-9)
+    return d / (1 + masked(safe) + masked(cos_o)) / (4 * safe * cos_o)
+
+
+def _least_rest(sphere: Hemisphere, y: Array, alpha: tuple[float, ...]) -> tuple[Array, Array]:
+    """(weights (KNOTS + lobes, c) ≥ 0, rest (c,)): least ∫|y − Σ weight × closure| over light."""
+    matrix = closures(sphere, alpha)
+    kept = sphere.solid > 0
+    matrix, y, solid = matrix[kept], y[kept], sphere.solid[kept]
+    found, rest = np.zeros((matrix.shape[1], y.shape[1])), np.zeros(y.shape[1])
+    scale = np.sqrt(solid @ matrix**2) + 1e-12
+    matrix = matrix / scale
+    for c in range(y.shape[1]):
+        floor = 1e-3 * float(solid @ np.abs(y[:, c])) / float(solid.sum()) + 1e-12
+        weight, best = solid.copy(), np.inf
+        for _ in range(ROUNDS):
+            weighted = matrix * weight[:, None]
+            gram = weighted.T @ matrix
+            gram[np.diag_indices_from(gram)] += 1e-6 * np.trace(gram) / len(gram)
+            root = np.linalg.cholesky(gram)
+            x, _ = nnls(root.T, np.linalg.solve(root, weighted.T @ y[:, c]), maxiter=1000)
+            left = np.abs(y[:, c] - matrix @ x)
+            if (now := float(solid @ left)) < best:
+                best, found[:, c], rest[c] = now, x / scale, now
+            weight = solid / (left + floor)
+    return found, rest

@@ -1,0 +1,55 @@
+"""The bright spots of a picture of the world: a table to draw directions from.
+
+The path that a measured material sends on through a portal knows no lights. Directions of bright
+spots are drawn from this table and in no other way, so that a small sun in an HDR picture does not
+show up as single bright pixels.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+Array = NDArray[np.floating]
+
+LARGEST = (256, 512)  # rows, columns
+BRIGHT = 6.0  # times the world's mean radiance
+
+
+def world_texels(radiance: Array) -> NDArray[np.float32] | None:
+    """(rows, columns, 3) of an equirectangular picture (h, w, 3), both with the zenith in row 0: R
+    density per sr, 0 outside of bright spots, G probability up to the end of the cell in its row,
+    B up to the end of the row. None where no spot is bright. Raises InputError for what is no
+    picture."""
+    if radiance.ndim != 3 or radiance.shape[2] < 3 or min(radiance.shape[:2]) < 2:
+        raise InputError(f"a picture of the world has {radiance.shape} numbers, not rows of RGB")
+    level = np.nan_to_num(radiance[..., :3].mean(axis=2, dtype=np.float64), posinf=0.0)
+    level = _fewer(_fewer(np.maximum(level, 0.0), LARGEST[0], 0), LARGEST[1], 1)
+    rows, columns = level.shape
+    edges = np.cos(np.linspace(0.0, np.pi, rows + 1))
+    solid = (edges[:-1] - edges[1:])[:, None] * 2 * np.pi / columns
+    mean = float(np.sum(level * solid)) / (4 * np.pi)
+    mass = np.where(level > BRIGHT * mean, level, 0.0) * solid
+    if not mass.sum() > 0:
+        return None
+    mass /= mass.sum()
+    row = mass.sum(axis=1)
+    out = np.empty((rows, columns, 3), np.float32)
+    out[..., 0] = mass / solid
+    out[..., 1] = np.cumsum(mass, axis=1) / np.maximum(row, 1e-30)[:, None]
+    out[..., 2] = np.cumsum(row)[:, None]
+    out[:, -1, 1], out[-1, :, 2] = 1.0, 1.0
+    return out
+
+
+def _fewer(level: Array, largest: int, axis: int) -> Array:
+    """Means of neighbours along an axis, so that at most ``largest`` are left."""
+    count = level.shape[axis]
+    if count <= largest:
+        return level
+    starts = np.arange(largest) * count // largest
+    sizes = np.diff(np.append(starts, count))
+    total = np.add.reduceat(level, starts, axis=axis)
+    return total / (sizes[:, None] if axis == 0 else sizes)

@@ -1,0 +1,91 @@
+"""What an export could not take along, with numbers: losses.txt to read, losses.json to compute."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import Angles, cosines
+from ..appearance.cube_root import quadrature
+
+Array = NDArray[np.floating]
+Evaluate = Callable[[Angles], Array]
+
+FORMAT = 1
+MEASURE = (
+    "relative cube-root error ‖∛(f cosθi) − ∛(ρ cosθi)‖ / ‖∛(ρ cosθi)‖ (Fores et al. 2012), "
+    "directions as on the MERL grid, light and view within 82° of the normal"
+)
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What one format keeps of one material.
+
+    format: as in ``--to``. files: what was written for it. errors: what is held → its relative
+    cube-root error against the fitted table, the first being what a program that opens the file
+    shows. dropped: inputs or facts that the format has no place for. notes: what to know besides.
+    """
+
+    format: str
+    material: str
+    files: tuple[str, ...]
+    errors: dict[str, float]
+    dropped: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def lines(self) -> list[str]:
+        """The same for people."""
+        head = f"{self.material} as {self.format} ({', '.join(self.files)})"
+        shown = [f"  {what}: {percent(error)}" for what, error in self.errors.items()]
+        gone = [f"  lost: {what}" for what in self.dropped]
+        return [head, *shown, *gone, *(f"  note: {note}" for note in self.notes)]
+
+
+def percent(error: float) -> str:
+    """An error as people read it."""
+    return "0 %" if error == 0 else "< 0.01 %" if error < 1e-4 else f"{100 * error:.2g} %"
+
+
+def cube_root_error(evaluate: Evaluate, truth: Evaluate) -> float:
+    """Error of ``evaluate(angles) -> (n, 3)`` against ``truth``, both in 1/sr; the measure that the
+    Principled is fitted by. Negative values count as 0."""
+    angles, weight = quadrature()
+    cos_i, _ = cosines(*angles)
+    root = [
+        np.cbrt(np.maximum(np.asarray(f(angles), float), 0.0) * cos_i[:, None])
+        for f in (evaluate, truth)
+    ]
+    scale = np.sqrt(weight)[:, None]
+    length = max(float(np.linalg.norm(scale * root[1])), 1e-12)
+    return float(np.linalg.norm(scale * (root[0] - root[1])) / length)
+
+
+def write_losses(folder: Path, losses: Sequence[Loss], source: str) -> list[str]:
+    """Write losses.txt and losses.json into a folder; returns the lines of the text.
+
+    source: what was exported, for the head. The files appear whole or not at all.
+    """
+    lines = [
+        f"What these files hold of {source}, and what not.",
+        f"Measure: {MEASURE}.",
+        "",
+    ]
+    for loss in losses:
+        lines += [*loss.lines(), ""]
+    told = {"format": FORMAT, "measure": MEASURE, "losses": [vars(loss) for loss in losses]}
+    _write(folder / "losses.txt", "\n".join(lines))
+    _write(folder / "losses.json", json.dumps(told, indent=1, allow_nan=False) + "\n")
+    return lines
+
+
+def _write(path: Path, text: str) -> None:
+    partial = path.with_name(path.name + ".part")
+    partial.write_text(text, "utf-8")
+    os.replace(partial, path)

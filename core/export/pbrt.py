@@ -1,0 +1,41 @@
+"""pbrt-v4: a scene whose material is `measured` and reads NAME.bsdf."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from ..report.sphere import KEY
+from .mitsuba import IRRADIANCE
+
+SCENE = """# A unit sphere of {title}, seen along -z, under one distant light; pbrt NAME.pbrt
+Film "rgb" "integer xresolution" [ 256 ] "integer yresolution" [ 256 ]
+    "string filename" [ "{name}.exr" ]
+PixelFilter "box"
+Sampler "zsobol" "integer pixelsamples" [ 64 ]
+Integrator "path"
+# pbrt is left-handed: mirrored, so that the picture is that of a right-handed scene
+Scale -1 1 1
+LookAt 0 0 5  0 0 0  0 1 0
+Camera "orthographic" "float screenwindow" [ -1.05 1.05 -1.05 1.05 ]
+
+WorldBegin
+LightSource "distant" "point3 from" [ {light} ] "point3 to" [ 0 0 0 ]
+    "rgb L" [ {power} {power} {power} ]
+
+MakeNamedMaterial "{name}" "string type" "measured" "string filename" "{name}.bsdf"
+NamedMaterial "{name}"
+Shape "sphere" "float radius" 1
+"""
+
+
+def write_scene(path: Path, name: str, title: str) -> None:
+    """Write the scene for NAME.bsdf beside it; name: an identifier; title: one line for people."""
+    light = " ".join(f"{v:.8g}" for v in KEY / np.linalg.norm(KEY))
+    shown = " ".join(title.split()).encode("ascii", "replace").decode()
+    text = SCENE.format(name=name, title=shown, light=light, power=f"{IRRADIANCE:.8g}")
+    partial = path.with_name(path.name + ".part")
+    partial.write_text(text, "utf-8")
+    os.replace(partial, path)

@@ -1,0 +1,106 @@
+"""The exports for renderers: MaterialX, Mitsuba 3 and pbrt-v4."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from . import materialx, materialx_model, mitsuba, pbrt, tensor_file
+from .losses import Loss
+from .subject import Subject
+
+SPECTRAL = (
+    "colours are spread over wavelengths so that they come back under daylight (D65); under other "
+    "light they are a guess"
+)
+
+
+def write_mtlx(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
+    """NAME.mtlx: surfacematerials NAME (lobe stack), NAME_plain where that one's colours change
+    towards the silhouette, and NAME_openpbr (the Principled)."""
+    losses = []
+    for subject in subjects:
+        root = materialx.document()
+        stacks = {subject.id: subject.lobes.stack}
+        if not subject.lobes.stack.plain:
+            stacks[f"{subject.id}_plain"] = subject.lobes.plain
+        errors = {}
+        for name, stack in stacks.items():
+            materialx.add_lobe_stack(root, name, stack)
+            shown = partial(materialx_model.evaluate, stack)
+            count = len(stack.lobes)
+            what = f"{name}, lobe stack of {count} lobe{'s' if count != 1 else ''}"
+            errors[f"{what}, by MaterialX's own shaders"] = subject.error(shown)
+            errors[f"{what}, as Blender has it"] = subject.error(stack.evaluate)
+        name = f"{subject.id}_openpbr"
+        materialx.add_open_pbr(root, name, subject.material.principled)
+        errors[f"{name}, taken for Blender's Principled"] = subject.error(
+            subject.material.principled.evaluate
+        )
+        file = f"{subject.id}.mtlx"
+        materialx.write(folder / file, root)
+        losses.append(
+            Loss(
+                "mtlx",
+                subject.name,
+                (file,),
+                errors,
+                dropped=("what the lobes and the diffuse base cannot follow",),
+                notes=subject.scale_note,
+            )
+        )
+    return losses
+
+
+def write_mitsuba(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
+    """NAME.xml with the plugin, NAME_spectral.xml with Mitsuba's own `measured`, render.py."""
+    plugin = tuple(mitsuba.write_plugin(folder))
+    losses = []
+    for subject in subjects:
+        own = mitsuba.write_material(folder, subject.material)
+        tensor = _write_tensor(folder, subject)
+        spectral = f"{subject.id}_spectral.xml"
+        mitsuba.write_scene(folder / spectral, "measured", tensor)
+        losses.append(
+            Loss(
+                "mitsuba",
+                subject.name,
+                (*own, tensor, spectral, *plugin),
+                {
+                    "plugin of ours (RGB variants)": 0.0,
+                    "Mitsuba's own measured (spectral variants)": subject.error(
+                        subject.pictures.evaluate
+                    ),
+                },
+                notes=(SPECTRAL, *subject.scale_note),
+            )
+        )
+    return losses
+
+
+def write_pbrt(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
+    """NAME.pbrt and the NAME.bsdf that its `measured` material reads."""
+    losses = []
+    for subject in subjects:
+        tensor = _write_tensor(folder, subject)
+        scene = f"{subject.id}.pbrt"
+        pbrt.write_scene(folder / scene, subject.id, subject.name)
+        losses.append(
+            Loss(
+                "pbrt",
+                subject.name,
+                (scene, tensor),
+                {"measured": subject.error(subject.pictures.evaluate)},
+                notes=(SPECTRAL, *subject.scale_note),
+            )
+        )
+    return losses
+
+
+def _write_tensor(folder: Path, subject: Subject) -> str:
+    name = f"{subject.id}.bsdf"
+    if not (folder / name).is_file():  # Mitsuba and pbrt share it
+        fields = subject.pictures.fields(f"{subject.id}, measured with Patina")
+        tensor_file.write(folder / name, fields)
+    return name

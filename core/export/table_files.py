@@ -1,0 +1,122 @@
+"""The BRDF as arrays: table, coefficients and components, as EXR pictures or as one NPZ each."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import merl_grid
+from ..basis import Basis, PrincipalBRDF
+from ..basis.mapping import EPSILON
+from ..brdf import TabulatedBRDF
+from ..result import FittedMaterial
+from .exr_layers import write_float_exr
+from .file_names import identifier
+
+EXR_README, NPZ_README = "README_exr.txt", "README_npz.txt"
+
+
+def table_pixels(table: TabulatedBRDF) -> NDArray[np.float32]:
+    """(8100, 180, 3): row 90·ih + id, column ip; invalid cells −1."""
+    n_h, n_d, n_p = merl_grid.SHAPE
+    return np.moveaxis(table.values, 0, -1).reshape(n_h * n_d, n_p, 3)
+
+
+def table_from_pixels(pixels: NDArray[np.floating]) -> TabulatedBRDF:
+    """What :func:`table_pixels` was made of."""
+    values = np.moveaxis(np.asarray(pixels).reshape(*merl_grid.SHAPE, 3), -1, 0)
+    return TabulatedBRDF(np.ascontiguousarray(values, np.float32))
+
+
+def write_exr_material(folder: Path, material: FittedMaterial, table: TabulatedBRDF) -> list[str]:
+    """NAME_table.exr and NAME_coefficients.exr; returns their names."""
+    name = identifier(material.name)
+    write_float_exr(
+        folder / f"{name}_table.exr",
+        table_pixels(table),
+        "RGB",
+        "BRDF in 1/sr at the centres of the MERL cells; row 90*ih + id, column ip; -1: invalid",
+    )
+    write_float_exr(
+        folder / f"{name}_coefficients.exr",
+        material.brdf.coefficients.T[None],
+        "RGB",
+        f"coefficients in the basis {material.brdf.basis.version}, one column a component",
+    )
+    return [f"{name}_table.exr", f"{name}_coefficients.exr"]
+
+
+def write_exr_basis(folder: Path, basis: Basis) -> str:
+    """basis_VERSION.exr: slabs of n_h rows, first µ, then ln(ref + ε), then the components."""
+    n_h, n_d, n_p = basis.grid.shape
+    slabs = np.concatenate([basis.mean[None], basis.log_reference[None], basis.components])
+    name = f"basis_{basis.version}.exr"
+    write_float_exr(
+        folder / name,
+        slabs.reshape(-1, n_d * n_p, 1),
+        "Y",
+        f"{len(slabs)} slabs of {n_h} rows (theta_h); column {n_p}*id + ip; see {EXR_README}",
+    )
+    return name
+
+
+def write_npz_material(folder: Path, material: FittedMaterial, table: TabulatedBRDF) -> str:
+    """NAME.npz: table, log table, coefficients and the nodes' angles; returns its name."""
+    name = f"{identifier(material.name)}.npz"
+    write_npz(
+        folder / name,
+        name=np.array(material.name),
+        table=table.values,
+        **log_table_arrays(material.brdf),
+        coefficients=material.brdf.coefficients,
+        basis_version=np.array(material.brdf.basis.version),
+        scale_known=np.array(material.scale_known),
+        scale=np.array(material.scale),
+    )
+    return name
+
+
+def log_table_arrays(brdf: PrincipalBRDF) -> dict[str, NDArray[Any]]:
+    """ln(ρ·cosMap + ε) at the basis' nodes, (n_h, n_d, n_p, 3), with the nodes' angles."""
+    grid = brdf.basis.grid
+    nodes = grid.nodes()
+    return {
+        "log_table": brdf.log_table.values.reshape(*grid.shape, 3),
+        "theta_h": nodes.theta_h[:, 0, 0],
+        "theta_d": nodes.theta_d[0, :, 0],
+        "phi_d": nodes.phi_d[0, 0, :],
+        "knee": np.array(grid.knee),
+        "epsilon": np.array(EPSILON),
+    }
+
+
+def write_npz_basis(folder: Path, basis: Basis) -> str:
+    """basis_VERSION.npz: µ, ln(ref + ε), components and nodes; returns its name."""
+    nodes = basis.grid.nodes()
+    name = f"basis_{basis.version}.npz"
+    write_npz(
+        folder / name,
+        mean=basis.mean,
+        log_reference=basis.log_reference,
+        components=basis.components,
+        explained=basis.explained,
+        theta_h=nodes.theta_h[:, 0, 0],
+        theta_d=nodes.theta_d[0, :, 0],
+        phi_d=nodes.phi_d[0, 0, :],
+        knee=np.array(basis.grid.knee),
+        epsilon=np.array(EPSILON),
+        provenance=np.array(basis.provenance),
+    )
+    return name
+
+
+def write_npz(path: Path, **arrays: NDArray[Any]) -> None:
+    """Write a compressed .npz; the file appears whole or not at all."""
+    partial = path.with_name(path.name + ".part")
+    with open(partial, "wb") as file:
+        np.savez_compressed(file, **arrays)
+    os.replace(partial, path)

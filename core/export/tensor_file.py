@@ -1,0 +1,51 @@
+"""The container of RGL's measured BRDFs (`.bsdf`): named arrays in one file.
+
+As Mitsuba 3 (`TensorFile`) and pbrt-v4 read it: "tensor_file\\0", version (1, 0), number of fields
+(uint32); then for each: length of its name (uint16), name, dimensions (uint16), type (uint8), place
+of its data from the file's start (uint64), shape (uint64 each). Little endian.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+MAGIC = b"tensor_file\0"
+TYPES = {"uint8": 1, "float32": 10}
+ALIGNMENT = 8
+
+
+def write(path: Path, fields: Mapping[str, NDArray[Any]]) -> None:
+    """Write uint8 and float32 arrays by name; the file appears whole or not at all."""
+    arrays = {name: np.ascontiguousarray(value) for name, value in fields.items()}
+    head = (
+        len(MAGIC)
+        + 2
+        + 4
+        + sum(2 + len(name.encode()) + 2 + 1 + 8 + 8 * value.ndim for name, value in arrays.items())
+    )
+    place = _aligned(head)
+    index = [MAGIC, struct.pack("<BBI", 1, 0, len(arrays))]
+    for name, value in arrays.items():
+        label = name.encode()
+        index.append(struct.pack("<H", len(label)) + label)
+        index.append(struct.pack("<HBQ", value.ndim, TYPES[value.dtype.name], place))
+        index.append(struct.pack(f"<{value.ndim}Q", *value.shape))
+        place = _aligned(place + value.nbytes)
+    partial = path.with_name(path.name + ".part")
+    with open(partial, "wb") as file:
+        file.write(b"".join(index))
+        for value in arrays.values():
+            file.write(bytes(_aligned(file.tell()) - file.tell()))
+            file.write(value.astype(value.dtype.newbyteorder("<")).tobytes())
+    os.replace(partial, path)
+
+
+def _aligned(place: int) -> int:
+    return -(-place // ALIGNMENT) * ALIGNMENT

@@ -1,0 +1,64 @@
+"""Which pixels of a photo show which material, and which of them a fit would trust."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..capture import Capture
+from ..geometry import PixelRays, RayScene, bands, view_window
+from ..job import inputs
+from ..job.photos import LitPhoto
+from ..light import Light
+from ..samples.take import halo, inner_pixels, light_surface, trusted_pixels
+from ..scan import Camera, Scan
+
+MOST_MATERIALS = 250
+
+
+@dataclass(frozen=True)
+class PixelLabels:
+    """shown: (h, w) uint8, 1 + place of the material that a pixel shows, 0 for none. trusted: the
+    same where the pixel is lit, not clipped, and away from outlines, shadow edges and the borders
+    of masks; 0 elsewhere."""
+
+    shown: NDArray[np.uint8]
+    trusted: NDArray[np.uint8]
+
+
+def label_pixels(
+    capture: Capture,
+    scan: Scan,
+    rays: RayScene,
+    camera: Camera,
+    place: int,
+    photo: LitPhoto,
+    light: Light,
+) -> PixelLabels:
+    """Look at one photo in bands, as sampling for a fit does. Raises InputError for its masks."""
+    masks = inputs.photo_masks(capture, place)
+    margins = capture.fit.margins
+    lines = PixelRays.of(camera)
+    shown = np.zeros(camera.height * camera.width, np.uint8)
+    trusted = np.zeros_like(shown)
+    usable = photo.usable.ravel()
+    for window in bands(camera, halo(margins), rays.cover.columns(camera)):
+        view = view_window(rays, lines, window)
+        wanted = np.zeros(len(view.pixel), bool)
+        wanted[view.wanted] = True
+        if not wanted.any():
+            continue
+        lighting = light_surface(rays, view, light, camera)
+        where, in_shadow = inputs.material_pixels(capture, scan, view, place, masks)
+        good = trusted_pixels(view, lighting, margins) & ~in_shadow & wanted
+        good &= usable.take(view.pixel)
+        for index, material in enumerate(capture.materials):
+            pixels = where[material.name]
+            shown[view.pixel[pixels & wanted]] = index + 1
+            inner = inner_pixels(view, pixels, margins)
+            trusted[view.pixel[good & inner]] = index + 1
+    trusted[trusted != shown] = 0  # masks that overlap: nobody knows
+    shape = camera.height, camera.width
+    return PixelLabels(shown.reshape(shape), trusted.reshape(shape))

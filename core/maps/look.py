@@ -1,0 +1,217 @@
+"""Texels looked up in one photo: where they are in it, whether it sees them, and what it shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import half_difference
+from ..angles.vectors import dot
+from ..capture import Capture
+from ..geometry import RayScene
+from ..geometry.view import SHADOW_LIFT, cast_shadow
+from ..job.photos import LitPhoto
+from ..light import DistantLight, Incidence, Light, MountedLight, NearLight
+from ..scan import Camera, Scan
+from .labels import PixelLabels, label_pixels
+from .level import MaterialLevel
+from .slots import TexelSamples
+
+Array = NDArray[np.floating]
+
+LEAST_COSINE = 0.1  # of light and view: as of a fit's samples
+RELATIVE = 0.03  # of the radiance: misregistration, resampling, what no model explains
+NOISE = 0.002  # of the photo's bright end: what dark pixels may be off by
+GRAZING = 0.03  # times 1/cos − 1, light's and view's: fitted BRDFs are least sure there
+SHINY = 0.1  # share of the reflectance: less is no highlight to judge gloss by
+SPECULAR_TRUST = 0.25  # of the specular part: the surface's gloss may vary by so much
+LIMB = 4  # rays to the rim of a light with a size
+
+
+@dataclass(frozen=True)
+class PhotoLook:
+    """One photo, ready to be asked. radiance: (h, w, 3) linear. bright: its bright end. levels:
+    what the fit knows of each material, in the order of the capture."""
+
+    rays: RayScene
+    camera: Camera
+    light: Light
+    radiance: NDArray[np.float32]
+    labels: PixelLabels
+    levels: tuple[MaterialLevel, ...]
+    bright: float
+
+    @classmethod
+    def of(
+        cls,
+        capture: Capture,
+        scan: Scan,
+        rays: RayScene,
+        camera: Camera,
+        place: int,
+        photo: LitPhoto,
+        light: Light,
+        levels: tuple[MaterialLevel, ...],
+    ) -> PhotoLook:
+        """Label the photo's pixels and measure its bright end on what is trusted."""
+        labels = label_pixels(capture, scan, rays, camera, place, photo, light)
+        lit = photo.radiance[labels.trusted > 0].mean(axis=1)
+        bright = float(np.percentile(lit, 95)) if len(lit) else 0.0
+        return cls(rays, camera, light, photo.radiance, labels, levels, bright)
+
+    def at(self, points: Array, normals: Array) -> tuple[TexelSamples, NDArray[np.intp], Array]:
+        """(samples of the texels that are seen lit, rows (k,) of those that are seen at all, their
+        votes (k, materials): how much of the pixels around shows each material).
+
+        points, normals: (n, 3), scan frame."""
+        facing, view, pixels = self._facing(points, normals)
+        weights, corners = _corners(pixels, self.camera)
+        shown = self.labels.shown.ravel()[corners]
+        some = (shown > 0).any(axis=1)
+        facing, view, weights, corners, shown = (
+            a[some] for a in (facing, view, weights, corners, shown)
+        )
+        seen = ~self._hidden(points[facing], normals[facing], view)
+        facing, view, weights, corners, shown = (
+            a[seen] for a in (facing, view, weights, corners, shown)
+        )
+        cos_o = dot(normals[facing].astype(np.float32), view.astype(np.float32))
+        votes = np.zeros((len(facing), len(self.levels)), np.float32)
+        for index in range(len(self.levels)):
+            votes[:, index] = cos_o * np.sum(weights * (shown == index + 1), axis=1)
+        trusted = self.labels.trusted.ravel()[corners]
+        good = (trusted > 0).all(axis=1) & (trusted == trusted[:, :1]).all(axis=1)
+        rows = np.flatnonzero(good)
+        samples = self._samples(
+            points, normals, facing[rows], view[rows], weights[rows], corners[rows],
+            trusted[rows, 0] - 1,
+        )  # fmt: skip
+        return samples, facing, votes
+
+    def _facing(self, points: Array, normals: Array) -> tuple[NDArray[np.intp], Array, Array]:
+        """(rows that face the camera and lie in the photo, their directions to it, pixels)."""
+        centre = self.camera.pose.centre
+        if self.camera.orthographic:
+            view = np.broadcast_to(-self.camera.pose.rotation[2], points.shape)
+        else:
+            offset = centre - points
+            view = offset / np.maximum(np.linalg.norm(offset, axis=1, keepdims=True), 1e-12)
+        cosine = np.einsum("ij,ij->i", normals, view)
+        rows = np.flatnonzero(cosine > LEAST_COSINE)
+        pixels = self.camera.project(points[rows])
+        with np.errstate(invalid="ignore"):
+            inside = (pixels >= 0.5).all(axis=1) & (pixels[:, 0] <= self.camera.width - 0.5)
+            inside &= pixels[:, 1] <= self.camera.height - 0.5
+        rows = rows[inside]
+        return rows, view[rows], pixels[inside]
+
+    def _hidden(self, points: Array, normals: Array, view: Array) -> NDArray[np.bool_]:
+        """(n,) whether the mesh hides a point from the camera."""
+        limits = None
+        if not self.camera.orthographic:
+            limits = np.linalg.norm(self.camera.pose.centre - points, axis=1)
+        lift = np.float32(SHADOW_LIFT * self.rays.mesh.size) * normals.astype(np.float32)
+        return self.rays.occluded(points, view, limits, lift)
+
+    def _samples(
+        self,
+        points: Array,
+        normals: Array,
+        texel: NDArray[np.intp],
+        view: Array,
+        weights: Array,
+        corners: NDArray[np.intp],
+        material: NDArray[np.uint8],
+    ) -> TexelSamples:
+        point, normal = points[texel], normals[texel]
+        incidence = self.light.incidence(point, self.camera)
+        cos_i = np.einsum("ij,ij->i", normal, incidence.towards)
+        lit = np.flatnonzero((cos_i > LEAST_COSINE) & (incidence.irradiance > 1e-30).all(axis=1))
+        some = incidence.select(lit)
+        point, normal = point[lit], normal[lit]
+        lit = lit[~self._shadowed(point, normal, some)]
+        texel, material, cos_i = texel[lit], material[lit], cos_i[lit]
+        view, weights, corners = view[lit], weights[lit], corners[lit]
+        incidence, normal = incidence.select(lit), normals[texel]
+        flat = self.radiance.reshape(-1, 3)
+        radiance = np.einsum("nj,njc->nc", weights, flat[corners])
+        single = [a.astype(np.float32) for a in (normal, incidence.towards, view)]
+        angles = half_difference(*single)
+        brightness = incidence.irradiance * cos_i[:, None]
+        reflected = radiance / brightness
+        noise = NOISE * self.bright / brightness.mean(axis=1)
+        cos_o = np.einsum("ij,ij->i", normal, view)
+        sine = np.sqrt(np.maximum(1 - cos_i**2, 0))
+        n = len(texel)
+        scale, error, specular, gloss = np.empty((n, 3)), np.empty(n), np.empty(n), np.empty(n)
+        for index, level in enumerate(self.levels):
+            own = np.flatnonzero(material == index)
+            if not len(own):
+                continue
+            part = level.at(type(angles)(*(a[own] for a in angles)))
+            rho = reflected[own] * level.scale
+            grey = rho.mean(axis=1)
+            body = np.maximum(part.body.mean(axis=1), 1e-9)
+            shine = part.specular.mean(axis=1)
+            tilt = level.normal_error * sine[own] / cos_i[own]
+            steep = GRAZING * (1 / cos_i[own] + 1 / cos_o[own] - 2)
+            variance = (
+                (level.scale * noise[own]) ** 2
+                + (RELATIVE**2 + tilt**2 + steep**2) * grey**2
+                + (SPECULAR_TRUST * shine) ** 2
+                + part.slope**2
+            )
+            scale[own] = (rho - part.specular) / np.maximum(part.body, 1e-9)
+            error[own] = np.sqrt(variance) / body
+            specular[own] = shine / np.maximum(shine + body, 1e-12)
+            shiny = level.split.whole | (specular[own] > SHINY)
+            gloss[own] = np.where(shiny, part.gloss / body, 0.0)
+        return TexelSamples(texel, scale, error, specular, gloss, material)
+
+    def _shadowed(self, points: Array, normals: Array, light: Incidence) -> NDArray[np.bool_]:
+        """(n,) whether any of the light's disc is hidden: penumbras count as shadow."""
+        blocked = cast_shadow(self.rays, points, normals, light.towards, light.distance)
+        radius = angular_radius(self.light, light)
+        if radius is None:
+            return blocked
+        helper = np.where(np.abs(light.towards[:, :1]) < 0.7, [[1.0, 0, 0]], [[0, 1.0, 0]])
+        first = np.cross(light.towards, helper)
+        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        second = np.cross(light.towards, first)
+        for k in range(LIMB):
+            turn = 2 * np.pi * k / LIMB
+            aside = np.tan(radius)[:, None] * (np.cos(turn) * first + np.sin(turn) * second)
+            towards = light.towards + aside
+            towards = towards / np.linalg.norm(towards, axis=1, keepdims=True)
+            blocked |= cast_shadow(self.rays, points, normals, towards, light.distance)
+        return blocked
+
+
+def angular_radius(light: Light, incidence: Incidence) -> Array | None:
+    """(n,) radians, half of what the light spans at each point; None for a point-like one."""
+    if isinstance(light, DistantLight):
+        return None if light.angular_radius <= 0 else np.full(
+            len(incidence.towards), light.angular_radius
+        )  # fmt: skip
+    if isinstance(light, NearLight | MountedLight) and light.radius > 0:
+        assert incidence.distance is not None
+        return np.arctan(light.radius / np.maximum(incidence.distance, 1e-12))
+    return None
+
+
+def _corners(pixels: Array, camera: Camera) -> tuple[Array, NDArray[np.intp]]:
+    """(weights (n, 4), flat pixels (n, 4)) of bilinear interpolation at pixels (n, 2), whose
+    centres are at halves."""
+    at = pixels - 0.5
+    low = np.floor(at).astype(np.intp)
+    low[:, 0] = np.clip(low[:, 0], 0, max(camera.width - 2, 0))
+    low[:, 1] = np.clip(low[:, 1], 0, max(camera.height - 2, 0))
+    x, y = np.clip((at - low).T, 0.0, 1.0)
+    right = np.minimum(low[:, 0] + 1, camera.width - 1)
+    below = np.minimum(low[:, 1] + 1, camera.height - 1)
+    weights = np.stack([(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y], axis=1)
+    columns = np.stack([low[:, 0], right, low[:, 0], right], axis=1)
+    rows = np.stack([low[:, 1], low[:, 1], below, below], axis=1)
+    return weights.astype(np.float32), rows * camera.width + columns

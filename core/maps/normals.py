@@ -1,0 +1,143 @@
+"""A normal map from what photos say of the surface's normals, given the BRDF.
+
+The estimator turns the scan's normals patch by patch (core/fit/measured/normals.py) to be rid of
+their errors. Here the same turns, from samples without paint, are kept: between patches' centres
+they are interpolated, and each texel's normal is written in its tangent frame: red along growing u,
+green along growing v, blue along the smooth normal (what Blender's Normal Map node and glTF read).
+
+Tangents are the mean of the faces' ∂P/∂u around a vertex of one island, weighted by the corners'
+angles, square to the normal: MikkTSpace's but for its order of sums. Turns are some degrees; a
+tangent's own error of a degree matters in the second order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ..basis.log_table import LogTable
+from ..fit.measured.normals import refine_normals
+from ..fit.measured.patches import Patches
+from ..samples import SampleTable
+from ..scan import Mesh
+from .level import MaterialLevel
+from .texels import Texels
+
+Array = NDArray[np.float64]
+
+NEAREST = 6  # patches that a texel's turn is taken from
+REACH = 3.0  # patch sizes: farther away nothing was seen
+FEWEST = 50  # samples of a material
+MOST_SAMPLES = 1_000_000
+CHUNK = 1 << 17
+
+
+@dataclass(frozen=True)
+class TurnedNormals:
+    """p patches of the surface. points: (p, 3) their centres, scan frame; turn: (p, 3) is added to
+    the scan's unit normal; size: a patch's edge, scan units."""
+
+    points: Array
+    turn: Array
+    size: float
+
+    @classmethod
+    def of(
+        cls, tables: Sequence[SampleTable], levels: Sequence[MaterialLevel]
+    ) -> TurnedNormals | None:
+        """From samples without paint, one table a material; None where none has enough."""
+        points: list[Array] = []
+        turns: list[Array] = []
+        sizes = []
+        for table, level in zip(tables, levels, strict=True):
+            if len(table) < FEWEST:
+                continue
+            step = -(-len(table) // MOST_SAMPLES)
+            some = table if step == 1 else table.select(np.arange(0, len(table), step))
+            patches = Patches.of_points(some.point)
+            brdf = LogTable.of(level.brdf.basis, level.brdf.coefficients)
+            found = refine_normals(some, patches, brdf, level.normal_error)
+            count = np.bincount(patches.of, minlength=patches.count)
+            for values, out in (
+                (some.point, points),
+                (found.table.normal.astype(np.float64) - some.normal, turns),
+            ):
+                sums = [np.bincount(patches.of, v, patches.count) for v in values.T]
+                out.append(np.stack(sums, axis=1) / count[:, None])
+            sizes.append(patches.size)
+        if not points:
+            return None
+        return cls(np.concatenate(points), np.concatenate(turns), float(np.max(sizes)))
+
+    def at(self, points: Array, normals: Array) -> Array:
+        """(n, 3) unit normals at points (n, 3) whose smooth normals are ``normals`` (n, 3)."""
+        out = np.empty_like(normals)
+        tree, count = cKDTree(self.points), min(NEAREST, len(self.points))
+        for begin in range(0, len(points), CHUNK):
+            part = slice(begin, begin + CHUNK)
+            away, near = tree.query(points[part], k=count)
+            away = away.reshape(-1, count) / self.size
+            weight = np.exp(-0.5 * away**2) * (away < REACH)
+            # what is far from all patches keeps its normal
+            total = np.maximum(weight.sum(axis=1, keepdims=True), 0.2)
+            turn = np.einsum("nk,nkc->nc", weight / total, self.turn[near.reshape(-1, count)])
+            normal = normals[part]
+            turn -= np.einsum("nc,nc->n", turn, normal)[:, None] * normal
+            out[part] = _unit(normal + turn)
+        return out
+
+
+def tangent_normals(mesh: Mesh, texels: Texels, turned: TurnedNormals) -> NDArray[np.float32]:
+    """(n, 3) unit normals of all texels in their tangent frames: (0, 0, 1) is the mesh's own."""
+    corner, tangents, sign = corner_tangents(mesh)
+    out = np.empty((len(texels), 3), np.float32)
+    for begin in range(0, len(texels), CHUNK):
+        part = slice(begin, begin + CHUNK)
+        normal = texels.normals(mesh, part)
+        face = texels.face[part]
+        second, third = (w[part, None].astype(np.float64) for w in (texels.second, texels.third))
+        a, b, c = (tangents[corner[face, k]] for k in range(3))
+        tangent = (1 - second - third) * a + second * b + third * c
+        tangent -= np.einsum("nc,nc->n", tangent, normal)[:, None] * normal
+        tangent = _unit(tangent)
+        other = sign[face, None] * np.cross(normal, tangent)
+        found = turned.at(texels.points(mesh, part), normal)
+        frame = np.stack([tangent, other, normal], axis=1)
+        out[part] = np.einsum("nij,nj->ni", frame, found)
+    return out
+
+
+def corner_tangents(mesh: Mesh) -> tuple[NDArray[np.int64], Array, Array]:
+    """(tangent of each face's corner (f, 3) as a place in the next, tangents (t, 3) unit, (f,) +1
+    or −1 where a face is mirrored in the texture). Corners share one where they share vertex,
+    texture coordinates and handedness."""
+    assert mesh.uv is not None
+    uv = mesh.uv.astype(np.float64)
+    point = mesh.vertices[mesh.faces]
+    first, second = point[:, 1] - point[:, 0], point[:, 2] - point[:, 0]
+    u1, v1 = (uv[:, 1] - uv[:, 0]).T
+    u2, v2 = (uv[:, 2] - uv[:, 0]).T
+    area = u1 * v2 - u2 * v1
+    sign = np.where(area < 0, -1.0, 1.0)
+    along = _unit(sign[:, None] * (v2[:, None] * first - v1[:, None] * second))
+    key = np.column_stack(
+        [mesh.faces.ravel(), mesh.uv.reshape(-1, 2).view(np.int32), np.repeat(sign, 3)]
+    )
+    _, corner = np.unique(key, axis=0, return_inverse=True)
+    corner = corner.reshape(-1, 3)
+    sums = np.zeros((int(corner.max()) + 1, 3))
+    for k in range(3):
+        a = _unit(point[:, (k + 1) % 3] - point[:, k])
+        b = _unit(point[:, (k + 2) % 3] - point[:, k])
+        angle = np.arccos(np.clip(np.einsum("nc,nc->n", a, b), -1, 1))
+        for axis in range(3):
+            sums[:, axis] += np.bincount(corner[:, k], angle * along[:, axis], len(sums))
+    return corner.astype(np.int64), _unit(sums), sign
+
+
+def _unit(v: Array) -> Array:
+    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-30)

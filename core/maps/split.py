@@ -1,0 +1,105 @@
+"""A BRDF divided into a body, which has the surface's own colour, and the specular remainder.
+
+ρ = body + specular, body = min(ρ, D), D (3,) the level of the BRDF away from its highlight. A texel
+scales the body: ρ' = s·min(ρ, D) + (ρ − min(ρ, D)).
+
+Why so: min(ρ, D) lies below the BRDF everywhere, so no part is negative for any s ≥ 0, whatever
+shape the measured lobe has; where the BRDF is below D (shadowed grazing directions) all of it
+scales. It needs no lobe model to be right, and is one line in a shader. D is the lower quartile of
+well-seen directions: a diffuse surface under a coat has one value in nearly all of them, a
+lobe's tails raise some, and few directions are so grazing that they fall below.
+
+A metal has no body: what is left beside its highlight is the lobe's own tail. Where the body
+reflects less than BODY of the light, the whole BRDF scales instead, as Principled's base colour
+scales a metal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import Angles, half_difference
+
+LIMIT = 60.0  # degrees of light and view from the normal
+POLAR, AZIMUTH = 12, 24  # directions
+QUANTILE = 0.25
+BODY = 0.15  # share of the reflected light that makes a body
+EVERYTHING = 1e9  # 1/sr: D of a material that scales as a whole
+
+
+@dataclass(frozen=True)
+class BodySplit:
+    """body: (3,) D in 1/sr, EVERYTHING where the material scales as a whole. share: of the light
+    reflected at normal incidence and at 45°, what the body reflects."""
+
+    body: NDArray[np.float64]
+    share: float
+
+    @property
+    def whole(self) -> bool:
+        """True where all of the BRDF scales, for want of a body."""
+        return bool(self.body[0] >= EVERYTHING)
+
+    def parts(self, rho: NDArray[np.floating]) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+        """(body, specular), each (n, 3) in 1/sr, of reflectances ρ (n, 3)."""
+        body = np.minimum(rho, self.body.astype(rho.dtype))
+        return body, rho - body
+
+
+def split_body(evaluate: Callable[[Angles], NDArray[np.floating]]) -> BodySplit:
+    """The split of ``evaluate(angles) -> (n, 3)`` in 1/sr."""
+    angles, weight = _directions()
+    rho = np.maximum(np.asarray(evaluate(angles), np.float64), 0.0)
+    level = np.array([_quantile(channel, weight) for channel in rho.T])
+    share = _share(evaluate, level)
+    if share < BODY:
+        return BodySplit(np.full(3, EVERYTHING), share)
+    return BodySplit(level, share)
+
+
+def _directions() -> tuple[Angles, NDArray[np.float64]]:
+    """Light and view within LIMIT of the normal; weight: (n,) projected solid angles."""
+    edges = np.linspace(0.0, np.sin(np.radians(LIMIT)) ** 2, POLAR + 1)
+    polar = np.arcsin(np.sqrt(0.5 * (edges[1:] + edges[:-1])))  # equal projected solid angles
+    azimuth = np.pi * (np.arange(AZIMUTH) + 0.5) / AZIMUTH
+    i, o, phi = (a.ravel() for a in np.meshgrid(polar, polar, azimuth, indexing="ij"))
+    light = np.stack([np.sin(i) * np.cos(phi), np.sin(i) * np.sin(phi), np.cos(i)], axis=1)
+    view = np.stack([np.sin(o), np.zeros_like(o), np.cos(o)], axis=1)
+    normal = np.broadcast_to([0.0, 0.0, 1.0], light.shape)
+    return half_difference(normal, light, view), np.ones(len(i))
+
+
+def _quantile(values: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
+    order = np.argsort(values)
+    below = np.cumsum(weight[order])
+    return float(values[order[np.searchsorted(below, QUANTILE * below[-1])]])
+
+
+def _share(evaluate: Callable[[Angles], NDArray[np.floating]], level: NDArray[np.float64]) -> float:
+    """What min(ρ, level) reflects of what ρ does, all channels, light at 0° and 45°.
+
+    Half vectors are drawn finely near the normal, where lobes are: dω_i = 4 (l·h) dω_h.
+    """
+    own = total = 0.0
+    theta = np.radians(90.0) * ((np.arange(160) + 0.5) / 160) ** 2
+    wide = np.gradient(theta)
+    phi = 2 * np.pi * (np.arange(32) + 0.5) / 32
+    h, p = (a.ravel() for a in np.meshgrid(theta, phi, indexing="ij"))
+    solid = np.repeat(np.sin(theta) * wide, len(phi)) * 2 * np.pi / len(phi)
+    half = np.stack([np.sin(h) * np.cos(p), np.sin(h) * np.sin(p), np.cos(h)], axis=1)
+    for view_angle in (0.0, 0.25 * np.pi):
+        view = np.array([np.sin(view_angle), 0.0, np.cos(view_angle)])
+        along = half @ view
+        light = 2 * along[:, None] * half - view
+        up = (light[:, 2] > 0.01) & (along > 0.01)
+        normal = np.broadcast_to([0.0, 0.0, 1.0], light[up].shape)
+        angles = half_difference(normal, light[up], np.broadcast_to(view, light[up].shape))
+        rho = np.maximum(np.asarray(evaluate(angles), np.float64), 0.0)
+        reflected = (light[up, 2] * 4 * along[up] * solid[up])[:, None]
+        own += float(np.sum(np.minimum(rho, level) * reflected))
+        total += float(np.sum(rho * reflected))
+    return own / max(total, 1e-12)

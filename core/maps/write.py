@@ -1,0 +1,226 @@
+"""Maps as pictures and numbers: base colour, roughness, scale, shares, coverage, maps.json."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..photo import write_png
+from ..photo.image import write_exr
+from .dilate import dilated, margin_of
+from .maps_job import MapsResult
+from .settle import MaterialMaps
+
+Format = Literal["exr", "png"]
+BLEND = "blend"  # NAME of the maps that blend all materials
+PHOTO_STEP = 25  # of coverage.png, a photo
+WORST_ERROR = 0.5  # relative, white in uncertainty.png
+ROUGHEST = 1.0
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class MapFile:
+    """A written map. material: its name, BLEND, or "" for the mesh; kind: base_color, roughness …;
+    colour: True where its numbers are colours (sRGB in a PNG, linear in an EXR)."""
+
+    material: str
+    kind: str
+    file: str
+    colour: bool
+
+
+def write_maps(folder: Path, result: MapsResult, kind: Format) -> list[MapFile]:
+    """All maps of a result into ``folder``, and maps.json."""
+    files = []
+    for map_file, values, fill in _maps(result, kind):
+        _write(folder / map_file.file, result, values, fill, map_file.colour)
+        files.append(map_file)
+    _write_json(folder / "maps.json", result, files)
+    return files
+
+
+def base_color(result: MapsResult, index: int) -> NDArray[np.float32]:
+    """(n, 3) base colour of the fitted Principled with the body's scale: linear, 0 … 1."""
+    fitted = result.materials[index].principled.base_color
+    scale = result.maps.materials[index].scale
+    return np.clip(np.asarray(fitted, np.float32) * scale, 0.0, 1.0)
+
+
+def roughness(result: MapsResult, index: int) -> NDArray[np.float32]:
+    """(n,) roughness of the fitted Principled (its square root of α) with the gloss found."""
+    fitted = result.materials[index].principled.roughness
+    return _rougher(result.maps.materials[index], float(fitted))
+
+
+def albedo(result: MapsResult, index: int) -> NDArray[np.float32]:
+    """(n, 3) what the body reflects of light from everywhere, π·D·scale; of a material that varies
+    as a whole, its base colour."""
+    split = result.levels[index].split
+    if split.whole:
+        return base_color(result, index)
+    return (np.pi * split.body * result.maps.materials[index].scale).astype(np.float32)
+
+
+def _rougher(maps: MaterialMaps, fitted: float) -> NDArray[np.float32]:
+    return np.clip(fitted * np.exp(0.5 * maps.gloss), 0.0, ROUGHEST).astype(np.float32)
+
+
+def _maps(
+    result: MapsResult, kind: Format
+) -> Iterator[tuple[MapFile, NDArray[np.float32], NDArray[np.floating] | float]]:
+    """(file, values (n,) or (n, 3), what stands where no face is)."""
+    several = len(result.materials) > 1
+    for index, material in enumerate(result.materials):
+        name = material.name
+
+        def named(what: str, colour: bool, name: str = name, ending: str = kind) -> MapFile:
+            return MapFile(name, what, f"{name}_{what}.{ending}", colour)
+
+        colours = base_color(result, index)
+        yield named("base_color", True), colours, _typical(result, index, colours)
+        yield named("albedo", True), albedo(result, index), _typical(result, index, colours)
+        shine = roughness(result, index)
+        yield named("roughness", False), shine, float(material.principled.roughness)
+        yield named("scale", False, ending="exr"), result.maps.materials[index].scale, 1.0
+        if several:
+            yield named("mask", False), result.maps.materials[index].share, 0.0
+    if several:
+        for what, values in _blended(result).items():
+            file = MapFile(BLEND, what, f"{BLEND}_{what}.{kind}", what == "base_color")
+            yield file, values, values.mean(axis=0)
+    if result.normal is not None:
+        flat = np.array([0.5, 0.5, 1.0], np.float32)
+        file = MapFile("", "normal", f"normal.{kind}", False)
+        yield file, 0.5 + 0.5 * result.normal, flat
+    photos = np.clip(result.maps.photos * (PHOTO_STEP / 255), 0, 1).astype(np.float32)
+    yield MapFile("", "coverage", "coverage.png", False), photos, 0.0
+    error = np.clip(result.maps.error / WORST_ERROR, 0, 1)
+    yield MapFile("", "uncertainty", "uncertainty.png", False), error, 1.0
+
+
+def _typical(result: MapsResult, index: int, colours: NDArray[np.float32]) -> NDArray[np.floating]:
+    """(3,) mean over the material's own texels."""
+    own = result.maps.material == index
+    return colours[own].mean(axis=0) if own.any() else colours.mean(axis=0)
+
+
+def _blended(result: MapsResult) -> dict[str, NDArray[np.float32]]:
+    """Maps of one Principled for the whole mesh: each input of the materials by their shares."""
+    share = [maps.share for maps in result.maps.materials]
+    found: dict[str, NDArray[np.float32]] = {}
+    for what in ("base_color", "roughness", "metallic", "specular"):
+        total: Any = 0.0
+        for index, own in enumerate(share):
+            principled = result.materials[index].principled
+            if what == "base_color":
+                total = total + own[:, None] * base_color(result, index)
+            elif what == "roughness":
+                total = total + own * roughness(result, index)
+            elif what == "metallic":
+                total = total + own * np.float32(principled.metallic)
+            else:
+                total = total + own * np.float32(principled.specular_ior_level)
+        found[what] = np.asarray(total, np.float32)
+    return found
+
+
+def _write(
+    path: Path,
+    result: MapsResult,
+    values: NDArray[np.float32],
+    fill: NDArray[np.floating] | float,
+    colour: bool,
+) -> None:
+    texels = result.texels
+    known = texels.image(np.ones(len(texels), bool), False)
+    (image,), reached = dilated([texels.image(values)], known, margin_of(texels.size))
+    image[~reached] = fill
+    if path.suffix == ".png":
+        shown = _srgb(image) if colour else image
+        write_png(path, np.round(255 * np.clip(shown, 0, 1)).astype(np.uint8))
+    else:
+        rgb = image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2)
+        write_exr(path, rgb, half=True)
+
+
+def _srgb(linear: NDArray[np.float32]) -> NDArray[np.float32]:
+    """IEC 61966-2-1."""
+    low = 12.92 * linear
+    high = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
+    return np.where(linear <= 0.0031308, low, high).astype(np.float32)
+
+
+def _write_json(path: Path, result: MapsResult, files: list[MapFile]) -> None:
+    partial = path.with_name(path.name + ".part")
+    text = json.dumps(describe(result, files), indent=1, allow_nan=False)
+    partial.write_text(text + "\n", "utf-8")
+    os.replace(partial, path)
+
+
+def describe(result: MapsResult, files: list[MapFile]) -> dict[str, Any]:
+    """The content of maps.json."""
+    maps, texels = result.maps, result.texels
+    seen = maps.photos > 0
+    return {
+        "format": FORMAT,
+        "capture": str(result.capture.file),
+        "size": texels.size,
+        "texels": len(texels),
+        "overlapped": texels.overlapped,
+        "faces_outside": texels.outside,
+        "unwrapped": result.unwrapped,
+        "seen": float(seen.mean()),
+        "photos": {
+            "median": float(np.median(maps.photos)),
+            "percentile_10": float(np.percentile(maps.photos, 10)),
+        },
+        "standard_error": {
+            "measure": "relative, of the base colour of texels that a photo sees lit",
+            "median": float(np.median(maps.error[seen])),
+            "percentile_90": float(np.percentile(maps.error[seen], 90)),
+        },
+        "highlight_seen": float(maps.highlight.mean()),
+        "normals_turned": None if result.normal is None else _turned(result.normal[seen]),
+        "materials": [_material(result, index) for index in range(len(result.materials))],
+        "files": [vars(f) for f in files],
+        "notes": list(result.notes),
+    }
+
+
+def _material(result: MapsResult, index: int) -> dict[str, Any]:
+    level, maps = result.levels[index], result.maps
+    own = maps.material == index
+    seen = own & (maps.photos > 0)
+    scale = maps.materials[index].scale[seen]
+    low, middle, high = np.percentile(scale, (5, 50, 95), axis=0) if seen.any() else np.ones((3, 3))
+    return {
+        "name": level.name,
+        "texels": int(own.sum()),
+        "seen": int(seen.sum()),
+        "varies": "the whole reflectance" if level.split.whole else "its diffuse part",
+        "diffuse_share": level.split.share,
+        "diffuse_albedo": None if level.split.whole else (np.pi * level.split.body).tolist(),
+        "base_color": np.asarray(result.materials[index].principled.base_color).tolist(),
+        "scale": {
+            "percentile_5": low.tolist(),
+            "median": middle.tolist(),
+            "percentile_95": high.tolist(),
+        },
+    }
+
+
+def _turned(normal: NDArray[np.float32]) -> dict[str, float]:
+    """Degrees between the map's normals and the mesh's, of texels that a photo sees lit."""
+    angle = np.degrees(np.arctan2(np.hypot(normal[:, 0], normal[:, 1]), normal[:, 2]))
+    return {
+        "median": float(np.median(angle)),
+        "percentile_95": float(np.percentile(angle, 95)),
+    }

@@ -1,0 +1,78 @@
+"""A result folder written by hand: what `fit` leaves, without a fit."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from patina.core.basis import Basis
+
+BRONZE, FABRIC, ACRYLIC = 0, 4, 10  # places in the embedded basis' training set
+PRINCIPLED = {
+    "base_color": [0.5, 0.25, 0.1],
+    "metallic": 0.0,
+    "roughness": 0.3,
+    "ior": 1.5,
+    "specular_ior_level": 0.4,
+    "specular_tint": [1.0, 1.0, 1.0],
+    "coat_weight": 0.2,
+    "coat_roughness": 0.1,
+    "coat_ior": 1.5,
+    "cube_root_error": 0.06,
+    "lambertian_cube_root_error": 0.5,
+}
+
+
+def coefficients(place: int) -> np.ndarray:
+    """(3, k) of a material that the basis was trained with."""
+    training = Basis.default().training
+    assert training is not None
+    return training[3 * place : 3 * place + 3]
+
+
+def material(name: str, place: int, /, **changes: Any) -> dict[str, Any]:
+    """One entry of "materials"."""
+    return {
+        "name": name,
+        "estimator": "measured",
+        "coefficients": coefficients(place).tolist(),
+        "scale_known": True,
+        "scale": 1.0,
+        "held_out": {"error": 0.3, "typical": 0.05, "per_photo": {"a.exr": 0.3}},
+        "principled": dict(PRINCIPLED),
+        "warnings": ["one", "two"],
+        **changes,
+    }
+
+
+def description(*materials: dict[str, Any]) -> dict[str, Any]:
+    """The content of a result.json."""
+    return {
+        "format": 2,
+        "program": {"name": "patina", "version": "0.1.0"},
+        "basis": {"version": Basis.default().version, "components": 100, "columns": 300},
+        "capture": "/somewhere/x.capture.toml",
+        "materials": list(materials),
+    }
+
+
+def write_result(folder: Path, told: dict[str, Any]) -> Path:
+    """Leave result.json in a folder; returns the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "result.json").write_text(json.dumps(told), "utf-8")
+    return folder
+
+
+def two_materials(folder: Path) -> Path:
+    """A metal and a fabric."""
+    metal = dict(PRINCIPLED, metallic=1.0, coat_weight=0.0, base_color=[0.7, 0.5, 0.3])
+    return write_result(
+        folder,
+        description(
+            material("bronze", BRONZE, principled=metal),
+            material("old rug", FABRIC),
+        ),
+    )

@@ -1,0 +1,113 @@
+"""`material RESULT --to …`: what is left, exit codes, one line for a mistake, no half files."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from patina.commands import material
+from patina.core.errors import InputError
+from tests import make_result as made
+
+pytestmark = pytest.mark.blender
+
+
+def headless(root: Path, *words: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, root / "headless.py", "material", *map(str, words)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made.two_materials(tmp_path_factory.mktemp("result"))
+
+
+def test_several_formats_at_once(root: Path, result: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "mine.txt").write_text("kept")
+    done = headless(
+        root, result, "--to", "binary", "mtlx", "pbrt", "mitsuba", "--material", "old rug",
+        "--out", out,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert {p.name for p in out.iterdir()} == {
+        "mine.txt", "losses.txt", "losses.json", "old rug.binary", "old_rug.mtlx", "old_rug.pbrt",
+        "old_rug.bsdf", "old_rug.xml", "old_rug_spectral.xml", "old_rug_mitsuba.npz",
+        "patina_bsdf.py", "render.py",
+    }  # fmt: skip
+    told = json.loads((out / "losses.json").read_text("utf-8"))["losses"]
+    assert [loss["format"] for loss in told] == ["binary", "mtlx", "pbrt", "mitsuba"]
+    for loss in told:
+        assert loss["material"] == "old rug" and loss["errors"]
+        assert all((out / file).is_file() for file in loss["files"])
+        for what, error in loss["errors"].items():
+            assert 0 <= error < np.inf and what in done.stdout
+    assert (result / "result.json").is_file() and len(list(result.iterdir())) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [(["--to", "png"], "invalid choice"), (["--to", "exr", "--material", "gold"], "old rug")],
+)
+def test_wrong_words_are_one_line(root, result, tmp_path, words, message) -> None:
+    done = headless(root, result, *words, "--out", tmp_path / "out")
+    assert done.returncode == 2
+    assert message in done.stderr and len(done.stderr.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_wrong_places_are_refused_before_any_work(result: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    for source, out in (
+        (tmp_path / "nothing", tmp_path / "out"),
+        (tmp_path / "file", tmp_path / "out"),
+        (result, tmp_path / "file"),
+        (result, result),
+    ):
+        told = argparse.Namespace(result=source, to=["binary"], out=out, material=None)
+        with pytest.raises(InputError) as caught:
+            material.run(told)
+        assert "\n" not in str(caught.value)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file"]
+    assert [p.name for p in result.iterdir()] == ["result.json"]
+
+
+def test_a_run_that_dies_leaves_nothing(result: Path, tmp_path: Path, monkeypatch) -> None:
+    def fails(folder: Path, subjects: object) -> None:
+        (folder / "half.bsdf").write_bytes(b"half")
+        raise OSError("no space left")
+
+    monkeypatch.setitem(material.PLAIN, "pbrt", fails)
+    told = argparse.Namespace(
+        result=result, to=["binary", "pbrt"], out=tmp_path / "out", material=["bronze"]
+    )
+    with pytest.raises(InputError, match="no space left"):
+        material.run(told)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_blend_holds_assets_that_render(root: Path, result: Path, tmp_path: Path) -> None:
+    done = headless(root, result, "--to", "blend", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    import bpy
+
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "materials.blend"))
+    for name in ("bronze", "old rug"):
+        made_of = bpy.data.materials[name]
+        assert made_of.asset_data is not None and name in bpy.data.objects
+        for node in made_of.node_tree.nodes:
+            if node.bl_idname == "ShaderNodeScript":
+                file = Path(node.inputs["components"].default_value)
+                assert file.parent == tmp_path / "out" and file.is_file()
+    assert not list((tmp_path / "out").glob("*.blend1"))

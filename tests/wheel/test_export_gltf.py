@@ -1,0 +1,86 @@
+"""GLB: valid by the Khronos validator, with the fitted numbers in it."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests import make_result as made
+from tools.common import cache_dir
+
+pytestmark = pytest.mark.blender
+
+VALIDATE = """
+const fs = require('fs'), validator = require('gltf-validator');
+validator.validateBytes(new Uint8Array(fs.readFileSync(process.argv[1])))
+  .then(report => console.log(JSON.stringify(report.issues)));
+"""
+
+
+def node_modules() -> Path | None:
+    """Where npm put gltf-validator: PATINA_NODE_MODULES, or node/ in the tools' cache."""
+    told = os.environ.get("PATINA_NODE_MODULES")
+    folders = [Path(told)] if told else [cache_dir() / "node" / "node_modules"]
+    return next((f for f in folders if (f / "gltf-validator").is_dir()), None)
+
+
+def read_glb(path: Path) -> dict:
+    raw = path.read_bytes()
+    magic, version, length = struct.unpack_from("<4sII", raw)
+    assert (magic, version, length) == (b"glTF", 2, len(raw))
+    size, kind = struct.unpack_from("<I4s", raw, 12)
+    assert kind == b"JSON"
+    return json.loads(raw[20 : 20 + size])
+
+
+@pytest.fixture(scope="module")
+def glb(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("gltf")
+    result = made.two_materials(folder / "result")
+    done = subprocess.run(
+        [sys.executable, root / "headless.py", "material", result, "--to", "gltf", "--out",
+         folder / "out"], capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return folder / "out" / "materials.glb"
+
+
+def test_the_khronos_validator_finds_nothing(glb: Path) -> None:
+    node, modules = shutil.which("node"), node_modules()
+    if node is None or modules is None:
+        pytest.skip("node, or the npm package gltf-validator, is not here (PATINA_NODE_MODULES)")
+    done = subprocess.run(
+        [node, "-e", VALIDATE, glb], capture_output=True, text=True, timeout=60,
+        env={**os.environ, "NODE_PATH": str(modules)},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    issues = json.loads(done.stdout)
+    assert issues["numErrors"] == issues["numWarnings"] == 0, issues["messages"]
+
+
+def test_the_fitted_numbers_are_in_it(glb: Path) -> None:
+    told = read_glb(glb)
+    materials = {m["name"]: m for m in told["materials"]}
+    assert set(materials) == {"bronze", "old rug"}
+    bronze = materials["bronze"]["pbrMetallicRoughness"]
+    assert bronze["baseColorFactor"][:3] == pytest.approx([0.7, 0.5, 0.3], abs=1e-5)
+    assert bronze.get("metallicFactor", 1) == 1
+    assert bronze["roughnessFactor"] == pytest.approx(0.3, abs=1e-5)
+    rug = materials["old rug"]
+    assert rug["pbrMetallicRoughness"]["metallicFactor"] == 0
+    coat = rug["extensions"]["KHR_materials_clearcoat"]
+    assert coat["clearcoatFactor"] == pytest.approx(0.2, abs=1e-5)
+    assert coat["clearcoatRoughnessFactor"] == pytest.approx(0.1, abs=1e-5)
+    specular = rug["extensions"]["KHR_materials_specular"]
+    assert specular["specularFactor"] == pytest.approx(0.8, abs=1e-5)
+    assert len(told["meshes"]) == 2 and not told.get("cameras")
+    worn = {p["material"] for mesh in told["meshes"] for p in mesh["primitives"]}
+    assert worn == {0, 1}
+    assert "TEXCOORD_0" in told["meshes"][0]["primitives"][0]["attributes"]

@@ -1,0 +1,108 @@
+"""USD: found compliant by USD's own checker, with both kinds of material in it."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests import make_result as made
+
+pytestmark = pytest.mark.blender
+
+# In a process of its own: usd-core and the USD inside bpy are two libraries of one name. Earlier
+# usd-core has the checker that usdchecker was made of, later the validators that it is made of.
+# usd-core knows no MaterialX nodes: those are looked up in MaterialX's own library instead.
+CHECK = """
+import json, sys
+from pxr import Usd, UsdShade, UsdUtils
+stage = Usd.Stage.Open(sys.argv[1])
+found = {}
+ids = set()
+for prim in stage.Traverse():
+    if prim.IsA(UsdShade.Shader):
+        ids.add(UsdShade.Shader(prim).GetIdAttr().Get())
+    if prim.IsA(UsdShade.Material):
+        kinds = {}
+        for context in ("", "mtlx"):
+            shader = UsdShade.Material(prim).ComputeSurfaceSource(context)[0]
+            if shader:
+                told = {i.GetBaseName(): i.Get() for i in shader.GetInputs()}
+                plain = {k: list(v) if hasattr(v, "__len__") and not isinstance(v, str) else v
+                         for k, v in told.items() if v is not None}
+                kinds[context] = [shader.GetIdAttr().Get(), plain]
+        found[prim.GetName()] = kinds
+said, checked = [], 0
+if hasattr(UsdUtils, "ComplianceChecker"):
+    checker = UsdUtils.ComplianceChecker(arkit=False)
+    checker.CheckCompliance(sys.argv[1])
+    said += [["", x] for x in checker.GetErrors() + checker.GetFailedChecks()
+             + checker.GetWarnings()]
+    checked += 1
+try:
+    from pxr import UsdValidation
+    registry = UsdValidation.ValidationRegistry()
+    names = [m.name for m in registry.GetAllValidatorMetadata()]
+    validators = registry.GetOrLoadValidatorsByName(names)
+    for error in UsdValidation.ValidationContext(validators).Validate(stage):
+        said.append([error.GetName(), error.GetMessage()])
+    checked += len(names)
+except ImportError:
+    pass
+undefined = None
+try:
+    import MaterialX as mx
+    library = mx.createDocument()
+    mx.loadLibraries(mx.getDefaultDataLibraryFolders(), mx.getDefaultDataSearchPath(), library)
+    undefined = [i for i in ids if i.startswith("ND_") and library.getNodeDef(i) is None]
+except ImportError:
+    pass
+print(json.dumps([checked, said, undefined, found, str(stage.GetDefaultPrim().GetPath())]))
+"""
+
+
+@pytest.fixture(scope="module")
+def told(root: Path, tmp_path_factory: pytest.TempPathFactory) -> list:
+    if importlib.util.find_spec("pxr") is None:
+        pytest.skip("the usd-core package is not installed")
+    folder = tmp_path_factory.mktemp("usd")
+    result = made.two_materials(folder / "result")
+    done = subprocess.run(
+        [sys.executable, root / "headless.py", "material", result, "--to", "usd", "--out",
+         folder / "out"], capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    file = folder / "out" / "materials.usdc"
+    done = subprocess.run(
+        [sys.executable, "-c", CHECK, file], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_usdchecker_finds_nothing(told: list) -> None:
+    checked, said, undefined, _, default = told
+    assert checked > 0 and default == "/root"
+    ours = [x for x in said if not (x[0] == "MissingShaderIdInRegistry" and "'ND_" in x[1])]
+    assert ours == []
+    assert not undefined  # None where the MaterialX package is not at hand
+
+
+def test_both_materials_are_in_it(told: list) -> None:
+    found = told[3]
+    assert set(found) == {"bronze", "old_rug"}
+    kind, inputs = found["old_rug"][""]
+    assert kind == "UsdPreviewSurface"
+    assert inputs["diffuseColor"] == pytest.approx([0.5, 0.25, 0.1], abs=1e-5)
+    assert inputs["clearcoat"] == pytest.approx(0.2, abs=1e-5)
+    import bpy
+
+    if "generate_materialx_network" not in bpy.ops.wm.usd_export.get_rna_type().properties:
+        return
+    kind, inputs = found["old_rug"]["mtlx"]
+    assert kind in ("ND_open_pbr_surface_surfaceshader", "ND_standard_surface_surfaceshader")
+    assert inputs["coat_weight" if "open" in kind else "coat"] == pytest.approx(0.2, abs=1e-5)

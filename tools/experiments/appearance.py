@@ -1,0 +1,153 @@
+"""What the portable models lose: Principled and lobe stack against the table, sphere by sphere.
+
+Every material is fitted as a capture's result would be, but from its true BRDF: what is lost is the
+model's own. Pictures under Blender's HDR worlds (sphere_light.py), PSNR of the 8-bit sRGB values of
+the disc's pixels, white at the 95th percentile of the true picture; the median over the worlds
+stands for a material.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from patina.core.appearance.lobe_fit import fit_lobe_stack
+from patina.core.appearance.principled import Principled
+from patina.core.appearance.principled_fit import fit_principled
+from patina.core.photo import write_png
+from patina.core.report.display import srgb
+
+from ..common import ROOT
+from . import materials, spheres
+from .records import Record, table
+from .runs import Records
+from .sphere_light import lit
+
+IMAGES = "images/appearance"
+LARGE = 64  # pixels across in a picture of the worst
+SHOWN = ("city", "studio", "sunset")  # the worlds they are shown under
+WORST = 5
+PAPER = 246  # grey behind the spheres
+MODELS = {
+    "principled": "Principled",
+    "plain": "lobe stack, plain",
+    "lobes": "lobe stack",
+    "lambertian": "best Lambertian",
+}
+GOALS = {"principled": 38.0, "lobes": 42.0}  # dB, median over the materials
+
+
+def tasks(quick: bool) -> list[str]:
+    """The validation materials by name."""
+    names = [m.name for m in materials.materials() if not m.trained]
+    return names[:2] if quick else names
+
+
+def work(name: str) -> Records:
+    """A record: cube-root error, PSNR under each world and processor time of every model."""
+    (material,) = materials.materials([name])
+    since = time.process_time()
+    principled = fit_principled(material.evaluate)
+    between = time.process_time()
+    lobes = fit_lobe_stack(material.evaluate)
+    ended = time.process_time()
+    grey = Principled(base_color=principled.lambertian, specular_ior_level=0.0)
+    models = {
+        "principled": (principled.principled, principled.error),
+        "plain": (lobes.plain, lobes.plain_error),
+        "lobes": (lobes.stack, lobes.error),
+        "lambertian": (grey, principled.diffuse_error),
+    }
+    truth = lit().table(material.evaluate)
+    found = {
+        key: {"error": error, "psnr": spheres.psnr(lit().model(model.at), truth).tolist()}
+        for key, (model, error) in models.items()
+    }
+    return [
+        {
+            "material": name,
+            "worlds": list(spheres.worlds()),
+            **found,
+            "lobe_count": len(lobes.stack.lobes),
+            "seconds": {"principled": between - since, "lobes": ended - between},
+        }
+    ]
+
+
+def summary(records: list[Record]) -> str:
+    """The medians, and the goals beside them."""
+    rows = []
+    for key, label in MODELS.items():
+        levels = [_level(r, key) for r in records]
+        errors = [r[key]["error"] for r in records]
+        goal = f"≥ {GOALS[key]:.0f} dB" if key in GOALS else "–"
+        reached = sum(level >= GOALS.get(key, 0) for level in levels) if key in GOALS else None
+        rows.append(
+            [
+                label,
+                f"{np.median(levels):.1f} dB",
+                goal,
+                "–" if reached is None else f"{reached} of {len(records)}",
+                f"{min(levels):.1f} … {max(levels):.1f} dB",
+                f"{100 * np.median(errors):.1f} %",
+            ]
+        )
+    head = ["model", "median PSNR", "goal", "materials that reach it", "range"]
+    seconds = [np.median([r["seconds"][key] for r in records]) for key in ("principled", "lobes")]
+    return (
+        table([*head, "median cube-root error"], rows)
+        + f"\nProcessor time of a fit, median: Principled {seconds[0]:.1f} s, lobe stack "
+        f"{seconds[1]:.1f} s.\n"
+    )
+
+
+def by_material(records: list[Record]) -> str:
+    """One row a material, the worst lobe stack last."""
+    rows = []
+    for r in sorted(records, key=lambda r: -_level(r, "lobes")):
+        rows.append(
+            [r["material"]]
+            + [f"{_level(r, key):.1f}" for key in MODELS]
+            + [f"{100 * r[key]['error']:.1f}" for key in MODELS]
+            + [str(r["lobe_count"])]
+        )
+    head = ["material", *(f"{label}, dB" for label in MODELS.values())]
+    return table([*head, *(f"{label}, %" for label in MODELS.values()), "lobes"], rows)
+
+
+def worst(records: list[Record]) -> str:
+    """The five materials that the lobe stack does worst, each with its picture."""
+    folder = ROOT / "docs" / IMAGES
+    folder.mkdir(parents=True, exist_ok=True)
+    parts = []
+    for r in sorted(records, key=lambda r: _level(r, "lobes"))[:WORST]:
+        name = r["material"]
+        write_png(folder / f"{name}.png", _picture(name))
+        parts.append(
+            f"**{name}**: lobe stack {_level(r, 'lobes'):.1f} dB, Principled "
+            f"{_level(r, 'principled'):.1f} dB\n\n![{name}: table, lobe stack, Principled under "
+            f"{', '.join(SHOWN)}]({IMAGES}/{name}.png)"
+        )
+    return "\n\n".join(parts)
+
+
+def _level(record: Record, key: str) -> float:
+    return float(np.median(record[key]["psnr"]))
+
+
+def _picture(name: str) -> np.ndarray:
+    """(LARGE, 9·LARGE, 3): table, lobe stack, Principled, under each of the worlds shown."""
+    (material,) = materials.materials([name])
+    lobes, principled = fit_lobe_stack(material.evaluate), fit_principled(material.evaluate)
+    spheres_shown = []
+    for world in SHOWN:
+        light = lit(LARGE, world)
+        truth = light.table(material.evaluate)[0]
+        white = max(float(np.percentile(truth, spheres.WHITE)), 1e-9)
+        models = [light.model(model.at)[0] for model in (lobes.stack, principled.principled)]
+        for radiance in (truth, *models):
+            picture = np.full((LARGE, LARGE, 3), PAPER, np.uint8)
+            picture[light.inside] = srgb(radiance / white)
+            spheres_shown.append(picture)
+    return np.concatenate(spheres_shown, axis=1)

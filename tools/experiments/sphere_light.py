@@ -1,0 +1,158 @@
+"""A sphere under the HDR worlds, fit for mirrors too: every lobe is resolved, whatever its width.
+
+spheres.py draws one direction in each of 48 × 96 cells of a world: a lobe narrower than a cell is
+hit or missed. Here a pixel's directions of light lie on a grid of half vectors around its normal,
+θh on a logarithm, and each takes the mean of the world over about its own solid angle, from a
+pyramid of ever coarser maps. Orthographic view, no shadows or interreflection (a sphere has none).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from patina.core.angles import Angles, half_difference
+from patina.core.appearance.principled import Configuration
+
+from .spheres import Evaluate, worlds
+
+Floats = NDArray[np.float32]
+At = Callable[[Configuration], NDArray[np.floating]]
+
+DISC = 28  # pixels across
+NODES = (44, 48)  # half vectors: θh on a logarithm, φh over a whole turn
+KNEE = np.radians(0.3)
+BLOCK = 200  # pixels at a time
+
+
+@dataclass(frozen=True)
+class Lit:
+    """Pairs of pixel and direction of light. normal: (p, 3) of the disc's pixels; inside: (h, w)
+    where they are; angles, cos_i, cos_o, each (p, n); light: (worlds, p, n, 3) L·cosθ·dω, 0 where
+    there is no such direction."""
+
+    inside: NDArray[np.bool_]
+    angles: Angles
+    cos_i: Floats
+    cos_o: Floats
+    light: Floats
+
+    def table(self, evaluate: Evaluate) -> Floats:
+        """(worlds, p, 3) radiance of a BRDF that knows half/difference angles."""
+        return self._sum(lambda rows: evaluate(Angles(*(a[rows].ravel() for a in self.angles))))
+
+    def model(self, at: At) -> Floats:
+        """(worlds, p, 3) radiance of a model that tells light from view."""
+
+        def rho(rows: slice) -> NDArray[np.floating]:
+            cos_h, cos_d = (np.cos(a[rows].ravel()) for a in self.angles[:2])
+            return at(
+                Configuration(self.cos_i[rows].ravel(), self.cos_o[rows].ravel(), cos_h, cos_d)
+            )
+
+        return self._sum(rho)
+
+    def _sum(self, rho: Callable[[slice], NDArray[np.floating]]) -> Floats:
+        found = np.zeros((len(self.light), len(self.cos_i), 3), np.float32)
+        for start in range(0, len(self.cos_i), BLOCK):
+            rows = slice(start, start + BLOCK)
+            values = np.asarray(rho(rows), np.float32).reshape(*self.cos_i[rows].shape, 3)
+            found[:, rows] = np.einsum("wpnc,pnc->wpc", self.light[:, rows], values)
+        return found
+
+
+@lru_cache(maxsize=4)
+def lit(disc: int = DISC, only: str | None = None) -> Lit:
+    """The pairs of a disc ``disc`` pixels across; only: under one of the worlds."""
+    axis = (np.arange(disc) + 0.5) / disc * 2 - 1
+    x, z = np.meshgrid(axis, -axis)
+    inside = x**2 + z**2 < 0.98
+    x, z = x[inside], z[inside]
+    normal = np.stack([x, -np.sqrt(1 - x**2 - z**2), z], axis=1)  # the camera looks along +y
+    view = np.array([0.0, -1.0, 0.0])
+    n_h, n_p = NODES
+    span = np.log1p(np.pi / 2 / KNEE)
+    theta = KNEE * np.expm1((np.arange(n_h) + 0.5) / n_h * span)
+    theta, phi = np.meshgrid(theta, (np.arange(n_p) + 0.5) / n_p * 2 * np.pi, indexing="ij")
+    solid = ((theta + KNEE) * span / n_h * np.sin(theta) * 2 * np.pi / n_p).ravel()
+    local = np.stack(
+        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
+    ).reshape(-1, 3)
+    tangent = np.cross(normal, np.where(np.abs(normal[:, :1]) < 0.6, [1.0, 0, 0], [0, 0, 1.0]))
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    frame = np.stack([tangent, np.cross(normal, tangent), normal], axis=1)  # (p, 3, xyz)
+    half = local @ frame  # (p, n, 3)
+    cos_d = half @ view
+    light = 2 * cos_d[..., None] * half - view
+    cos_i = np.einsum("pnx,px->pn", light, normal)
+    seen = (cos_d > 1e-4) & (cos_i > 1e-4)
+    size = np.where(seen, 4 * np.maximum(cos_d, 0) * solid, 1.0)
+    weight = np.where(seen, cos_i * size, 0.0)
+    names = [only] if only else list(worlds())
+    radiance = np.stack([pyramid(name).mean_over(light, size) for name in names])
+    angles = half_difference(normal[:, None, :], light, np.broadcast_to(view, light.shape))
+    cos_o = np.broadcast_to((normal @ view)[:, None], cos_i.shape)
+    return Lit(
+        inside,
+        Angles(*(a.astype(np.float32) for a in angles)),
+        np.maximum(cos_i, 1e-4).astype(np.float32),
+        cos_o.astype(np.float32),
+        (radiance * weight[..., None]).astype(np.float32),
+    )
+
+
+@dataclass(frozen=True)
+class Pyramid:
+    """A world as latitude-longitude maps, each half as large as the one before."""
+
+    maps: tuple[Floats, ...]
+
+    def mean_over(self, light: NDArray[np.floating], size: NDArray[np.floating]) -> Floats:
+        """Mean radiance (..., 3) over about ``size`` sr around unit vectors (..., 3), z up."""
+        rows, columns = self.maps[0].shape[:2]
+        sine = np.sqrt(np.maximum(1 - light[..., 2] ** 2, 1e-4))
+        texel = 2 * np.pi**2 / (rows * columns) * sine
+        level = np.clip(0.5 * np.log2(size / texel), 0, len(self.maps) - 1.001)
+        low = level.astype(int)
+        part = (level - low)[..., None].astype(np.float32)
+        v = np.arccos(np.clip(light[..., 2], -1, 1)) / np.pi
+        u = np.arctan2(light[..., 1], light[..., 0]) / (2 * np.pi) % 1.0
+        found = np.zeros(light.shape, np.float32)
+        for k in range(len(self.maps)):
+            for offset, share in ((0, 1 - part), (1, part)):
+                at = low + offset == k
+                if at.any():
+                    found[at] += share[at] * _bilinear(self.maps[k], u[at], v[at])
+        return found
+
+
+@lru_cache(maxsize=8)
+def pyramid(name: str) -> Pyramid:
+    """The named world of Blender's."""
+    pixels = np.asarray(oiio.ImageBuf(str(worlds()[name])).get_pixels(oiio.FLOAT))[..., :3]
+    maps = [pixels[: len(pixels) // 16 * 16, : pixels.shape[1] // 16 * 16].astype(np.float32)]
+    while len(maps[-1]) % 2 == 0 and len(maps[-1]) > 8:
+        finer = maps[-1]
+        h, w = finer.shape[:2]
+        area = np.sin((np.arange(h) + 0.5) / h * np.pi).reshape(h // 2, 2, 1, 1, 1)
+        blocks = finer.reshape(h // 2, 2, w // 2, 2, 3)
+        mean = (blocks * area).sum(axis=(1, 3)) / (2 * area.sum(axis=(1, 3)))
+        maps.append(mean.astype(np.float32))
+    return Pyramid(tuple(maps))
+
+
+def _bilinear(image: Floats, u: NDArray[np.floating], v: NDArray[np.floating]) -> Floats:
+    h, w = image.shape[:2]
+    x, y = u * w - 0.5, np.clip(v * h - 0.5, 0, h - 1.001)
+    left, top = np.floor(x).astype(int), y.astype(int)
+    a, b = (x - left)[..., None].astype(np.float32), (y - top)[..., None].astype(np.float32)
+    right, below = (left + 1) % w, np.minimum(top + 1, h - 1)
+    left = left % w
+    upper = image[top, left] * (1 - a) + image[top, right] * a
+    lower = image[below, left] * (1 - a) + image[below, right] * a
+    return np.asarray(upper * (1 - b) + lower * b)
