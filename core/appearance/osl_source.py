@@ -65,6 +65,8 @@ def inputs(count: int) -> list[Input]:
         Input(SAMPLING, "Sampling", "string", ""),
         Input("shading_normal", "Normal", "vector", (0.0, 0.0, 0.0)),
         Input("scale", "Reflectance Scale", "float", 1.0),
+        Input("body", "Body", "vector", (0.0, 0.0, 0.0), hidden=True),
+        Input("body_scale", "Body Scale", "color", (1.0, 1.0, 1.0)),
         Input(ALPHAS, "Lobes", "vector", (0.02, 0.1, 0.5), hidden=True),
         *coefficient_inputs(count),
         Input(WORLD[0], "World", "string", "", hidden=True),

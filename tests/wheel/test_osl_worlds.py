@@ -1,0 +1,198 @@
+"""The measured material under pictures of the world, in a furnace, and between objects: Cycles'
+path tracing of it against a numpy quadrature of the table and against Cycles' own closures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy")
+pytestmark = [pytest.mark.blender, pytest.mark.slow]
+
+import bpy  # noqa: E402
+import OpenImageIO as oiio  # noqa: E402
+
+from patina.core.angles import Angles, half_difference, merl_grid  # noqa: E402
+from patina.core.appearance.energy import directional_albedo  # noqa: E402
+from patina.core.appearance.principled import Principled  # noqa: E402
+from patina.core.appearance.principled_fit import fit_principled  # noqa: E402
+from patina.core.basis import Basis, PrincipalBRDF  # noqa: E402
+from patina.core.maps.split import split_body  # noqa: E402
+from patina.scene import materials, osl_files  # noqa: E402
+from tests.wheel import cycles_sphere  # noqa: E402
+from tools.experiments.spheres import worlds  # noqa: E402
+
+VIEW = np.array([0.0, 0.0, 1.0])
+WORLDS = worlds()
+PIXELS = 24  # that are compared, of every world
+
+if materials.osl_missing():
+    pytest.skip(f"{materials.osl_missing()}", allow_module_level=True)
+
+
+def brdf_of(evaluate, count: int = 60) -> PrincipalBRDF:
+    centres = merl_grid.node_angles(0.5)
+    seen = np.flatnonzero(merl_grid.visible(centres))
+    chosen = np.random.default_rng(0).choice(seen, 20000, replace=False)
+    angles = Angles(*(a.ravel()[chosen] for a in centres))
+    basis = Basis.default()
+    return PrincipalBRDF(basis, basis.project(evaluate(angles), angles, count, eta=1.0))
+
+
+def lambert(angles: Angles) -> np.ndarray:
+    return np.full((angles.theta_h.size, 3), 1 / np.pi)
+
+
+GLOSSY = Principled(base_color=np.array([0.4, 0.1, 0.05]), roughness=0.3)
+
+
+def wear(brdf: PrincipalBRDF, thing: bpy.types.Object) -> bpy.types.Node:
+    files = osl_files.ensure_files(brdf)
+    fit = fit_principled(brdf.evaluate, coat=False, nodes=(12, 6, 4))
+    material = materials.create_material("measured", brdf, fit, files)
+    assert materials.REASON_PROPERTY not in material
+    thing.data.materials.clear()
+    thing.data.materials.append(material)
+    (node,) = osl_files.script_nodes(material)
+    return node
+
+
+def world(path: Path) -> np.ndarray:
+    """Light the scene by a picture; returns its (h, w, 3) radiance, the zenith in row 0."""
+    cycles_sphere.sky(1.0)
+    tree = bpy.context.scene.world.node_tree
+    texture = tree.nodes.new("ShaderNodeTexEnvironment")
+    texture.image = bpy.data.images.load(str(path))
+    background = next(n for n in tree.nodes if n.type == "BACKGROUND")
+    tree.links.new(texture.outputs["Color"], background.inputs["Color"])
+    return np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT), np.float64)[..., :3]
+
+
+def reflected(brdf: PrincipalBRDF, sky: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """(3,) Σ ρ L cos θi dω over all pixels of the world; Cycles' own mapping of directions."""
+    h, w = sky.shape[:2]
+    down = (np.arange(h) + 0.5) / h * np.pi
+    around = (0.5 - (np.arange(w) + 0.5) / w) * 2 * np.pi
+    t, p = np.meshgrid(down, around, indexing="ij")
+    light = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1)
+    solid = (2 * np.pi / w) * 2 * np.sin(t) * np.sin(np.pi / h / 2)
+    cos_i = light @ normal
+    up = cos_i > 0
+    wide = light[up]
+    angles = half_difference(
+        np.broadcast_to(normal, wide.shape), wide, np.broadcast_to(VIEW, wide.shape)
+    )
+    weight = (cos_i[up] * solid[up])[:, None] * sky[up]
+    return np.sum(brdf.evaluate(angles) * weight, axis=0)
+
+
+@pytest.mark.parametrize("name", ["forest", "interior", "sunset"])
+@pytest.mark.parametrize("made", [GLOSSY.evaluate, lambert], ids=["glossy", "matte"])
+def test_a_sphere_under_a_picture_of_the_world(made, name, tmp_path):
+    if name not in WORLDS:
+        pytest.skip(f"this bpy has no world {name!r}")
+    brdf = brdf_of(made)
+    sphere = cycles_sphere.new_scene(size=32, samples=1024, osl=True)
+    sky = world(WORLDS[name])
+    node = wear(brdf, sphere)
+    assert {s.identifier: s for s in node.inputs}["world"].default_value != ""
+    images = []
+    for seed in (1, 2):
+        bpy.context.scene.cycles.seed = seed
+        images.append(cycles_sphere.render(tmp_path))
+    normal, inside = cycles_sphere.normals()
+    rows = np.argwhere(inside & (normal @ VIEW > 0.2))
+    rows = rows[np.random.default_rng(3).choice(len(rows), PIXELS, replace=False)]
+    expected = np.array([reflected(brdf, sky, normal[y, x]) for y, x in rows])
+    found = np.array([[image[y, x] for y, x in rows] for image in images])
+    kept = inside & (normal @ VIEW > 0.2)
+    every = (images[0] - images[1])[kept]
+    noise = np.sqrt(np.mean(every**2) / 2)  # of one image
+    error = found.mean(axis=0) - expected
+    assert abs(error.mean()) < 0.003 * expected.mean() + 3 * noise / np.sqrt(6 * PIXELS)
+    assert np.sqrt(np.mean(error**2)) < 2.0 * noise / np.sqrt(2) + 0.003 * expected.mean()
+
+
+def test_a_white_furnace(tmp_path):
+    """What reflects all light is not to be seen in a uniform world."""
+    brdf = brdf_of(lambert)
+    sphere = cycles_sphere.new_scene(size=40, samples=256, osl=True)
+    bpy.context.scene.cycles.filter_width = 1.0
+    cycles_sphere.sky(1.0)
+    wear(brdf, sphere)
+    image = cycles_sphere.render(tmp_path)
+    normal, inside = cycles_sphere.normals()
+    kept = inside & (normal @ VIEW > 0.1)
+    albedo = directional_albedo(brdf.evaluate, np.arccos(np.linspace(0.2, 1, 9)))
+    far = np.abs(albedo - 1).max()  # the basis' white, not the render's
+    assert far < 0.05
+    assert abs(image[kept].mean() - 1) < far + 0.003
+    assert np.abs(image[kept] - 1).max() < far + 0.05
+
+
+def test_it_never_gives_more_light_than_it_gets(tmp_path):
+    brdf = brdf_of(lambda angles: 1.6 * lambert(angles))
+    sphere = cycles_sphere.new_scene(size=40, samples=256, osl=True)
+    bpy.context.scene.cycles.filter_width = 1.0
+    cycles_sphere.sky(1.0)
+    wear(brdf, sphere)
+    image = cycles_sphere.render(tmp_path)
+    normal, inside = cycles_sphere.normals()
+    assert image[inside & (normal @ VIEW > 0.2)].mean() == pytest.approx(1.0, abs=0.01)
+
+
+def test_light_bounces_between_objects_as_between_cycles_own(tmp_path):
+    """A sphere on a floor, both matte: measured against Diffuse of the same albedo."""
+    albedo = 0.7
+    brdf = brdf_of(lambda angles: albedo * lambert(angles))
+    sphere = cycles_sphere.new_scene(size=32, samples=1024, osl=True)
+    bpy.context.scene.cycles.filter_width = 1.0
+    cycles_sphere.sky(1.0)
+    bpy.ops.mesh.primitive_plane_add(size=8, location=(0, -1, 0), rotation=(np.pi / 2, 0, 0))
+    floor = bpy.context.object
+    own = bpy.data.materials.new("own")
+    own.use_nodes = True
+    tree = own.node_tree
+    tree.nodes.clear()
+    diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    diffuse.inputs["Color"].default_value = (albedo, albedo, albedo, 1)
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(diffuse.outputs[0], output.inputs[0])
+    images = []
+    for measured in (False, True):
+        for thing in (sphere, floor):
+            if measured:
+                wear(brdf, thing)
+            else:
+                thing.data.materials.clear()
+                thing.data.materials.append(own)
+        images.append(cycles_sphere.render(tmp_path))
+    normal, inside = cycles_sphere.normals()
+    low = inside & (normal @ VIEW > 0.3) & (normal[..., 1] < -0.2)  # sees the floor
+    high = inside & (normal @ VIEW > 0.3) & (normal[..., 1] > 0.5)
+    assert images[0][low].mean() < 0.95 * images[0][high].mean()  # the floor takes some light
+    for part in (low, high):
+        assert images[1][part].mean() == pytest.approx(images[0][part].mean(), rel=0.01)
+
+
+def test_paint_scales_the_body_alone(tmp_path):
+    brdf = brdf_of(GLOSSY.evaluate)
+    light = np.array([0.6, 0.2, 0.77]) / np.linalg.norm([0.6, 0.2, 0.77])
+    sphere = cycles_sphere.new_scene(size=80, osl=True)
+    cycles_sphere.sun(light, 2.0)
+    node = wear(brdf, sphere)
+    body = split_body(brdf.evaluate)
+    paint = np.array([0.3, 1.0, 1.5])
+    sockets = {s.identifier: s for s in node.inputs}
+    sockets["body"].default_value = tuple(body.body)
+    sockets["body_scale"].default_value = (*paint, 1.0)
+    image = cycles_sphere.render(tmp_path)
+    normal, inside = cycles_sphere.normals()
+    kept = inside & (normal @ light > 0.05) & (normal @ VIEW > 0.05)
+    wide = [np.broadcast_to(v, normal[kept].shape) for v in (light, VIEW)]
+    low, high = body.parts(brdf.evaluate(half_difference(normal[kept], *wide)))
+    expected = 2.0 * (paint * low + high) * (normal[kept] @ light)[:, None]
+    error = np.sqrt(np.sum((image[kept] - expected) ** 2) / np.sum(expected**2))
+    assert error < 0.005
