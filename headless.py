@@ -29,6 +29,7 @@ COMMANDS = {
     "build-basis": "build_basis",
     "compare": "compare",
     "material": "material",
+    "render": "render",
 }
 
 

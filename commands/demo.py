@@ -5,9 +5,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ..core.errors import PatinaError
+from ..core.report.relit import add_to_report
 from .fit import fit_to_folder
+from .render import render_to_folder
 
 HELP = "the whole job on the capture that comes with Patina"
+RELIT = "relit"  # folder in the report
+WORLDS, SIZE, SAMPLES, TURNS = ["forest"], 288, 48, 3
 CAPTURE = Path(__file__).parents[1] / "assets" / "demo" / "demo.capture.toml"
 
 
@@ -16,5 +21,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    fit_to_folder(CAPTURE, arguments.out)
-    print(f"Open {arguments.out / 'report' / 'index.html'} to see what was measured.")
+    out = arguments.out
+    fit_to_folder(CAPTURE, out)
+    _show_under_other_light(out)
+    print(f"Open {out / 'report' / 'index.html'} to see what was measured.")
+
+
+def _show_under_other_light(out: Path) -> None:
+    """Pictures under a world that Blender ships, where it ships any."""
+    report = out / "report"
+    try:
+        found = render_to_folder(out, report / RELIT, WORLDS, SIZE, SAMPLES, TURNS)
+    except PatinaError as error:
+        print(f"note: no pictures under other light ({error})")
+        return
+    add_to_report(report / "index.html", found, RELIT)

@@ -43,8 +43,11 @@ def new_stage() -> bpy.types.Scene:
     return scene
 
 
-def create_materials(subjects: Sequence[Subject], whole: bool) -> list[bpy.types.Material]:
-    """The materials: whole as a fit makes them, or what exporters take of them alone."""
+def create_materials(
+    subjects: Sequence[Subject], whole: bool, stack: bool = True
+) -> list[bpy.types.Material]:
+    """The materials: whole as a fit makes them, or what exporters take of them alone; stack: with
+    the lobe stack that EEVEE shows, which takes seconds to fit."""
     made = []
     for subject in subjects:
         item = subject.material
@@ -58,7 +61,7 @@ def create_materials(subjects: Sequence[Subject], whole: bool) -> list[bpy.types
         )
         files, lobes = None, None
         if whole:
-            lobes = subject.lobes
+            lobes = subject.lobes if stack else None
             if materials.osl_missing() is None:
                 files = osl_files.ensure_files(item.brdf)
         material = materials.create_material(item.name, item.brdf, fit, files, lobes)

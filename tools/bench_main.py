@@ -11,7 +11,7 @@ from pathlib import Path
 from .common import ROOT
 from .package import load_patina
 
-BENCHES = ("basis", "sampling", "fit", "light", "real", "solve", "speed")
+BENCHES = ("basis", "sampling", "fit", "light", "real", "solve", "noise", "speed")
 
 
 def main() -> int:

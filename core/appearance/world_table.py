@@ -15,7 +15,7 @@ from ..errors import InputError
 Array = NDArray[np.floating]
 
 LARGEST = (256, 512)  # rows, columns
-BRIGHT = 6.0  # times the world's mean radiance
+BRIGHT = 3.0  # times the world's mean radiance, anywhere in a cell
 
 
 def world_texels(radiance: Array) -> NDArray[np.float32] | None:
@@ -26,12 +26,14 @@ def world_texels(radiance: Array) -> NDArray[np.float32] | None:
     if radiance.ndim != 3 or radiance.shape[2] < 3 or min(radiance.shape[:2]) < 2:
         raise InputError(f"a picture of the world has {radiance.shape} numbers, not rows of RGB")
     level = np.nan_to_num(radiance[..., :3].mean(axis=2, dtype=np.float64), posinf=0.0)
-    level = _fewer(_fewer(np.maximum(level, 0.0), LARGEST[0], 0), LARGEST[1], 1)
+    peak = np.maximum(level, 0.0)
+    level = _fewer(_fewer(peak, LARGEST[0], 0, np.add), LARGEST[1], 1, np.add)
+    peak = _fewer(_fewer(peak, LARGEST[0], 0, np.maximum), LARGEST[1], 1, np.maximum)
     rows, columns = level.shape
     edges = np.cos(np.linspace(0.0, np.pi, rows + 1))
     solid = (edges[:-1] - edges[1:])[:, None] * 2 * np.pi / columns
     mean = float(np.sum(level * solid)) / (4 * np.pi)
-    mass = np.where(level > BRIGHT * mean, level, 0.0) * solid
+    mass = np.where(peak > BRIGHT * mean, level, 0.0) * solid
     if not mass.sum() > 0:
         return None
     mass /= mass.sum()
@@ -44,12 +46,14 @@ def world_texels(radiance: Array) -> NDArray[np.float32] | None:
     return out
 
 
-def _fewer(level: Array, largest: int, axis: int) -> Array:
-    """Means of neighbours along an axis, so that at most ``largest`` are left."""
-    count = level.shape[axis]
+def _fewer(values: Array, largest: int, axis: int, of: np.ufunc) -> Array:
+    """Means (``of`` np.add) or largest of neighbours on an axis, so that ``largest`` are left."""
+    count = values.shape[axis]
     if count <= largest:
-        return level
+        return values
     starts = np.arange(largest) * count // largest
+    found = of.reduceat(values, starts, axis=axis)
+    if of is not np.add:
+        return found
     sizes = np.diff(np.append(starts, count))
-    total = np.add.reduceat(level, starts, axis=axis)
-    return total / (sizes[:, None] if axis == 0 else sizes)
+    return found / (sizes[:, None] if axis == 0 else sizes)

@@ -1,0 +1,80 @@
+"""``render RESULT --world FILE|NAME|all --out DIR``: fitted materials under other light."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..core.errors import InputError
+from ..core.export.subject import Subject
+from ..core.job.job import Step
+from ..core.report.relit import Picture, write_page
+from ..core.result import read_result
+from .progress import Progress
+from .staging import check_out, staged_folder
+
+HELP = "render a result's materials, and the scanned object, under pictures of the world"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "result", type=Path, help="what `fit` left: its folder, or the result.json in it"
+    )
+    parser.add_argument(
+        "--world", nargs="+", required=True, metavar="WORLD",
+        help="a .hdr or .exr file, the name of a world that Blender ships, or all of those",
+    )  # fmt: skip
+    parser.add_argument("--out", type=Path, required=True, help="folder for the pictures")
+    parser.add_argument("--size", type=int, default=512, metavar="N", help="pixels along a side")
+    parser.add_argument("--samples", type=int, default=128, metavar="N", help="a pixel")
+    parser.add_argument(
+        "--turns", type=int, default=12, metavar="N",
+        help="pictures of one turn of the object (0: spheres alone)",
+    )  # fmt: skip
+    parser.add_argument("--no-denoise", action="store_true", help="leave the noise in")
+
+
+def run(arguments: argparse.Namespace) -> None:
+    for key, least, most in (("size", 16, 8192), ("samples", 1, 65536), ("turns", 0, 360)):
+        if not least <= getattr(arguments, key) <= most:
+            raise InputError(
+                f"found {getattr(arguments, key)}, expected {least} to {most}", key=f"--{key}"
+            )
+    out = check_out(arguments.out)
+    pictures = render_to_folder(
+        arguments.result,
+        out,
+        arguments.world,
+        arguments.size,
+        arguments.samples,
+        arguments.turns,
+        not arguments.no_denoise,
+    )
+    print(f"wrote {len(pictures)} pictures")
+    print(f"      {out / 'index.html'}")
+
+
+def render_to_folder(
+    result_file: Path,
+    out: Path,
+    told: list[str],
+    size: int,
+    samples: int,
+    turns: int,
+    denoise: bool = True,
+) -> list[Picture]:
+    """Render a result under worlds into ``out``, with a page that shows all; returns them."""
+    from ..scene.relight import Quality, relight, worlds_named  # needs bpy
+
+    result = read_result(result_file)
+    worlds = worlds_named(told)
+    subjects = [Subject(material) for material in result.materials]
+    progress, found = Progress(), []
+    quality = Quality(size, samples, turns, denoise)
+    with staged_folder(out) as folder:
+        for fraction, relit in relight(folder, result, subjects, worlds, quality):
+            progress(Step("rendering", 0.98 * fraction))
+            if relit is not None:
+                found.append(Picture(relit.file, relit.world, relit.subject, relit.turn))
+        write_page(folder, found)
+    return found

@@ -1,0 +1,74 @@
+"""Pictures under other light, as a page of their own and as a section of the report."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from urllib.parse import quote
+
+STYLE = Path(__file__).parents[2] / "assets" / "report" / "style.css"
+SHOWN = 8  # pictures of a turn
+END = "</html>"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """file: relative to the page's folder; subject: a material's name (a sphere), or "object";
+    turn: which step of the turntable, None of a sphere."""
+
+    file: Path
+    world: str
+    subject: str
+    turn: int | None = None
+
+
+def write_page(folder: Path, pictures: Sequence[Picture]) -> Path:
+    """index.html beside the pictures."""
+    page = folder / "index.html"
+    page.write_text(
+        "<!doctype html><html lang='en'><meta charset='utf-8'><title>Patina: other light</title>"
+        f"<style>{STYLE.read_text('utf-8')}</style><h1>Under other light</h1>"
+        f"{section(pictures)}{END}",
+        "utf-8",
+    )
+    return page
+
+
+def add_to_report(page: Path, pictures: Sequence[Picture], folder: str) -> None:
+    """Put the pictures, which lie in ``folder`` beside the page, at the end of a report."""
+    text = page.read_text("utf-8")
+    if not text.endswith(END) or not pictures:
+        return
+    part = f"<h2>Under other light</h2>{section(pictures, folder)}"
+    partial = page.with_name(page.name + ".part")
+    partial.write_text(text[: -len(END)] + part + END, "utf-8")
+    os.replace(partial, page)
+
+
+def section(pictures: Sequence[Picture], folder: str = "") -> str:
+    """HTML: a row of spheres and one of the object's turn for every world."""
+    rows = []
+    for world in dict.fromkeys(p.world for p in pictures):
+        spheres = [p for p in pictures if p.world == world and p.turn is None]
+        turn = [p for p in pictures if p.world == world and p.turn is not None]
+        step = max(1, -(-len(turn) // SHOWN))
+        rows.append(f"<p class='sub'>{escape(world)}</p>")
+        for shown in (spheres, turn[::step]):
+            if shown:
+                rows.append(
+                    f"<div class='relit'>{''.join(_figure(p, folder) for p in shown)}</div>"
+                )
+    return (
+        "<p class='sub'>Rendered by Cycles with the measured material, lit by pictures of the "
+        f"world alone.</p>{''.join(rows)}"
+    )
+
+
+def _figure(picture: Picture, folder: str) -> str:
+    source = quote((Path(folder) / picture.file).as_posix())
+    label = escape(picture.subject if picture.turn is None else f"{picture.subject}, turned")
+    caption = f"<figcaption>{label}</figcaption>" if picture.turn is None else ""
+    return f"<figure><img src='{source}' alt='{label}' loading='lazy'>{caption}</figure>"

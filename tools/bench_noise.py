@@ -1,0 +1,105 @@
+"""Noise of the measured material under pictures of the world, against Cycles' own closures."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+SIZE, SAMPLES, SEEDS = 48, 64, 4
+MATERIALS = (
+    ("pink-fabric", "diffuse"), ("white-fabric", "diffuse"), ("blue-rubber", "diffuse"),
+    ("alum-bronze", "glossy"), ("blue-acrylic", "glossy"), ("gold-metallic-paint", "glossy"),
+)  # fmt: skip
+WORLDS = ("forest", "interior", "sunset")
+
+
+def run(data: Path) -> None:
+    """Print the table of docs/measurements.md, section "Noise"."""
+    from patina.core.appearance.principled_fit import fit_principled
+
+    print(f"## noise ({SIZE} x {SIZE} pixels, {SAMPLES} samples, {SEEDS} seeds)\n")
+    print("| material | world | ours | Cycles' own | which | ratio |")
+    print("|---|---|---|---|---|---|")
+    ratios: dict[str, list[float]] = {"diffuse": [], "glossy": []}
+    for name, kind in MATERIALS:
+        brdf = _brdf(data, name)
+        fit = fit_principled(brdf.evaluate)
+        roughness = fit.principled.roughness
+        for world in WORLDS:
+            ours = _noise(world, lambda sphere, b=brdf, f=fit: _measured(sphere, b, f))
+            own = _noise(world, lambda sphere, k=kind, r=roughness: _own(sphere, k, r))
+            ratios[kind].append(ours / own)
+            told = "Diffuse" if kind == "diffuse" else f"Glossy, roughness {roughness:.2f}"
+            print(
+                f"| {name} | {world} | {100 * ours:.1f} % | {100 * own:.1f} % | {told} | "
+                f"{ours / own:.2f} |",
+                flush=True,
+            )
+    for kind, values in ratios.items():
+        print(f"\n- {kind}: median {np.median(values):.2f}, largest {max(values):.2f}")
+
+
+def _brdf(data: Path, name: str):  # type: ignore[no-untyped-def]
+    from patina.core.angles import Angles, merl_grid
+    from patina.core.basis import Basis, PrincipalBRDF
+    from patina.core.brdf import nbrdf
+
+    names, weights = nbrdf.load(data / "brdf" / "nbrdf_merl.npz")
+    centres = merl_grid.node_angles(0.5)
+    seen = np.flatnonzero(merl_grid.visible(centres))
+    chosen = np.random.default_rng(0).choice(seen, 20000, replace=False)
+    angles = Angles(*(a.ravel()[chosen] for a in centres))
+    basis = Basis.default()
+    values = nbrdf.evaluate(weights[names.index(name)], angles)
+    return PrincipalBRDF(basis, basis.project(values, angles, 100, eta=1.0))
+
+
+def _measured(sphere, brdf, fit) -> None:  # type: ignore[no-untyped-def]
+    from patina.scene import materials, osl_files
+
+    files = osl_files.ensure_files(brdf)
+    sphere.data.materials.append(materials.create_material("measured", brdf, fit, files))
+
+
+def _own(sphere, kind: str, roughness: float) -> None:  # type: ignore[no-untyped-def]
+    import bpy
+
+    material = bpy.data.materials.new("own")
+    material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    if kind == "diffuse":
+        node = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    else:
+        node = tree.nodes.new("ShaderNodeBsdfAnisotropic")
+        node.distribution = "GGX"
+        node.inputs["Roughness"].default_value = roughness
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(node.outputs[0], output.inputs["Surface"])
+    sphere.data.materials.append(material)
+
+
+def _noise(world: str, wear) -> float:  # type: ignore[no-untyped-def]
+    """RMS over pixels of the standard deviation between seeds, of the mean radiance."""
+    import bpy
+
+    from patina.scene import relight
+    from tests.wheel import cycles_sphere
+
+    sphere = cycles_sphere.new_scene(size=SIZE, samples=SAMPLES, osl=True)
+    scene = bpy.context.scene
+    scene.cycles.filter_width = 1.0
+    relight.light_by(scene, relight.shipped_worlds()[world])
+    wear(sphere)
+    images = []
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in range(SEEDS):
+            scene.cycles.seed = seed
+            images.append(cycles_sphere.render(Path(folder)).mean(axis=2))
+    normal, inside = cycles_sphere.normals()
+    kept: NDArray[np.bool_] = inside & (normal[..., 2] > 0.2)
+    stack = np.array(images)[:, kept]
+    return float(np.sqrt(np.mean(stack.var(axis=0, ddof=1))) / stack.mean())
