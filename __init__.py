@@ -11,6 +11,7 @@ MODULES: tuple[str, ...] = (
     "scene.osl_files",
     "scene.lamps",
     "scene.worlds",
+    "scene.fallback",
     "operators.import_capture",
     "operators.solve",
     "operators.masks",

@@ -9,6 +9,7 @@ import bpy
 from ..core.report.figures import either_side
 from ..operators.look_through import lit_cameras
 from ..scene.apply import measured_materials
+from ..scene.fallback import osl_hindrance
 from ..scene.materials import REASON_PROPERTY
 from ..scene.properties import capture_path, stored_result
 from ..scene.running import running
@@ -97,13 +98,14 @@ class PATINA_PT_material(_Stage, bpy.types.Panel):
         if not found:
             layout.label(text="Nothing measured yet", icon="INFO")
         reasons = {m[REASON_PROPERTY] for m in found if REASON_PROPERTY in m}
+        hindrance = osl_hindrance(context.scene) if found else None
         for material in found:
             row = layout.row()
             row.label(text=material.name, icon="MATERIAL")
-            missing = REASON_PROPERTY in material
-            row.label(text="Principled only" if missing else "OSL + Principled")
-        for reason in sorted(reasons):
-            _wrapped(layout, f"No OSL: {reason}", "INFO")
+            portable = REASON_PROPERTY in material or hindrance is not None
+            row.label(text="Portable" if portable else "Measured")
+        for reason in sorted({*reasons} if reasons else {hindrance} - {None}):
+            _wrapped(layout, f"Not the measurement itself: {reason}", "INFO")
 
 
 def _wrapped(layout: bpy.types.UILayout, text: str, icon: str) -> None:

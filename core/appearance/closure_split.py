@@ -27,7 +27,7 @@ VIEWS = 24  # directions of view, evenly over θo
 GRAZING = np.radians(89.0)
 CELLS = (48, 16)  # of half vectors
 ALPHAS = np.geomspace(0.006, 0.8, 16)
-ROUNDS = 6  # of weighted least squares towards the least absolute rest
+ROUNDS = 6  # of weighted least squares, towards the least power 1.5 of the absolute rest
 FEW = (2, 8, 14, 19)  # views that choose the lobes' widths
 
 
@@ -124,5 +124,5 @@ def _least_rest(sphere: Hemisphere, y: Array, alpha: tuple[float, ...]) -> tuple
             left = np.abs(y[:, c] - matrix @ x)
             if (now := float(solid @ left)) < best:
                 best, found[:, c], rest[c] = now, x / scale, now
-            weight = solid / (left + floor)
+            weight = solid / np.sqrt(left + floor)
     return found, rest

@@ -17,7 +17,7 @@ from patina.core.appearance.principled import Principled  # noqa: E402
 from patina.core.appearance.principled_fit import fit_principled  # noqa: E402
 from patina.core.basis import Basis, PrincipalBRDF  # noqa: E402
 from patina.core.brdf import nbrdf  # noqa: E402
-from patina.scene import lamps, materials, osl_files  # noqa: E402
+from patina.scene import fallback, lamps, materials, osl_files, worlds  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
 
 VIEW = np.array([0.0, 0.0, 1.0])
@@ -280,14 +280,38 @@ def test_a_replaced_material_leaves_no_picture_behind():
     assert names[1] in bpy.data.images and names[0] not in bpy.data.images
 
 
+def test_where_osl_is_off_cycles_gets_the_portable_material(tmp_path):
+    sphere = cycles_sphere.new_scene(osl=True)
+    scene = bpy.context.scene
+    cycles_sphere.sun(LIGHT, 2.0)
+    material = _material(_brdf("analytic", 5, None), sphere)
+
+    def leads() -> str:
+        outputs = {n.target: n for n in material.node_tree.nodes if n.type == "OUTPUT_MATERIAL"}
+        return outputs["CYCLES"].inputs["Surface"].links[0].from_node.type
+
+    assert leads() == "SCRIPT" and fallback.osl_hindrance(scene) is None
+    scene.cycles.shading_system = False
+    assert "Open Shading Language" in fallback.osl_hindrance(scene)
+    assert fallback.update_fallback(scene) == 1 and leads() == "BSDF_PRINCIPLED"
+    assert cycles_sphere.render(tmp_path).max() > 0.05  # not black
+    scene.cycles.shading_system = True
+    assert fallback.update_fallback(scene) == 1 and leads() == "SCRIPT"
+    assert fallback.update_fallback(scene) == 0
+    scene.render.engine = "BLENDER_WORKBENCH"
+    assert "another engine" in fallback.osl_hindrance(scene)
+
+
 def test_handlers_come_and_go():
     groups = ("load_post", "save_post", "depsgraph_update_post", "render_pre")
     before = {g: list(getattr(bpy.app.handlers, g)) for g in groups}
-    for module in (osl_files, lamps):
+    modules = (osl_files, lamps, worlds, fallback)
+    for module in modules:
         module.register()
     added = {g: len(getattr(bpy.app.handlers, g)) - len(before[g]) for g in groups}
-    assert added == dict.fromkeys(groups, 1)
-    for module in (osl_files, lamps):
+    expected = {"load_post": 3, "save_post": 1, "depsgraph_update_post": 3, "render_pre": 3}
+    assert added == expected
+    for module in reversed(modules):
         module.unregister()
     assert {g: list(getattr(bpy.app.handlers, g)) for g in groups} == before
 

@@ -146,7 +146,7 @@ def _sweep_panel(here: list[Record], title: str, x_label: str, drawn: set[str]) 
     top = max(y for points in curves.values() for _, y in points)
     chart = svg.Chart(
         title, x_label, "log-relative RMS", (-0.3, len(place) - 0.7), (0.0, top * 1.1),
-        x_ticks=[(i, label) for label, i in place.items()],
+        x_ticks=[(i, label.removeprefix("OpenMVS ")) for label, i in place.items()],
     )  # fmt: skip
     for estimator, points in curves.items():
         drawn.add(estimator)
