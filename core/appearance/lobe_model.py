@@ -64,7 +64,7 @@ def reflectance_and_derivatives(x: Array, where: Configuration) -> tuple[Array, 
     ]
     passed = [lobe.passed(where.cos_o) for lobe in stack.lobes]
     # below[k]: the reflectance of lobe k and all below, without what lies above
-    below = [base]
+    below: list[Array] = [base]
     for reflected, part in zip(reversed(own), reversed(passed), strict=True):
         below.insert(0, reflected + part[:, None] * below[0])
     above = np.ones(len(base))

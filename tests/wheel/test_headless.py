@@ -48,8 +48,12 @@ def fitted(root: Path, ball: Path) -> Path:
 
 def test_fit_leaves_what_design_lists_and_nothing_else(fitted: Path) -> None:
     names = {p.name for p in fitted.iterdir()}
-    exr = {name for name in names if name.startswith(("patina_components_", "patina_brdf_"))}
-    assert len(exr) == 2
+    exr = {
+        name
+        for name in names
+        if name.startswith(("patina_components_", "patina_brdf_", "patina_sampling_"))
+    }
+    assert len(exr) == 3
     assert names - exr == {"result.json", "surface.binary", "scene.blend", "report", "mine.txt"}
     assert (fitted / "report" / "index.html").is_file()
     assert (fitted / "report" / "notes.txt").read_text() == "kept"
