@@ -66,7 +66,7 @@ def reflectance_and_derivatives(x: Array, where: Configuration) -> tuple[Array, 
     # below[k]: the reflectance of lobe k and all below, without what lies above
     below: list[Array] = [base]
     for reflected, part in zip(reversed(own), reversed(passed), strict=True):
-        below.insert(0, reflected + part[:, None] * below[0])
+        below.insert(0, np.asarray(reflected + part[:, None] * below[0], np.float64))
     above = np.ones(len(base))
     for k, lobe in enumerate(stack.lobes):
         start = BASE + EACH * k
