@@ -182,7 +182,6 @@ def _prepare(scene: bpy.types.Scene, quality: Quality) -> None:
     render = scene.render
     render.resolution_x = render.resolution_y = quality.size
     render.resolution_percentage = 100
-    render.use_persistent_data = True
     settings = render.image_settings
     if hasattr(settings, "media_type"):
         settings.media_type = "IMAGE"
