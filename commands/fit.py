@@ -11,7 +11,7 @@ from pathlib import Path
 from ..core.brdf import merl_file
 from ..core.capture import read_capture
 from ..core.fit.measured_result import MeasuredResult
-from ..core.job import CaptureResult, FitJob, Stage
+from ..core.job import CaptureResult, FitJob, Stage, finished
 from ..core.job.job import Step, peak_memory
 from ..core.report import result_json, write_report
 from ..core.report.figures import reach
@@ -41,9 +41,7 @@ def fit_to_folder(capture_file: Path, out: Path, threads: int | None = None) -> 
     progress = Progress(share=0.85)
     job = FitJob(read_capture(capture_file), threads=threads)
     job.drain(progress)
-    result = job.result
-    if result is None:  # pragma: no cover - drain raises or finishes
-        raise RuntimeError("the job ended without a result")
+    result = finished(job.result)
     progress.share = 1.0
     with staged_folder(out) as folder:
         stages = [*job.stages]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..core.brdf import merl_file
 from ..core.capture import read_capture
+from ..core.job import finished
 from ..core.maps import MapsJob, MapsSettings
 from ..core.maps.maps_job import REFITS, MapsResult
 from ..core.maps.texels import check_size
@@ -52,9 +53,7 @@ def run(arguments: argparse.Namespace) -> None:
     job = MapsJob(capture, fitted, settings, unwrapped)
     progress = Progress(share=0.9)
     job.drain(progress)
-    result = job.result
-    if result is None:  # pragma: no cover - drain raises or finishes
-        raise RuntimeError("the job ended without a result")
+    result = finished(job.result)
     progress.share = 1.0
     with staged_folder(out) as folder:
         stages = [*job.stages]

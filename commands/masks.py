@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..core.capture import read_capture
 from ..core.errors import InputError
+from ..core.job import finished
 from ..core.masks.proposal import MOST_MATERIALS
 from ..core.masks.write_masks import MasksJob, Wanted, check_final
 from .progress import Progress
@@ -43,9 +44,7 @@ def run(arguments: argparse.Namespace) -> None:
     with staged_folder(out) as folder:
         job = MasksJob(capture, wanted, folder, out)
         job.drain(Progress())
-        done = job.result
-        if done is None:  # pragma: no cover - drain raises or finishes
-            raise RuntimeError("the job ended without a result")
+        done = finished(job.result)
         name = done.capture.name
     if done.proposal is not None:
         names = ", ".join(done.names)

@@ -72,9 +72,9 @@ def render_to_folder(
     progress, found = Progress(), []
     quality = Quality(size, samples, turns, denoise)
     with staged_folder(out) as folder:
-        for fraction, relit in relight(folder, result, subjects, worlds, quality):
+        for fraction, picture in relight(folder, result, subjects, worlds, quality):
             progress(Step("rendering", 0.98 * fraction))
-            if relit is not None:
-                found.append(Picture(relit.file, relit.world, relit.subject, relit.turn))
+            if picture is not None:
+                found.append(picture)
         write_page(folder, found)
     return found

@@ -24,7 +24,7 @@ def write_import(path: Path, final: Path, capture: Capture, scan: Scan, lights: 
     """Mesh, cameras with photos, lights. final: where the file will be moved to, with all that
     lies beside it."""
     _imported(path, capture, scan, lights)
-    _save(path, final)
+    save(path, final)
 
 
 def write_reconstruction(
@@ -36,7 +36,7 @@ def write_reconstruction(
     """Cameras and sparse points of a reconstruction that has no mesh yet."""
     scene = _new_file()
     create_reconstruction(scene, final.stem, found, images, path.parent / RECTIFIED)
-    _save(path, final)
+    save(path, final)
 
 
 def write_blend(
@@ -44,14 +44,11 @@ def write_blend(
 ) -> list[str]:
     """A capture with the fitted materials on its mesh; returns notes for the user."""
     _imported(path, result.capture, result.scan, result.lights)
-    _save(path, final)  # the shader's EXRs go beside a saved file
+    save(path, final)  # the shader's EXRs go beside a saved file
     notes = apply_result(bpy.context.scene, result, stages)
     for material in measured_materials():
-        for node in osl_files.script_nodes(material):
-            for socket in osl_files.file_sockets(node):
-                moved = final.absolute().parent / Path(socket.default_value).name
-                socket.default_value = moved.as_posix()
-    _save(path, final)
+        osl_files.lead_to(material, final.parent)
+    save(path, final)
     return notes
 
 
@@ -82,7 +79,7 @@ def _new_file() -> bpy.types.Scene:
     return scene
 
 
-def _save(path: Path, final: Path) -> None:
+def save(path: Path, final: Path) -> None:
     """Save with pictures by paths relative to ``final`` and without a .blend1."""
     here, there = path.absolute().parent, final.absolute().parent
     for image in bpy.data.images:

@@ -76,7 +76,7 @@ def preview_spheres(made: Sequence[bpy.types.Material]) -> list[bpy.types.Object
     for place, material in enumerate(made):
         mesh = bpy.data.meshes.new(material.name)
         sphere = bpy.data.objects.new(material.name, mesh)
-        _fill_sphere(mesh)
+        fill_sphere(mesh)
         mesh.materials.append(material)
         sphere.location.x = SPACING * place
         scene.collection.objects.link(sphere)
@@ -92,13 +92,14 @@ def select_only(objects: Sequence[bpy.types.Object]) -> None:
     bpy.context.view_layer.objects.active = objects[0]
 
 
-def _fill_sphere(mesh: bpy.types.Mesh) -> None:
+def fill_sphere(mesh: bpy.types.Mesh, rings: int = RINGS, segments: int = SEGMENTS) -> None:
+    """Make a mesh a smooth unit sphere with UVs."""
     import bmesh
 
     shape = bmesh.new()
     shape.loops.layers.uv.new("UVMap")
     bmesh.ops.create_uvsphere(
-        shape, u_segments=SEGMENTS, v_segments=RINGS, radius=1.0, calc_uvs=True
+        shape, u_segments=segments, v_segments=rings, radius=1.0, calc_uvs=True
     )
     shape.to_mesh(mesh)
     shape.free()

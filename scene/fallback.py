@@ -9,8 +9,9 @@ from __future__ import annotations
 import bpy
 from bpy.app.handlers import persistent
 
+from .handlers import attach, detach
 from .materials import osl_missing
-from .osl_files import FILE_PROPERTY, script_nodes
+from .osl_files import own_materials, script_nodes
 
 
 def osl_hindrance(scene: bpy.types.Scene) -> str | None:
@@ -34,8 +35,7 @@ def update_fallback(scene: bpy.types.Scene) -> int:
     runs = osl_hindrance(scene) is None
     return sum(
         _lead(material, node, runs)
-        for material in bpy.data.materials
-        if FILE_PROPERTY in material and material.library is None
+        for material in own_materials()
         for node in script_nodes(material)[:1]
     )
 
@@ -92,11 +92,9 @@ HANDLERS = (
 
 def register() -> None:
     """Follow the scene's render settings from now on."""
-    for name, handler in HANDLERS:
-        getattr(bpy.app.handlers, name).append(handler)
+    attach(HANDLERS)
 
 
 def unregister() -> None:
     """Leave nothing behind."""
-    for name, handler in HANDLERS:
-        getattr(bpy.app.handlers, name).remove(handler)
+    detach(HANDLERS)

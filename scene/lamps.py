@@ -14,7 +14,8 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core.appearance import osl_source
-from .osl_files import FILE_PROPERTY, script_nodes
+from .handlers import attach, detach
+from .osl_files import own_shaders
 
 log = logging.getLogger(__name__)
 
@@ -59,12 +60,7 @@ def update_lamps(scene: bpy.types.Scene) -> int:
 
     A scene holds more than the shader can take: the brightest count, and a warning says so.
     """
-    nodes = [
-        node
-        for material in bpy.data.materials
-        if FILE_PROPERTY in material and material.library is None
-        for node in script_nodes(material)
-    ]
+    nodes = own_shaders()
     if not nodes:
         return 0
     lamps = scene_lamps(scene)
@@ -154,13 +150,14 @@ def _before_render(scene: bpy.types.Scene, *_: object) -> None:
     update_lamps(scene)
 
 
+HANDLERS = (("depsgraph_update_post", _after_update), ("render_pre", _before_render))
+
+
 def register() -> None:
     """Follow the lamps from now on."""
-    bpy.app.handlers.depsgraph_update_post.append(_after_update)
-    bpy.app.handlers.render_pre.append(_before_render)
+    attach(HANDLERS)
 
 
 def unregister() -> None:
     """Leave nothing behind."""
-    bpy.app.handlers.render_pre.remove(_before_render)
-    bpy.app.handlers.depsgraph_update_post.remove(_after_update)
+    detach(HANDLERS)

@@ -24,7 +24,7 @@ from ..core.maps.maps_job import MapsResult
 from ..core.maps.write import BLEND, MapFile
 from . import osl_files
 from .apply import MEASURED, measured_materials
-from .blend_file import _save, write_blend
+from .blend_file import save, write_blend
 from .materials import fill_principled
 from .meshes import UV_LAYER
 
@@ -59,7 +59,7 @@ def write_mapped_blend(
     else:
         return ["the result has no scene.blend: the maps are on no material"]
     notes += apply_maps(bpy.context.scene, result, path.parent, files)
-    _save(path, final)
+    save(path, final)
     return notes
 
 
@@ -183,11 +183,10 @@ def _set_uv(data: bpy.types.Mesh, result: MapsResult) -> bool:
 
 def _own_shader_files(path: Path, final: Path) -> None:
     """Put the shader's EXRs, which travel packed, beside the new file; point its nodes there."""
+
+    def moved(file: Path) -> bool:
+        image = bpy.data.images.get(file.name)
+        return osl_files.write_packed(image, path.parent / file.name)
+
     for material in measured_materials():
-        for node in osl_files.script_nodes(material):
-            for socket in osl_files.file_sockets(node):
-                name = Path(socket.default_value).name
-                image = bpy.data.images.get(name)
-                if image is not None and image.packed_file is not None:
-                    (path.parent / name).write_bytes(image.packed_file.data)
-                    socket.default_value = (final.absolute().parent / name).as_posix()
+        osl_files.lead_to(material, final.parent, moved)

@@ -21,6 +21,7 @@ from ..core.appearance.closure_split import split
 from ..core.appearance.osl_source import COMPONENTS, REMAINDER, SAMPLING
 from ..core.basis import PrincipalBRDF
 from .folders import blend_folder
+from .handlers import attach, detach
 
 log = logging.getLogger(__name__)
 
@@ -67,10 +68,8 @@ def ensure_files(brdf: PrincipalBRDF) -> ShaderFiles:
 
 def _ensure(name: str, write: Callable[[Path], object]) -> Path:
     path = blend_folder() / name
-    if not path.is_file():
-        packed = bpy.data.images.get(name)
-        if packed is None or not _write_packed(packed, path):
-            write(path)
+    if not path.is_file() and not write_packed(bpy.data.images.get(name), path):
+        write(path)
     pack(path)
     return path
 
@@ -109,9 +108,7 @@ def restore() -> list[str]:
     Returns the names of materials with a file that is neither on disk nor in the .blend.
     """
     missing = []
-    for material in bpy.data.materials:
-        if material.get(FILE_PROPERTY) is None or material.library is not None:
-            continue
+    for material in own_materials():
         found = [
             _restored(socket, material.get(PROPERTIES[socket.identifier]))
             for node in script_nodes(material)
@@ -130,8 +127,8 @@ def _restored(socket: bpy.types.NodeSocket, name: str | None) -> bool:
         return True
     if not name:
         return False
-    path, image = blend_folder() / name, bpy.data.images.get(name)
-    if path.is_file() or (image is not None and _write_packed(image, path)):
+    path = blend_folder() / name
+    if path.is_file() or write_packed(bpy.data.images.get(name), path):
         socket.default_value = path.as_posix()
         return True
     return False
@@ -148,9 +145,32 @@ def script_nodes(material: bpy.types.Material) -> list[bpy.types.Node]:
     ]
 
 
-def _write_packed(image: bpy.types.Image, path: Path) -> bool:
-    """Write the packed bytes to a file, whole or not at all."""
-    if image.packed_file is None:
+def own_materials() -> list[bpy.types.Material]:
+    """The materials of this .blend that have a Patina shader."""
+    return [m for m in bpy.data.materials if FILE_PROPERTY in m and m.library is None]
+
+
+def own_shaders() -> list[bpy.types.Node]:
+    """The shaders of all of them."""
+    return [node for material in own_materials() for node in script_nodes(material)]
+
+
+def lead_to(
+    material: bpy.types.Material, folder: Path, moved: Callable[[Path], bool] = lambda file: True
+) -> list[Path]:
+    """Make the material's shaders read those of their EXRs that are ``moved`` from the folder;
+    returns where they read them from until now."""
+    sockets = [s for node in script_nodes(material) for s in file_sockets(node)]
+    old = [Path(socket.default_value) for socket in sockets]
+    for socket, file in zip(sockets, old, strict=True):
+        if moved(file):
+            socket.default_value = (folder.absolute() / file.name).as_posix()
+    return old
+
+
+def write_packed(image: bpy.types.Image | None, path: Path) -> bool:
+    """Write a picture's packed bytes to a file, whole or not at all; False where it has none."""
+    if image is None or image.packed_file is None:
         return False
     partial = path.with_name(path.name + ".part")
     try:
@@ -174,18 +194,18 @@ def _after_save(*_: object) -> None:
     for material in bpy.data.materials:
         for key in PROPERTIES.values():
             name = material.get(key)
-            image = bpy.data.images.get(name) if name else None
-            if image is not None and not (blend_folder() / name).is_file():
-                _write_packed(image, blend_folder() / name)
+            if name and not (blend_folder() / name).is_file():
+                write_packed(bpy.data.images.get(name), blend_folder() / name)
+
+
+HANDLERS = (("load_post", _after_load), ("save_post", _after_save))
 
 
 def register() -> None:
     """Watch for loading and saving."""
-    bpy.app.handlers.load_post.append(_after_load)
-    bpy.app.handlers.save_post.append(_after_save)
+    attach(HANDLERS)
 
 
 def unregister() -> None:
     """Leave nothing behind."""
-    bpy.app.handlers.save_post.remove(_after_save)
-    bpy.app.handlers.load_post.remove(_after_load)
+    detach(HANDLERS)

@@ -16,6 +16,7 @@ from mathutils import Matrix, Vector
 
 from ..core.errors import InputError, PatinaError
 from ..core.export.subject import Subject
+from ..core.report.relit import Picture
 from ..core.result import FittedResult
 from . import export_stage
 from .lamps import update_lamps
@@ -25,7 +26,7 @@ from .worlds import update_worlds
 HEIGHT = math.radians(15)  # of the camera above the turntable
 LENS = 85.0  # mm on a sensor of 36
 MARGIN = 1.08
-SPHERE = (96, 192)
+SPHERE = (96, 192)  # rings, segments
 
 
 @dataclass(frozen=True)
@@ -37,17 +38,6 @@ class Quality:
     samples: int = 128
     turns: int = 12
     denoise: bool = True
-
-
-@dataclass(frozen=True)
-class Relit:
-    """A picture that was rendered. file: relative to the folder; subject: the material's name, or
-    "object"; turn: number of the turntable's step, None of a sphere."""
-
-    file: Path
-    world: str
-    subject: str
-    turn: int | None = None
 
 
 def shipped_worlds() -> dict[str, Path]:
@@ -86,7 +76,7 @@ def relight(
     subjects: Sequence[Subject],
     worlds: dict[str, Path],
     quality: Quality,
-) -> Iterator[tuple[float, Relit | None]]:
+) -> Iterator[tuple[float, Picture | None]]:
     """Render into ``folder``; yields the fraction done, and each picture when it is there.
 
     Raises InputError for a world that is no picture, PatinaError where Blender cannot render."""
@@ -108,7 +98,7 @@ def relight(
             target = Path(f"sphere_{subject.id}_{name}.png")
             _render(scene, folder / target)
             done += 1
-            yield done / count, Relit(target, name, subject.name)
+            yield done / count, Picture(target, name, subject.name)
     if turns == 0 or result.scene is None:
         return
     mesh = export_stage.open_scan(result.scene, [s.name for s in subjects])
@@ -126,18 +116,12 @@ def relight(
             target = Path(f"turntable_{name}") / f"{turn:03d}.png"
             _render(scene, folder / target)
             done += 1
-            yield done / count, Relit(target, name, "object", turn)
+            yield done / count, Picture(target, name, "object", turn)
 
 
 def _sphere() -> bpy.types.Object:
-    import bmesh
-
     mesh = bpy.data.meshes.new("sphere")
-    shape = bmesh.new()
-    bmesh.ops.create_uvsphere(shape, u_segments=SPHERE[1], v_segments=SPHERE[0], radius=1.0)
-    shape.to_mesh(mesh)
-    shape.free()
-    mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
+    export_stage.fill_sphere(mesh, *SPHERE)
     sphere = bpy.data.objects.new("sphere", mesh)
     bpy.context.scene.collection.objects.link(sphere)
     return sphere

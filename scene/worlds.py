@@ -19,7 +19,8 @@ from mathutils import Matrix
 from ..core.appearance import osl_atlas, osl_source
 from ..core.appearance.world_table import world_texels
 from ..core.errors import PatinaError
-from .osl_files import FILE_PROPERTY, script_nodes
+from .handlers import attach, detach
+from .osl_files import own_shaders
 
 log = logging.getLogger(__name__)
 
@@ -52,12 +53,7 @@ def scene_world(scene: bpy.types.Scene) -> World:
 
 def update_worlds(scene: bpy.types.Scene) -> int:
     """Tell all Patina materials of the world; returns how many inputs changed."""
-    nodes = [
-        node
-        for material in bpy.data.materials
-        if FILE_PROPERTY in material and material.library is None
-        for node in script_nodes(material)
-    ]
+    nodes = own_shaders()
     if not nodes:
         return 0
     world = scene_world(scene)
@@ -125,11 +121,15 @@ def _table(image: bpy.types.Image) -> Path | None:
     told = (image.name_full, image.filepath, width, height, image.is_dirty, image.library is None)
     name = hashlib.sha256(repr(told).encode()).hexdigest()[:12]
     path = Path(bpy.app.tempdir) / f"patina_world_{name}.exr"
+    even = path.with_suffix(".even")  # looked through before: it has no bright spot
+    if even.is_file():
+        return None
     if not path.is_file():
         pixels = np.empty(width * height * image.channels, np.float32)
         image.pixels.foreach_get(pixels)
         found = world_texels(pixels.reshape(height, width, -1)[::-1])
         if found is None:
+            even.touch()
             return None
         osl_atlas.write_picture(path, found)
     return path
@@ -162,11 +162,9 @@ HANDLERS = (
 
 def register() -> None:
     """Follow the world from now on."""
-    for name, handler in HANDLERS:
-        getattr(bpy.app.handlers, name).append(handler)
+    attach(HANDLERS)
 
 
 def unregister() -> None:
     """Leave nothing behind."""
-    for name, handler in HANDLERS:
-        getattr(bpy.app.handlers, name).remove(handler)
+    detach(HANDLERS)

@@ -18,24 +18,25 @@ WORLDS = ("forest", "interior", "sunset")
 
 def run(data: Path) -> None:
     """Print the table of docs/measurements.md, section "Noise"."""
+    from patina.core.appearance.closure_split import split
     from patina.core.appearance.principled_fit import fit_principled
 
     print(f"## noise ({SIZE} x {SIZE} pixels, {SAMPLES} samples, {SEEDS} seeds)\n")
-    print("| material | world | ours | Cycles' own | which | ratio |")
-    print("|---|---|---|---|---|---|")
+    print("| material | by the portal | world | ours | Cycles' own | which | ratio |")
+    print("|---|---|---|---|---|---|---|")
     ratios: dict[str, list[float]] = {"diffuse": [], "glossy": []}
     for name, kind in MATERIALS:
         brdf = _brdf(data, name)
         fit = fit_principled(brdf.evaluate)
-        roughness = fit.principled.roughness
+        roughness, rest = fit.principled.roughness, split(brdf.evaluate).rest
         for world in WORLDS:
             ours = _noise(world, lambda sphere, b=brdf, f=fit: _measured(sphere, b, f))
             own = _noise(world, lambda sphere, k=kind, r=roughness: _own(sphere, k, r))
             ratios[kind].append(ours / own)
             told = "Diffuse" if kind == "diffuse" else f"Glossy, roughness {roughness:.2f}"
             print(
-                f"| {name} | {world} | {100 * ours:.1f} % | {100 * own:.1f} % | {told} | "
-                f"{ours / own:.2f} |",
+                f"| {name} | {100 * rest:.0f} % | {world} | {100 * ours:.1f} % | "
+                f"{100 * own:.1f} % | {told} | {ours / own:.2f} |",
                 flush=True,
             )
     for kind, values in ratios.items():
@@ -43,18 +44,11 @@ def run(data: Path) -> None:
 
 
 def _brdf(data: Path, name: str):  # type: ignore[no-untyped-def]
-    from patina.core.angles import Angles, merl_grid
-    from patina.core.basis import Basis, PrincipalBRDF
     from patina.core.brdf import nbrdf
+    from tests.projected import projected
 
     names, weights = nbrdf.load(data / "brdf" / "nbrdf_merl.npz")
-    centres = merl_grid.node_angles(0.5)
-    seen = np.flatnonzero(merl_grid.visible(centres))
-    chosen = np.random.default_rng(0).choice(seen, 20000, replace=False)
-    angles = Angles(*(a.ravel()[chosen] for a in centres))
-    basis = Basis.default()
-    values = nbrdf.evaluate(weights[names.index(name)], angles)
-    return PrincipalBRDF(basis, basis.project(values, angles, 100, eta=1.0))
+    return projected(lambda angles: nbrdf.evaluate(weights[names.index(name)], angles), 100)
 
 
 def _measured(sphere, brdf, fit) -> None:  # type: ignore[no-untyped-def]
@@ -65,20 +59,16 @@ def _measured(sphere, brdf, fit) -> None:  # type: ignore[no-untyped-def]
 
 
 def _own(sphere, kind: str, roughness: float) -> None:  # type: ignore[no-untyped-def]
-    import bpy
+    from tests.wheel import cycles_sphere
 
-    material = bpy.data.materials.new("own")
-    material.use_nodes = True
-    tree = material.node_tree
-    tree.nodes.clear()
-    if kind == "diffuse":
-        node = tree.nodes.new("ShaderNodeBsdfDiffuse")
-    else:
+    material = cycles_sphere.diffuse(0.8)
+    if kind == "glossy":
+        tree = material.node_tree
         node = tree.nodes.new("ShaderNodeBsdfAnisotropic")
         node.distribution = "GGX"
         node.inputs["Roughness"].default_value = roughness
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(node.outputs[0], output.inputs["Surface"])
+        output = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
+        tree.links.new(node.outputs["BSDF"], output.inputs["Surface"])
     sphere.data.materials.append(material)
 
 

@@ -154,7 +154,7 @@ def _job(folder: str, threads: str, method: str) -> dict[str, Any]:
     from dataclasses import replace
 
     from patina.core.capture import read_capture
-    from patina.core.job import FitJob
+    from patina.core.job import FitJob, finished
     from patina.core.job.job import Step
     from patina.core.report import write_report
 
@@ -176,9 +176,8 @@ def _job(folder: str, threads: str, method: str) -> dict[str, Any]:
             seconds[STAGES.get(stage.name, "fit")] += stage.seconds
             peak = stage.peak_mb or float("nan")  # so far
             sampling = peak if STAGES.get(stage.name) else sampling
-    if job.result is None:
-        raise RuntimeError("the job ended without a result")
-    material = job.result.materials[0]
+    result = finished(job.result)
+    material = result.materials[0]
     since = time.perf_counter()
     with tempfile.TemporaryDirectory() as report:
         for _ in write_report(Path(report), job.result):

@@ -84,24 +84,10 @@ def closures(sphere: Hemisphere, alpha: tuple[float, ...]) -> Array:
     every = np.arange(at.size)
     columns[every, low] = 1 - (at - low)
     columns[every, low + 1] = at - low
-    cos_o = np.cos(sphere.theta_o)
     for j, a in enumerate(alpha):
-        columns[:, KNOTS + j] = ggx(sphere.cos_i, cos_o, sphere.cos_h, a) * sphere.cos_i
+        columns[:, KNOTS + j] = sphere.where.ggx(np.sqrt(a)) * sphere.cos_i
     columns[sphere.cos_i <= 0] = 0
     return columns
-
-
-def ggx(cos_i: Array, cos_o: Array | float, cos_h: Array, alpha: float) -> Array:
-    """D·G/(4 cos θi cos θo) of GGX, Smith's height-correlated masking (Heitz 2014), no Fresnel."""
-    a2 = alpha * alpha
-    d = a2 / (np.pi * (1 + (a2 - 1) * cos_h**2) ** 2)
-
-    def masked(c: Array | float) -> Array:
-        squared = np.maximum(np.asarray(c, float), 1e-9) ** 2
-        return (np.sqrt(1 + a2 * (1 / squared - 1)) - 1) / 2
-
-    safe = np.maximum(cos_i, 1e-9)
-    return d / (1 + masked(safe) + masked(cos_o)) / (4 * safe * cos_o)
 
 
 def _least_rest(sphere: Hemisphere, y: Array, alpha: tuple[float, ...]) -> tuple[Array, Array]:

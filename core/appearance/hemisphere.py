@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..angles import Angles, half_difference
 from ..angles.vectors import dot
+from .principled import Configuration
 
 Array = NDArray[np.floating]
 
@@ -36,8 +37,7 @@ class Hemisphere:
 
     angles: of each point; cos_i: (n,) of the light, 0 where it is below the horizon or behind the
     half vector; solid: (n,) sr of light that each stands for (both halves of φh), 0 likewise;
-    half_solid: (n,) sr of half vectors; cos_h: (n,) cosine of normal and half vector; cos_d:
-    (n,) of half vector and view.
+    half_solid: (n,) sr of half vectors; where: the same points as cosines.
     """
 
     theta_o: float
@@ -45,8 +45,7 @@ class Hemisphere:
     cos_i: Array
     solid: Array
     half_solid: Array
-    cos_h: Array
-    cos_d: Array
+    where: Configuration
 
     @classmethod
     def of(cls, theta_o: float, n_h: int, n_p: int, inside: int = 1) -> Hemisphere:
@@ -67,12 +66,12 @@ class Hemisphere:
         seen = (cos_d > 0) & (light[:, 2] > 0)
         normal = np.broadcast_to(np.array([0.0, 0.0, 1.0]), half.shape)
         safe = np.where(seen[:, None], light, view)
+        cos_i = np.where(seen, light[:, 2], 0.0)
         return cls(
             theta_o,
             half_difference(normal, safe, view),
-            np.where(seen, light[:, 2], 0.0),
+            cos_i,
             np.where(seen, 4 * cos_d * solid_h, 0.0),
             solid_h,
-            np.cos(t),
-            np.maximum(cos_d, 0.0),
+            Configuration(cos_i, view[:, 2], half[:, 2], np.maximum(cos_d, 0.0)),
         )

@@ -21,9 +21,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import Angles, light_view
 from .oren_nayar import oren_nayar
-from .principled import Configuration
+from .principled import Configuration, LayeredModel
 
 Array = NDArray[np.floating]
 
@@ -78,7 +77,7 @@ class Lobe:
 
 
 @dataclass(frozen=True)
-class LobeStack:
+class LobeStack(LayeredModel):
     """diffuse: (3,) albedo in [0, 1]; diffuse_roughness in [0, 1] as the Diffuse BSDF has it;
     lobes: topmost first, at most MOST_LOBES; diffuse_mid, diffuse_edge: diffuse where the surface
     turns away from the viewer (None: the same)."""
@@ -95,15 +94,6 @@ class LobeStack:
         turned = [self.diffuse_mid, self.diffuse_edge]
         turned += [f0 for lobe in self.lobes for f0 in (lobe.f0_mid, lobe.f0_edge)]
         return all(color is None for color in turned)
-
-    def evaluate(self, angles: Angles) -> Array:
-        """f (..., 3) in 1/sr at half/difference angles (radians) of any shape."""
-        light, view = light_view(*angles)
-        return self.reflectance(light, view)
-
-    def reflectance(self, light: Array, view: Array) -> Array:
-        """f (..., 3) in 1/sr for unit vectors (..., 3) in a frame whose z is the normal."""
-        return self.at(Configuration.of(light, view))
 
     def at(self, where: Configuration) -> Array:
         """f (..., 3) in 1/sr."""

@@ -9,6 +9,7 @@ the viewer, so the model is not quite reciprocal. α = roughness², Smith's heig
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -30,8 +31,25 @@ Array = NDArray[np.floating]
 MIN_ROUGHNESS = 0.03
 
 
+class LayeredModel(ABC):
+    """A BRDF that layers make: it tells light from view."""
+
+    def evaluate(self, angles: Angles) -> Array:
+        """f (..., 3) in 1/sr at half/difference angles (radians) of any shape."""
+        light, view = light_view(*angles)
+        return self.reflectance(light, view)
+
+    def reflectance(self, light: Array, view: Array) -> Array:
+        """f (..., 3) in 1/sr for unit vectors (..., 3) in a frame whose z is the normal."""
+        return self.at(Configuration.of(light, view))
+
+    @abstractmethod
+    def at(self, where: Configuration) -> Array:
+        """f (..., 3) in 1/sr."""
+
+
 @dataclass(frozen=True)
-class Principled:
+class Principled(LayeredModel):
     """Inputs of the Principled BSDF node, by the names of its sockets.
 
     base_color, specular_tint, coat_tint: (3,) linear RGB. roughness, diffuse_roughness, metallic,
@@ -50,15 +68,6 @@ class Principled:
     coat_ior: float = 1.5
     coat_tint: Array = field(default_factory=lambda: np.ones(3))
     diffuse_roughness: float = 0.0
-
-    def evaluate(self, angles: Angles) -> Array:
-        """f (..., 3) in 1/sr at half/difference angles (radians) of any shape."""
-        light, view = light_view(*angles)
-        return self.reflectance(light, view)
-
-    def reflectance(self, light: Array, view: Array) -> Array:
-        """f (..., 3) in 1/sr for unit vectors (..., 3) in a frame whose z is the normal."""
-        return self.at(Configuration.of(light, view))
 
     def at(self, where: Configuration) -> Array:
         """f (..., 3) in 1/sr."""

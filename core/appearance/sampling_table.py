@@ -60,8 +60,10 @@ def sampling_table(evaluate: Callable[[Angles], Array], split: ClosureSplit) -> 
         mass[v] = (1 - even) * share + even * spread
         density[v] = mass[v] / solid
     rows = mass.sum(axis=2)
-    marginal = np.cumsum(rows, axis=1)
+    # rounding must not lead past 1: the last cell's own probability would be below 0
+    marginal = np.minimum(np.cumsum(rows, axis=1), 1.0)
     conditional = np.cumsum(mass, axis=2) / np.maximum(rows, 1e-30)[:, :, None]
+    conditional = np.minimum(conditional, 1.0)
     marginal[:, -1], conditional[:, :, -1] = 1.0, 1.0
     keep = limit(directional_albedo(evaluate, split.theta_o))
     return SamplingTable(density, marginal, conditional, keep)

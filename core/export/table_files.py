@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import merl_grid
-from ..basis import Basis, PrincipalBRDF
+from ..basis import AngleGrid, Basis, PrincipalBRDF
 from ..basis.mapping import EPSILON
 from ..brdf import TabulatedBRDF
+from ..photo import write_exr
 from ..result import FittedMaterial
-from .exr_layers import write_float_exr
 from .file_names import identifier
 
 EXR_README, NPZ_README = "README_exr.txt", "README_npz.txt"
@@ -35,17 +35,17 @@ def table_from_pixels(pixels: NDArray[np.floating]) -> TabulatedBRDF:
 def write_exr_material(folder: Path, material: FittedMaterial, table: TabulatedBRDF) -> list[str]:
     """NAME_table.exr and NAME_coefficients.exr; returns their names."""
     name = identifier(material.name)
-    write_float_exr(
+    write_exr(
         folder / f"{name}_table.exr",
         table_pixels(table),
-        "RGB",
-        "BRDF in 1/sr at the centres of the MERL cells; row 90*ih + id, column ip; -1: invalid",
+        description="BRDF in 1/sr at the centres of the MERL cells; row 90*ih + id, column ip; "
+        "-1: invalid",
     )
-    write_float_exr(
+    write_exr(
         folder / f"{name}_coefficients.exr",
         material.brdf.coefficients.T[None],
-        "RGB",
-        f"coefficients in the basis {material.brdf.basis.version}, one column a component",
+        description=f"coefficients in the basis {material.brdf.basis.version}, one column a "
+        "component",
     )
     return [f"{name}_table.exr", f"{name}_coefficients.exr"]
 
@@ -55,11 +55,12 @@ def write_exr_basis(folder: Path, basis: Basis) -> str:
     n_h, n_d, n_p = basis.grid.shape
     slabs = np.concatenate([basis.mean[None], basis.log_reference[None], basis.components])
     name = f"basis_{basis.version}.exr"
-    write_float_exr(
+    write_exr(
         folder / name,
         slabs.reshape(-1, n_d * n_p, 1),
-        "Y",
-        f"{len(slabs)} slabs of {n_h} rows (theta_h); column {n_p}*id + ip; see {EXR_README}",
+        channels="Y",
+        description=f"{len(slabs)} slabs of {n_h} rows (theta_h); column {n_p}*id + ip; "
+        f"see {EXR_README}",
     )
     return name
 
@@ -83,9 +84,13 @@ def write_npz_material(folder: Path, material: FittedMaterial, table: TabulatedB
 def log_table_arrays(brdf: PrincipalBRDF) -> dict[str, NDArray[Any]]:
     """ln(ρ·cosMap + ε) at the basis' nodes, (n_h, n_d, n_p, 3), with the nodes' angles."""
     grid = brdf.basis.grid
+    return {"log_table": brdf.log_table.values.reshape(*grid.shape, 3), **node_arrays(grid)}
+
+
+def node_arrays(grid: AngleGrid) -> dict[str, NDArray[Any]]:
+    """The angles of a grid's nodes along each axis, and what the mapping needs beside them."""
     nodes = grid.nodes()
     return {
-        "log_table": brdf.log_table.values.reshape(*grid.shape, 3),
         "theta_h": nodes.theta_h[:, 0, 0],
         "theta_d": nodes.theta_d[0, :, 0],
         "phi_d": nodes.phi_d[0, 0, :],
@@ -96,7 +101,6 @@ def log_table_arrays(brdf: PrincipalBRDF) -> dict[str, NDArray[Any]]:
 
 def write_npz_basis(folder: Path, basis: Basis) -> str:
     """basis_VERSION.npz: µ, ln(ref + ε), components and nodes; returns its name."""
-    nodes = basis.grid.nodes()
     name = f"basis_{basis.version}.npz"
     write_npz(
         folder / name,
@@ -104,11 +108,7 @@ def write_npz_basis(folder: Path, basis: Basis) -> str:
         log_reference=basis.log_reference,
         components=basis.components,
         explained=basis.explained,
-        theta_h=nodes.theta_h[:, 0, 0],
-        theta_d=nodes.theta_d[0, :, 0],
-        phi_d=nodes.phi_d[0, 0, :],
-        knee=np.array(basis.grid.knee),
-        epsilon=np.array(EPSILON),
+        **node_arrays(basis.grid),
         provenance=np.array(basis.provenance),
     )
     return name

@@ -7,6 +7,9 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TypeVar
+
+R = TypeVar("R")
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,13 @@ class Job(ABC):
         if self.now.stage:
             self.stages.append(Stage(self.now.stage, moment - self._since, peak_memory()))
         self._since = moment
+
+
+def finished(result: R | None) -> R:
+    """What a drained job found."""
+    if result is None:  # pragma: no cover - drain raises or finishes
+        raise RuntimeError("the job ended without a result")
+    return result
 
 
 def peak_memory() -> float | None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ..appearance.principled import Principled
 from ..basis import PrincipalBRDF
 from ..capture import Capture
@@ -13,8 +11,6 @@ from ..errors import InputError
 from ..fit.measured_result import MeasuredResult
 from ..job import CaptureResult
 from ..result import FittedResult
-from ..scan.parsing.json_file import read_json
-from ..scan.parsing.json_record import root_record
 from .labels import MOST_MATERIALS
 
 
@@ -37,7 +33,6 @@ def from_result(capture: Capture, fitted: FittedResult) -> tuple[MapMaterial, ..
             f"has {len(capture.materials)} materials, maps are made of {MOST_MATERIALS} at most",
             file=capture.file,
         )
-    off = _deviations(fitted)
     there = {m.name: m for m in fitted.materials}
     for entry in capture.materials:
         if entry.name not in there:
@@ -47,7 +42,7 @@ def from_result(capture: Capture, fitted: FittedResult) -> tuple[MapMaterial, ..
                 file=fitted.file,
             )
     return tuple(
-        MapMaterial(m.name, m.brdf, m.principled, m.scale, off.get(m.name, 0.0))
+        MapMaterial(m.name, m.brdf, m.principled, m.scale, m.normal_deviation)
         for m in (there[entry.name] for entry in capture.materials)
     )
 
@@ -64,13 +59,3 @@ def from_fit(result: CaptureResult) -> tuple[MapMaterial, ...]:
         )
         for m in result.materials
     )
-
-
-def _deviations(fitted: FittedResult) -> dict[str, float]:
-    """Degrees that each material's fit found the scan's normals to be off by, where it says."""
-    listed = root_record(read_json(fitted.file), fitted.file).records("materials")
-    return {
-        entry.text("name"): float(np.clip(entry.number("normal_deviation"), 0.0, 45.0))
-        for entry in listed
-        if "normal_deviation" in entry
-    }

@@ -16,7 +16,7 @@ from ..capture.model import SHADOW_MASK
 from ..errors import InputError
 from ..geometry import RayScene, SurfaceView, edges, view_surface
 from ..job import inputs
-from ..job.job import Job, Step
+from ..job.job import Job, Step, finished
 from ..job.photos import LitPhotos
 from ..photo import read_mask, write_png
 from .capture_text import capture_with_masks
@@ -69,9 +69,7 @@ class MasksJob(Job):
             proposing = ProposalJob(capture, wanted.count)
             while proposing.step():
                 yield Step(proposing.now.stage, share * proposing.now.fraction)
-            found = proposing.result
-            if found is None:  # pragma: no cover - the job raises or finishes
-                raise RuntimeError("the job ended without a result")
+            found = finished(proposing.result)
             scan, rays, lights, done.proposal = (
                 found.scan, found.rays, found.lights, found.proposal,
             )  # fmt: skip

@@ -7,7 +7,7 @@ library, and writing crashes.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -165,10 +165,18 @@ def attributes(path: Path) -> dict[str, object]:
         return found
 
 
-def write_exr(path: Path, pixels: NDArray[np.floating], half: bool = False) -> None:
-    """Write (h, w, 3) linear RGB; the file appears whole or not at all."""
+def write_exr(
+    path: Path,
+    pixels: NDArray[np.floating],
+    half: bool = False,
+    channels: Sequence[str] = (),
+    description: str = "",
+) -> None:
+    """Write (h, w, c), row 0 on top: linear RGB, or the named channels; the file appears whole or
+    not at all. Raises PatinaError."""
     partial = path.with_name(path.stem + ".part.exr")
-    _write(partial, np.asarray(pixels, np.float32), "half" if half else "float")
+    kind = "half" if half else "float"
+    _write(partial, np.asarray(pixels, np.float32), kind, channels, description)
     os.replace(partial, path)
 
 
@@ -186,10 +194,20 @@ def _reason(source: Any) -> str:
     return found[:200] or "no reason given"
 
 
-def _write(path: Path, pixels: NDArray, kind: str) -> None:
+def _write(
+    path: Path,
+    pixels: NDArray,
+    kind: str,
+    channels: Sequence[str] = (),
+    description: str = "",
+) -> None:
     data = np.ascontiguousarray(np.atleast_3d(pixels))
-    height, width, channels = data.shape
-    spec = oiio.ImageSpec(width, height, channels, kind)
+    height, width, count = data.shape
+    spec = oiio.ImageSpec(width, height, count, kind)
+    if channels:
+        spec.channelnames = tuple(channels)
+    if description:
+        spec.attribute("ImageDescription", description)
     if path.suffix == ".exr":
         spec.attribute("compression", "zip")
         spec.attribute("DateTime", FIXED_DATE)

@@ -25,7 +25,8 @@ class FittedMaterial:
     brdf: coefficients (3, k) in the basis they were fitted in, ρ in 1/sr. principled: the
     Principled that was fitted, with its relative cube-root error (and the best Lambertian's).
     scale_known: False where no irradiance was known; then ρ was multiplied by ``scale``, and is
-    known up to one factor. held_out: None where there was one photo only.
+    known up to one factor. held_out: None where there was one photo only. normal_deviation: degrees
+    along each tangent that the scan's normals are off by, 0 where the fit does not say.
     """
 
     name: str
@@ -37,6 +38,7 @@ class FittedMaterial:
     scale_known: bool
     scale: float
     held_out: HeldOutError | None
+    normal_deviation: float
     warnings: tuple[str, ...]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from ..appearance.principled import Principled
 from ..basis import Basis, PrincipalBRDF
 from ..errors import InputError
+from ..scan.parsing.json_file import read_json
 from ..scan.parsing.json_record import Record, root_record, shown
 from .bases import basis_of_version
 from .fitted import FittedMaterial, FittedResult, HeldOutError
@@ -22,6 +22,7 @@ MOST_MATERIALS = 1000
 BEYOND = 1e3  # a coefficient of a training material is about 0.06
 BRIGHTEST = 20.0  # ln(ρ·cosMap): a polished mirror's highlight has 10
 NAME_LENGTH = 200
+STEEPEST = 45.0  # degrees that normals may be off by
 RANGES = {"ior": (1.0, 10.0), "coat_ior": (1.0, 10.0)}  # of the Principled's inputs beyond 0 … 1
 FORBIDDEN = set('/\\:*?"<>|\0')
 
@@ -33,7 +34,7 @@ def read_result(path: Path, cache: Path | None = None) -> FittedResult:
     line, for whatever is not a result that this version can read.
     """
     file = path / NAME if path.is_dir() else path
-    record = root_record(_read_json(file), file)
+    record = root_record(read_json(_checked(file), LARGEST, "a result.json"), file)
     version = record.whole("format")
     if version not in FORMATS:
         raise record.error(
@@ -64,7 +65,8 @@ def read_result(path: Path, cache: Path | None = None) -> FittedResult:
     )
 
 
-def _read_json(file: Path) -> Any:
+def _checked(file: Path) -> Path:
+    """The file, where there is one."""
     try:
         if not file.exists():
             raise InputError(
@@ -73,23 +75,10 @@ def _read_json(file: Path) -> Any:
             )
         if not file.is_file():
             raise InputError("is not a file; expected a result.json", file=file)
-        if (size := file.stat().st_size) > LARGEST:
-            raise InputError(f"has {size >> 20} MB: too large for a result.json", file=file)
-        with open(file, "rb") as opened:
-            text = opened.read(LARGEST + 1).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError("is not a text in UTF-8; expected a result.json", file=file) from error
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"cannot be read ({reason})", file=file) from error
-    try:
-        return json.loads(text)
-    except json.JSONDecodeError as error:
-        raise InputError(
-            f"is not valid JSON ({error.msg})", file=file, line=error.lineno
-        ) from error
-    except (RecursionError, ValueError) as error:  # nested, or a number, beyond all bounds
-        raise InputError("is no JSON that a fit writes (nested too deep)", file=file) from error
+    return file
 
 
 def _material(entry: Record, basis: Basis) -> FittedMaterial:
@@ -104,6 +93,7 @@ def _material(entry: Record, basis: Basis) -> FittedMaterial:
         scale_known=entry.flag("scale_known"),
         scale=_within(entry, "scale", 0.0, 1e12) if "scale" in entry else 1.0,
         held_out=_held_out(entry),
+        normal_deviation=float(np.clip(entry.number("normal_deviation", 0.0), 0.0, STEEPEST)),
         warnings=_sentences(entry),
     )
 

@@ -13,7 +13,7 @@ from patina.core.basis.log_table import LogTable
 from patina.core.errors import FitError
 from patina.core.fit.measured import MeasuredSettings, fit_measured
 from patina.core.fit.measured.anchors import Anchors, directions
-from patina.core.fit.measured.caution import CAUTION, cautious
+from patina.core.fit.measured.caution import CAUTION, caution
 from patina.core.fit.measured.cells import gather
 from patina.core.fit.measured.forward import CellModel, _distinct
 from patina.core.fit.measured.lobes import Lobes, fit_lobes
@@ -242,7 +242,7 @@ def test_caution_darkens_only_what_is_unsure() -> None:
     k = basis.count
     covariance = np.tile(1e-8 * np.eye(k), (3, 1, 1))
     covariance[:, 2, 2] = basis.coefficient_variance
-    change = basis.nodes[:, 1 : 1 + k] @ (cautious(basis, np.zeros((3, k)), covariance)[0])
+    change = basis.nodes[:, 1 : 1 + k] @ caution(basis, covariance)[0]
     variance = basis.coefficient_variance * basis.nodes[:, 3].astype(np.float64) ** 2
     cos_i, cos_o = cosines(*(Angles(*(a.ravel() for a in basis.grid.nodes()))))
     seen = np.minimum(cos_i, cos_o) > 0.05

@@ -7,6 +7,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from patina.core.appearance.principled import Configuration
+
 HALF_WIDTH = 1.05  # of the picture, in radii
 
 
@@ -92,6 +94,35 @@ def normals() -> tuple[np.ndarray, np.ndarray]:
     r2 = x * x + y * y
     z = np.sqrt(np.maximum(1 - r2, 0))
     return np.stack([x, y, z], axis=-1), r2 < 0.995
+
+
+def diffuse(albedo: float) -> bpy.types.Material:
+    """Cycles' own Lambertian."""
+    material = bpy.data.materials.new("diffuse")
+    material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    node = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    node.inputs["Color"].default_value = (albedo, albedo, albedo, 1)
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(node.outputs["BSDF"], output.inputs["Surface"])
+    return material
+
+
+def assert_is(image: np.ndarray, model, light: np.ndarray, irradiance: float) -> None:
+    """A picture under one sun shows a layered model, but for the sphere's tessellation, which
+    grows with the lobe's sharpness."""
+    normal, inside = normals()
+    view = np.array([0.0, 0.0, 1.0])
+    half = (light + view) / np.linalg.norm(light + view)
+    where = Configuration(
+        normal @ light, normal @ view, normal @ half, np.full(inside.shape, light @ half)
+    )
+    expected = irradiance * model.at(where) * np.maximum(where.cos_i, 0)[..., None]
+    kept = inside & (where.cos_i > 0.1) & (where.cos_o > 0.1)
+    error = np.abs(image[kept] - expected[kept])
+    assert np.sqrt(np.sum(error**2) / np.sum(expected[kept] ** 2)) < 0.005
+    assert (error / np.maximum(expected[kept], 1e-3)).max() < 0.015
 
 
 def render(folder: Path) -> np.ndarray:

@@ -12,12 +12,13 @@ pytestmark = [pytest.mark.blender, pytest.mark.slow]
 
 import bpy  # noqa: E402
 
-from patina.core.angles import Angles, half_difference, merl_grid  # noqa: E402
+from patina.core.angles import Angles, half_difference  # noqa: E402
 from patina.core.appearance.principled import Principled  # noqa: E402
 from patina.core.appearance.principled_fit import fit_principled  # noqa: E402
 from patina.core.basis import Basis, PrincipalBRDF  # noqa: E402
 from patina.core.brdf import nbrdf  # noqa: E402
 from patina.scene import fallback, lamps, materials, osl_files, worlds  # noqa: E402
+from tests.projected import projected  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
 
 VIEW = np.array([0.0, 0.0, 1.0])
@@ -41,12 +42,7 @@ def _brdf(name: str, count: int, shared: Path | None) -> PrincipalBRDF:
         def evaluate(angles: Angles) -> np.ndarray:
             return nbrdf.evaluate(weights[names.index(name)], angles)
 
-    centres = merl_grid.node_angles(0.5)
-    seen = np.flatnonzero(merl_grid.visible(centres))
-    chosen = np.random.default_rng(0).choice(seen, 20000, replace=False)
-    angles = Angles(*(a.ravel()[chosen] for a in centres))
-    basis = Basis.default()
-    return PrincipalBRDF(basis, basis.project(evaluate(angles), angles, count, eta=1.0))
+    return projected(evaluate, count)
 
 
 @pytest.fixture(params=MATERIALS, ids=lambda m: f"{m[0]}-{m[1]}")
@@ -101,7 +97,7 @@ def test_another_object_casts_its_shadow(tmp_path):
     cycles_sphere.sun(LIGHT, 2.0)
     bpy.ops.mesh.primitive_cube_add(size=0.5, location=tuple(1.6 * LIGHT))
     bpy.context.object.visible_camera = False
-    sphere.data.materials.append(_white())
+    sphere.data.materials.append(cycles_sphere.diffuse(1.0))
     lambert = cycles_sphere.render(tmp_path)
     brdf = _brdf("analytic", 5, None)
     _material(brdf, sphere)
@@ -115,18 +111,6 @@ def test_another_object_casts_its_shadow(tmp_path):
     wrong = np.abs(image - np.where(lit[..., None], expected, 0)).max(axis=-1) > 0.01
     assert np.mean(wrong[kept]) < 0.01
     assert np.mean(image[kept & ~lit] == 0) > 0.97
-
-
-def _white() -> bpy.types.Material:
-    white = bpy.data.materials.new("white")
-    white.use_nodes = True
-    tree = white.node_tree
-    tree.nodes.clear()
-    diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
-    diffuse.inputs["Color"].default_value = (1, 1, 1, 1)
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(diffuse.outputs[0], output.inputs[0])
-    return white
 
 
 def test_under_a_uniform_sky(brdf, tmp_path):
@@ -185,7 +169,7 @@ def test_other_lamps_bring_what_they_bring_to_a_diffuse_surface(kind, tmp_path):
     brdf = _brdf("analytic", 5, None)
     _material(brdf, sphere)
     image = cycles_sphere.render(tmp_path)
-    sphere.data.materials[0] = _white()
+    sphere.data.materials[0] = cycles_sphere.diffuse(1.0)
     lambert = cycles_sphere.render(tmp_path) * np.pi  # E cosθ
     normal, inside = cycles_sphere.normals()
     light = np.array([2.0, 1.0, 3.0]) - normal

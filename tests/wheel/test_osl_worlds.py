@@ -14,31 +14,26 @@ pytestmark = [pytest.mark.blender, pytest.mark.slow]
 import bpy  # noqa: E402
 import OpenImageIO as oiio  # noqa: E402
 
-from patina.core.angles import Angles, half_difference, merl_grid  # noqa: E402
+from patina.core.angles import Angles, half_difference  # noqa: E402
 from patina.core.appearance.energy import directional_albedo  # noqa: E402
 from patina.core.appearance.principled import Principled  # noqa: E402
 from patina.core.appearance.principled_fit import fit_principled  # noqa: E402
-from patina.core.basis import Basis, PrincipalBRDF  # noqa: E402
+from patina.core.basis import PrincipalBRDF  # noqa: E402
 from patina.core.maps.split import split_body  # noqa: E402
-from patina.scene import materials, osl_files  # noqa: E402
+from patina.scene import materials, osl_files, relight  # noqa: E402
+from tests.projected import projected  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
-from tools.experiments.spheres import worlds  # noqa: E402
 
 VIEW = np.array([0.0, 0.0, 1.0])
-WORLDS = worlds()
+WORLDS = relight.shipped_worlds()
 PIXELS = 24  # that are compared, of every world
 
 if materials.osl_missing():
     pytest.skip(f"{materials.osl_missing()}", allow_module_level=True)
 
 
-def brdf_of(evaluate, count: int = 60) -> PrincipalBRDF:
-    centres = merl_grid.node_angles(0.5)
-    seen = np.flatnonzero(merl_grid.visible(centres))
-    chosen = np.random.default_rng(0).choice(seen, 20000, replace=False)
-    angles = Angles(*(a.ravel()[chosen] for a in centres))
-    basis = Basis.default()
-    return PrincipalBRDF(basis, basis.project(evaluate(angles), angles, count, eta=1.0))
+def brdf_of(evaluate) -> PrincipalBRDF:
+    return projected(evaluate, 60)
 
 
 def lambert(angles: Angles) -> np.ndarray:
@@ -61,12 +56,7 @@ def wear(brdf: PrincipalBRDF, thing: bpy.types.Object) -> bpy.types.Node:
 
 def world(path: Path) -> np.ndarray:
     """Light the scene by a picture; returns its (h, w, 3) radiance, the zenith in row 0."""
-    cycles_sphere.sky(1.0)
-    tree = bpy.context.scene.world.node_tree
-    texture = tree.nodes.new("ShaderNodeTexEnvironment")
-    texture.image = bpy.data.images.load(str(path))
-    background = next(n for n in tree.nodes if n.type == "BACKGROUND")
-    tree.links.new(texture.outputs["Color"], background.inputs["Color"])
+    relight.light_by(bpy.context.scene, path)
     return np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT), np.float64)[..., :3]
 
 
@@ -152,14 +142,7 @@ def test_light_bounces_between_objects_as_between_cycles_own(tmp_path):
     cycles_sphere.sky(1.0)
     bpy.ops.mesh.primitive_plane_add(size=8, location=(0, -1, 0), rotation=(np.pi / 2, 0, 0))
     floor = bpy.context.object
-    own = bpy.data.materials.new("own")
-    own.use_nodes = True
-    tree = own.node_tree
-    tree.nodes.clear()
-    diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
-    diffuse.inputs["Color"].default_value = (albedo, albedo, albedo, 1)
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(diffuse.outputs[0], output.inputs[0])
+    own = cycles_sphere.diffuse(albedo)
     images = []
     for measured in (False, True):
         for thing in (sphere, floor):

@@ -21,16 +21,9 @@ NODES = 6000
 STIFF = 1e-6
 
 
-def cautious(
-    basis: Basis, coefficients: NDArray[np.float64], covariance: NDArray[np.float64], seed: int = 0
-) -> NDArray[np.float64]:
-    """Coefficients (3, k) of ln(ρ·cosMap + ε) less CAUTION times its variance; covariance:
-    (3, k, k) of the coefficients."""
-    return np.asarray(coefficients + caution(basis, covariance, seed))
-
-
 def caution(basis: Basis, covariance: NDArray[np.float64], seed: int = 0) -> NDArray[np.float64]:
-    """(3, k) what :func:`cautious` adds to any coefficients of this covariance."""
+    """(3, k) to add to coefficients of this covariance (3, k, k): it lowers ln(ρ·cosMap + ε) by
+    CAUTION times its variance."""
     k = covariance.shape[1]
     cos_i, cos_o = cosines(*(Angles(*(a.ravel() for a in basis.grid.nodes()))))
     visible = np.flatnonzero(np.minimum(cos_i, cos_o) > 0.01)
