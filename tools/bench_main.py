@@ -11,7 +11,7 @@ from pathlib import Path
 from .common import ROOT
 from .package import load_patina
 
-BENCHES = ("basis", "sampling", "fit", "light", "real", "solve", "noise", "speed")
+BENCHES = ("basis", "sampling", "fit", "light", "real", "solve", "noise", "viewport", "speed")
 
 
 def main() -> int:

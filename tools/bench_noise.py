@@ -26,7 +26,7 @@ def run(data: Path) -> None:
     print("|---|---|---|---|---|---|---|")
     ratios: dict[str, list[float]] = {"diffuse": [], "glossy": []}
     for name, kind in MATERIALS:
-        brdf = _brdf(data, name)
+        brdf = brdf_of(data, name)
         fit = fit_principled(brdf.evaluate)
         roughness, rest = fit.principled.roughness, split(brdf.evaluate).rest
         for world in WORLDS:
@@ -43,7 +43,8 @@ def run(data: Path) -> None:
         print(f"\n- {kind}: median {np.median(values):.2f}, largest {max(values):.2f}")
 
 
-def _brdf(data: Path, name: str):  # type: ignore[no-untyped-def]
+def brdf_of(data: Path, name: str):  # type: ignore[no-untyped-def]
+    """A measured material as 100 components of the basis."""
     from patina.core.brdf import nbrdf
     from tests.projected import projected
 

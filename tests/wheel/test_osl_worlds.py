@@ -3,8 +3,6 @@ path tracing of it against a numpy quadrature of the table and against Cycles' o
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -12,19 +10,17 @@ pytest.importorskip("bpy")
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 
 import bpy  # noqa: E402
-import OpenImageIO as oiio  # noqa: E402
 
-from patina.core.angles import Angles, half_difference  # noqa: E402
+from patina.core.angles import half_difference  # noqa: E402
 from patina.core.appearance.energy import directional_albedo  # noqa: E402
 from patina.core.appearance.principled import Principled  # noqa: E402
-from patina.core.appearance.principled_fit import fit_principled  # noqa: E402
 from patina.core.basis import PrincipalBRDF  # noqa: E402
 from patina.core.maps.split import split_body  # noqa: E402
-from patina.scene import materials, osl_files, relight  # noqa: E402
+from patina.scene import materials, relight  # noqa: E402
 from tests.projected import projected  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
+from tests.wheel.world_light import VIEW, lambert, reflected, wear, world  # noqa: E402
 
-VIEW = np.array([0.0, 0.0, 1.0])
 WORLDS = relight.shipped_worlds()
 PIXELS = 24  # that are compared, of every world
 
@@ -36,46 +32,7 @@ def brdf_of(evaluate) -> PrincipalBRDF:
     return projected(evaluate, 60)
 
 
-def lambert(angles: Angles) -> np.ndarray:
-    return np.full((angles.theta_h.size, 3), 1 / np.pi)
-
-
 GLOSSY = Principled(base_color=np.array([0.4, 0.1, 0.05]), roughness=0.3)
-
-
-def wear(brdf: PrincipalBRDF, thing: bpy.types.Object) -> bpy.types.Node:
-    files = osl_files.ensure_files(brdf)
-    fit = fit_principled(brdf.evaluate, coat=False, nodes=(12, 6, 4))
-    material = materials.create_material("measured", brdf, fit, files)
-    assert materials.REASON_PROPERTY not in material
-    thing.data.materials.clear()
-    thing.data.materials.append(material)
-    (node,) = osl_files.script_nodes(material)
-    return node
-
-
-def world(path: Path) -> np.ndarray:
-    """Light the scene by a picture; returns its (h, w, 3) radiance, the zenith in row 0."""
-    relight.light_by(bpy.context.scene, path)
-    return np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT), np.float64)[..., :3]
-
-
-def reflected(brdf: PrincipalBRDF, sky: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """(3,) Σ ρ L cos θi dω over all pixels of the world; Cycles' own mapping of directions."""
-    h, w = sky.shape[:2]
-    down = (np.arange(h) + 0.5) / h * np.pi
-    around = (0.5 - (np.arange(w) + 0.5) / w) * 2 * np.pi
-    t, p = np.meshgrid(down, around, indexing="ij")
-    light = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1)
-    solid = (2 * np.pi / w) * 2 * np.sin(t) * np.sin(np.pi / h / 2)
-    cos_i = light @ normal
-    up = cos_i > 0
-    wide = light[up]
-    angles = half_difference(
-        np.broadcast_to(normal, wide.shape), wide, np.broadcast_to(VIEW, wide.shape)
-    )
-    weight = (cos_i[up] * solid[up])[:, None] * sky[up]
-    return np.sum(brdf.evaluate(angles) * weight, axis=0)
 
 
 @pytest.mark.parametrize("name", ["forest", "interior", "sunset"])

@@ -1,0 +1,185 @@
+"""The measured material on a whole object: the bunny under pictures of the world, and two of them
+face to face."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy")
+pytestmark = [pytest.mark.blender, pytest.mark.slow]
+
+import bpy  # noqa: E402
+
+from patina.core.appearance.principled import Principled  # noqa: E402
+from patina.core.geometry import RayScene  # noqa: E402
+from patina.core.scan import Mesh  # noqa: E402
+from patina.core.scan.mesh import read_mesh  # noqa: E402
+from patina.scene import materials, relight  # noqa: E402
+from tests.projected import projected  # noqa: E402
+from tests.wheel import cycles_sphere  # noqa: E402
+from tests.wheel.world_light import VIEW, directions, lambert, reflected, wear, world  # noqa: E402
+
+SIZE = 48  # of the pictures
+SEEDS = 4
+PIXELS = 20  # that are compared, in the ball's shadow and out of it
+BALL = (np.array([0.9, 0.9, 0.9]), 0.45)  # black: centre and radius
+GLOSSY = Principled(base_color=np.array([0.4, 0.1, 0.05]), roughness=0.3)
+WORLDS = relight.shipped_worlds()
+
+if materials.osl_missing():
+    pytest.skip(f"{materials.osl_missing()}", allow_module_level=True)
+
+
+@pytest.fixture
+def bunny(shared) -> Mesh:
+    """The exact surface, in a unit sphere around the origin."""
+    mesh = read_mesh(shared / "data" / "scans" / "bunny_truth.ply")
+    vertices = mesh.vertices - (mesh.vertices.max(axis=0) + mesh.vertices.min(axis=0)) / 2
+    return Mesh(vertices / np.linalg.norm(vertices, axis=1).max(), mesh.faces)
+
+
+def put(mesh: Mesh, thing: bpy.types.Object | None = None) -> bpy.types.Object:
+    """The mesh as a smooth object of the scene: a new one, or instead of what another shows."""
+    data = bpy.data.meshes.new("bunny")
+    data.from_pydata(mesh.vertices, [], mesh.faces)
+    data.shade_smooth()
+    if thing is not None:
+        thing.data = data
+        return thing
+    thing = bpy.data.objects.new("bunny", data)
+    bpy.context.scene.collection.objects.link(thing)
+    return thing
+
+
+def seen_at_pixels(rays: RayScene, thing: bpy.types.Object) -> tuple[np.ndarray, ...]:
+    """(n, 2) pixels that show the mesh, (n, 3) its points there and Blender's smooth normals."""
+    u = ((np.arange(SIZE) + 0.5) / SIZE * 2 - 1) * cycles_sphere.HALF_WIDTH
+    x, y = np.meshgrid(u, -u)
+    starts = np.stack([x, y, np.full_like(x, 5.0)], axis=-1).reshape(-1, 3)
+    hits = rays.first_hits(starts, np.broadcast_to(-VIEW, starts.shape))
+    hit = hits.face >= 0
+    hits = type(hits)(*(a[hit] for a in hits))
+    smooth = np.empty(3 * len(thing.data.vertices), np.float32)
+    thing.data.vertex_normals.foreach_get("vector", smooth)
+    corners = smooth.reshape(-1, 3)[rays.mesh.faces[hits.face]].astype(float)
+    shares = np.stack([1 - hits.u - hits.v, hits.u, hits.v], axis=1)[..., None]
+    normals = np.sum(shares * corners, axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.stack(np.divmod(np.flatnonzero(hit), SIZE), axis=1), rays.points(hits), normals
+
+
+def behind_ball(point: np.ndarray, towards: np.ndarray) -> np.ndarray:
+    """Whether rays from a point, or points, along unit directions (..., 3) meet the ball."""
+    centre, radius = BALL
+    along = np.sum(towards * (centre - point), axis=-1)
+    nearest2 = np.sum((centre - point) ** 2, axis=-1) - along**2
+    return (along > 0) & (nearest2 < radius**2)
+
+
+CASES = {
+    "glossy-forest": (GLOSSY.evaluate, "forest"),
+    "glossy-interior": (GLOSSY.evaluate, "interior"),
+    "glossy-sunset": (GLOSSY.evaluate, "sunset"),
+    "matte-forest": (lambert, "forest"),
+}
+
+
+def hidden_by_itself(rays: RayScene, point: np.ndarray, normal: np.ndarray, towards: np.ndarray):
+    """Whether the mesh itself lies along directions (h, w, 3) above the surface."""
+    up = towards @ normal > 0
+    hidden = np.zeros(up.shape, bool)
+    start = np.broadcast_to(point + 2e-4 * normal, (int(up.sum()), 3))
+    hidden[up] = rays.occluded(start, towards[up])
+    return hidden
+
+
+@pytest.mark.parametrize("made, name", CASES.values(), ids=CASES.keys())
+def test_a_bunny_under_a_picture_of_the_world(made, name, bunny, tmp_path):
+    """Where it does not see itself, which only path tracing could follow; a black ball's shadow
+    falls on it."""
+    if name not in WORLDS:
+        pytest.skip(f"this bpy has no world {name!r}")
+    brdf = projected(made, 60)
+    thing = put(bunny, cycles_sphere.new_scene(size=SIZE, samples=1024, osl=True))
+    # a box is as wide as the pixel, whatever the width says; the bunny is not smooth across one
+    bpy.context.scene.cycles.pixel_filter_type = "BLACKMAN_HARRIS"
+    sky = world(WORLDS[name])
+    wear(brdf, thing)
+    bpy.ops.mesh.primitive_uv_sphere_add(
+        segments=256, ring_count=128, radius=BALL[1], location=BALL[0]
+    )
+    bpy.context.object.data.materials.append(cycles_sphere.diffuse(0.0))
+    images = []
+    for seed in range(SEEDS):
+        bpy.context.scene.cycles.seed = seed
+        images.append(cycles_sphere.render(tmp_path))
+
+    rays = RayScene.build(bunny)
+    towards, solid = directions(sky)
+    pixels, points, normals = seen_at_pixels(rays, thing)
+    facing = np.flatnonzero((normals @ VIEW > 0.3) & ~behind_ball(points, VIEW))
+    rows, expected, shadowed = [], [], []
+    for k in np.random.default_rng(3).permutation(facing):
+        few = towards[::8, ::8]
+        if hidden_by_itself(rays, points[k], normals[k], few).mean() > 0.005:
+            continue
+        cosine = np.maximum(towards @ normals[k], 0)
+        itself = hidden_by_itself(rays, points[k], normals[k], towards)
+        if np.sum((cosine * solid)[itself]) > 0.002 * np.pi:
+            continue
+        ball = behind_ball(points[k], towards)
+        dark = np.sum((cosine * solid)[ball]) > 0.05 * np.pi
+        if sum(s == dark for s in shadowed) == PIXELS // 2:
+            continue
+        rows.append(pixels[k])
+        shadowed.append(dark)
+        expected.append(reflected(brdf, np.where((ball | itself)[..., None], 0, sky), normals[k]))
+        if len(rows) == PIXELS:
+            break
+    assert len(rows) == PIXELS
+    at = tuple(np.array(rows).T)
+    found = np.array([image[at] for image in images])
+    noise = np.sqrt(np.mean(found.var(axis=0, ddof=1)) / SEEDS)
+    error, mean = found.mean(axis=0) - expected, np.mean(expected)
+    assert noise < 0.03 * mean
+    # a pixel's three channels err alike: they are no three draws
+    assert abs(error.mean()) < 0.003 * mean + 3 * noise / np.sqrt(PIXELS)
+    assert np.sqrt(np.mean(error**2)) < 1.5 * noise + 0.003 * mean
+
+
+def test_two_bunnies_face_to_face(bunny, tmp_path):
+    """Light bounces between them as between two of Cycles' own Diffuse."""
+    albedo = 0.7
+    brdf = projected(lambda angles: albedo * lambert(angles), 60)
+    sphere = cycles_sphere.new_scene(size=SIZE, samples=1024, osl=True)
+    bpy.context.scene.cycles.filter_width = 1.0
+    cycles_sphere.sky(1.0)
+    pair = []
+    for side in (-1, 1):
+        vertices = 0.7 * bunny.vertices
+        vertices[:, 0] = side * (vertices[:, 0].max() + 0.02 - vertices[:, 0])
+        faces = bunny.faces if side < 0 else bunny.faces[:, ::-1]
+        mesh = Mesh(vertices, np.ascontiguousarray(faces))
+        pair.append(put(mesh, sphere if side < 0 else None))
+    own = cycles_sphere.diffuse(albedo)
+    images = {}
+    for measured in (False, True):
+        for thing in pair:
+            thing.data.materials.clear()
+            thing.data.materials.append(own)
+        if measured:
+            wear(brdf, *pair)
+        images[measured] = cycles_sphere.render(tmp_path)
+    bpy.context.scene.cycles.max_bounces = 0
+    for thing in pair:
+        thing.data.materials.clear()
+        thing.data.materials.append(own)
+    direct = cycles_sphere.render(tmp_path)
+    # alone in a white world each would be `albedo`; bounced light lies between it and `direct`
+    on_it = (images[False] < 0.95).all(axis=-1)
+    deep = on_it & (direct.mean(axis=-1) < 0.75 * albedo)
+    assert deep.sum() > 20
+    assert images[False][deep].mean() > 1.2 * direct[deep].mean()
+    for part in (on_it, deep):
+        assert images[True][part].mean() == pytest.approx(images[False][part].mean(), rel=0.01)

@@ -1,0 +1,64 @@
+"""Objects that wear the measured material under a picture of the world, and what they should show:
+the sum over every pixel of that picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import OpenImageIO as oiio
+
+from patina.core.angles import Angles, half_difference
+from patina.core.appearance.principled_fit import fit_principled
+from patina.core.basis import PrincipalBRDF
+from patina.scene import materials, osl_files, relight
+
+VIEW = np.array([0.0, 0.0, 1.0])  # the camera of cycles_sphere
+
+
+def lambert(angles: Angles) -> np.ndarray:
+    """ρ of a white diffuser."""
+    return np.full((angles.theta_h.size, 3), 1 / np.pi)
+
+
+def wear(brdf: PrincipalBRDF, *things: bpy.types.Object) -> bpy.types.Node:
+    """Give objects the measured material; returns its script node."""
+    files = osl_files.ensure_files(brdf)
+    fit = fit_principled(brdf.evaluate, coat=False, nodes=(12, 6, 4))
+    material = materials.create_material("measured", brdf, fit, files)
+    assert materials.REASON_PROPERTY not in material
+    for thing in things:
+        thing.data.materials.clear()
+        thing.data.materials.append(material)
+    (node,) = osl_files.script_nodes(material)
+    return node
+
+
+def world(path: Path) -> np.ndarray:
+    """Light the scene by a picture; returns its (h, w, 3) radiance, the zenith in row 0."""
+    relight.light_by(bpy.context.scene, path)
+    return np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT), np.float64)[..., :3]
+
+
+def directions(sky: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(h, w, 3) towards each pixel of a world by Cycles' own mapping, and (h, w) sr of each."""
+    h, w = sky.shape[:2]
+    down = (np.arange(h) + 0.5) / h * np.pi
+    around = (0.5 - (np.arange(w) + 0.5) / w) * 2 * np.pi
+    t, p = np.meshgrid(down, around, indexing="ij")
+    towards = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1)
+    return towards, (2 * np.pi / w) * 2 * np.sin(t) * np.sin(np.pi / h / 2)
+
+
+def reflected(brdf: PrincipalBRDF, sky: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """(3,) Σ ρ L cos θi dω over all pixels of the world, towards VIEW."""
+    towards, solid = directions(sky)
+    cos_i = towards @ normal
+    up = cos_i > 0
+    wide = towards[up]
+    angles = half_difference(
+        np.broadcast_to(normal, wide.shape), wide, np.broadcast_to(VIEW, wide.shape)
+    )
+    weight = (cos_i[up] * solid[up])[:, None] * sky[up]
+    return np.sum(brdf.evaluate(angles) * weight, axis=0)

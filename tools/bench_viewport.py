@@ -1,0 +1,96 @@
+"""How soon a rendered viewport shows an edit of the measured material or of a lamp.
+
+A window cannot be had where bpy is a module; what a viewport does after an edit is what a render
+with persistent data does: it lets the extension's handlers run, syncs what changed, builds the
+shader anew, and traces a first sample.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+WIDTH, HEIGHT = 960, 540
+REPEATS = 7
+GOAL = 0.5  # s
+
+
+def run(data: Path) -> None:
+    """Print the table of docs/measurements.md, section "Edits"."""
+    import bpy
+
+    from patina.core.appearance.principled_fit import fit_principled
+    from patina.scene import lamps, materials, osl_files, relight, worlds
+    from tests.wheel import cycles_sphere
+
+    from .bench_noise import brdf_of
+
+    brdf = brdf_of(data, "alum-bronze")
+    sphere = cycles_sphere.new_scene(size=WIDTH, samples=1, osl=True)
+    scene = bpy.context.scene
+    scene.render.resolution_y = HEIGHT
+    scene.render.use_persistent_data = True
+    relight.light_by(scene, relight.shipped_worlds()["forest"])
+    lamp = cycles_sphere.sun(np.array([0.5, 0.3, 0.8]))
+    files = osl_files.ensure_files(brdf)
+    material = materials.create_material("measured", brdf, fit_principled(brdf.evaluate), files)
+    sphere.data.materials.append(material)
+    (node,) = osl_files.script_nodes(material)
+    inputs = {socket.identifier: socket for socket in node.inputs}
+
+    def paint(step: int) -> None:
+        inputs["body_scale"].default_value = (0.5 + 0.05 * step, 1.0, 1.0, 1.0)
+
+    def turn(step: int) -> None:
+        lamp.rotation_mode = "XYZ"
+        lamp.rotation_euler = (0.3 + 0.1 * step, 0.2, 0.0)
+
+    def strength(step: int) -> None:
+        lamp.data.energy = 1.0 + step
+
+    def add(step: int) -> None:
+        cycles_sphere.sun(np.array([0.1 * step, 0.3, 0.8]))
+
+    def none(step: int) -> None:
+        pass
+
+    edits: tuple[tuple[str, Callable[[int], None]], ...] = (
+        ("nothing (a redraw)", none), ("paint of the material", paint),
+        ("a sun turned", turn), ("a sun's strength", strength), ("a sun added", add),
+    )  # fmt: skip
+    faces = len(sphere.data.polygons)
+    print(f"## edits ({WIDTH} x {HEIGHT} pixels, {faces} faces, median of {REPEATS})\n")
+    print("| edit | handlers | sync and first sample | together |")
+    print("|---|---|---|---|")
+    lamps.register()
+    worlds.register()
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            scene.render.filepath = str(Path(folder) / "frame.png")
+            bpy.ops.render.render()
+            for name, edit in edits:
+                told, drawn = np.array([_seconds(edit, k) for k in range(REPEATS)]).T
+                both = np.median(told + drawn)
+                print(
+                    f"| {name} | {np.median(told):.3f} s | {np.median(drawn):.2f} s | "
+                    f"{both:.2f} s |"
+                )
+    finally:
+        lamps.unregister()
+        worlds.unregister()
+
+
+def _seconds(edit: Callable[[int], None], step: int) -> tuple[float, float]:
+    """(until Blender and its handlers know of the edit, until the picture is there)."""
+    import bpy
+
+    since = time.perf_counter()
+    edit(step)
+    bpy.context.view_layer.update()
+    told = time.perf_counter()
+    bpy.ops.render.render()
+    return told - since, time.perf_counter() - told
