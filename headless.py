@@ -19,6 +19,7 @@ from typing import NoReturn
 
 COMMANDS = {
     "fit": "fit",
+    "diagnose": "diagnose",
     "import": "import_",
     "masks": "masks",
     "maps": "maps",

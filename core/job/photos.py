@@ -15,6 +15,7 @@ from ..errors import InputError, PatinaError
 from ..photo import read_encoded
 from ..photo.bracket import merge_bracket
 from ..photo.exif import Exif, read_exif
+from ..photo.noise import estimate_noise
 from ..photo.photo import read_photo
 from ..photo.transfer import Transfer
 
@@ -54,16 +55,26 @@ class LitPhotos:
 
     def read(self, place: int) -> LitPhoto:
         """One lit photo. Raises InputError naming the capture's key."""
+        return self._read(place)
+
+    def read_with_noise(self, place: int) -> LitPhoto:
+        """The same with the variance of every pixel, also where it is no bracket."""
+        return self._read(place, noise=True)
+
+    def _read(self, place: int, noise: bool = False) -> LitPhoto:
         photo = self.capture.photos[place]
         try:
             curve = self.curve(place)
             if len(photo.files) == 1:
                 one = read_photo(photo.files[0], curve, photo.saturation)
+                variance = estimate_noise(one).variance(one.radiance) if noise else None
                 radiance = one.radiance
                 if self.exposures[place][0] != 1.0:
                     radiance /= np.float32(self.exposures[place][0])
+                    if variance is not None:
+                        variance /= np.float32(self.exposures[place][0] ** 2)
                 told = () if one.info.levels is None else (one.info.sentence,)
-                return LitPhoto(radiance, ~one.clipped, notes=(*told, *one.info.notes))
+                return LitPhoto(radiance, ~one.clipped, variance, (*told, *one.info.notes))
             merged = merge_bracket(
                 [partial(read_photo, file, curve, photo.saturation) for file in photo.files],
                 self.exposures[place],

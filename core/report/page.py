@@ -42,13 +42,22 @@ def write_report(folder: Path, result: CaptureResult) -> Iterator[float]:
     for place in range(len(result.capture.photos)):
         yield (len(result.materials) + place) / count
         body.append(_photo_row(folder, result, place))
-    title = escape(result.capture.file.name)
-    (folder / "index.html").write_text(
-        f"<!doctype html><html lang='en'><meta charset='utf-8'><title>Patina: {title}</title>"
-        f"<style>{STYLE.read_text('utf-8')}</style><h1>Patina report</h1><p class='sub'>{title} · "
+    head = (
         f"{len(result.capture.photos)} lit photos · {len(result.scan.mesh.faces):,} faces · basis "
-        f"{result.basis.version}</p>{''.join(body)}</html>",
-        "utf-8",
+        f"{result.basis.version}"
+    )
+    html = page(result.capture.file.name, "".join(body), head)
+    (folder / "index.html").write_text(html, "utf-8")
+
+
+def page(name: str, body: str, head: str = "") -> str:
+    """A whole page about a capture; body: HTML; head: text below the title."""
+    title = escape(name)
+    told = title if not head else f"{title} · {escape(head)}"
+    return (
+        f"<!doctype html><html lang='en'><meta charset='utf-8'><title>Patina: {title}</title>"
+        f"<style>{STYLE.read_text('utf-8')}</style><h1>Patina report</h1><p class='sub'>{told}</p>"
+        f"{body}</html>"
     )
 
 

@@ -1,0 +1,49 @@
+"""``diagnose CAPTURE --out DIR``: fit, say what is wrong and why, and what is gained."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..core.capture import read_capture
+from ..core.job import finished
+from ..core.job.diagnose_job import DiagnoseJob
+from ..core.report import diagnosis
+from ..core.report.page import page
+from .progress import Progress
+from .solve import check_threads
+from .staging import check_out, staged_folder
+
+HELP = "fit a capture and say what is wrong with it"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("capture", type=Path, help="the capture file (*.capture.toml)")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the diagnosis")
+    parser.add_argument(
+        "--threads", type=int, metavar="N", help="look at the photos on N threads (default: cores)"
+    )
+
+
+def run(arguments: argparse.Namespace) -> None:
+    check_threads(arguments.threads)
+    out = check_out(arguments.out)
+    job = DiagnoseJob(read_capture(arguments.capture), threads=arguments.threads)
+    job.drain(Progress(share=0.97))
+    found, setting = finished(job.found), finished(job.setting)
+    with staged_folder(out) as folder:
+        report = folder / "report"
+        report.mkdir()
+        html = page(arguments.capture.name, diagnosis.section(found, setting))
+        (report / "index.html").write_text(html, "utf-8")
+        diagnosis.write(folder / "diagnosis.json", found)
+    for trial in found.accepted:
+        print(f"{trial.effect.cause}: {trial.effect.sentence(trial.x, trial.deviation)}")
+    if not found.accepted:
+        print("none: nothing that can be named is wrong beyond noise and the scan's own errors")
+    print(
+        f"not noise: {100 * found.not_noise_before:.0f} % of what the prediction misses, "
+        f"{100 * found.not_noise_after:.0f} % with what is named in the model"
+    )
+    print(f"wrote {out / 'diagnosis.json'}")
+    print(f"      {out / 'report' / 'index.html'}")

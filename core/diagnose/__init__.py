@@ -1,0 +1,1 @@
+"""What the forward model gets wrong: shown, named, put into the model, measured."""

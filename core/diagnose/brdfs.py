@@ -1,0 +1,63 @@
+"""The BRDFs of all materials of a capture, and how what they reflect changes with coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import Angles
+from ..basis import Basis, PrincipalBRDF, mapping
+from ..basis.log_table import LogTable
+from . import slack
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class BRDFs:
+    """coefficients: (m, 3, k) of m materials in a basis with slack (slack.py); variance: (k,) of
+    them before a photo is seen."""
+
+    basis: Basis
+    coefficients: NDArray[np.float64]
+    variance: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, brdfs: Sequence[PrincipalBRDF]) -> BRDFs:
+        """Fitted BRDFs of one basis, with a little slack."""
+        basis = brdfs[0].basis
+        coefficients = np.zeros((len(brdfs), 3, basis.count + slack.COUNT))
+        for index, brdf in enumerate(brdfs):
+            coefficients[index, :, : brdf.coefficients.shape[1]] = brdf.coefficients
+        variance = slack.variances(basis, slack.LITTLE)
+        return cls(slack.with_slack(basis), coefficients, variance)
+
+    def loose(self) -> BRDFs:
+        """The same where materials may be far outside the basis."""
+        variance = self.variance.copy()
+        variance[-slack.COUNT :] = slack.MUCH**2
+        return replace(self, variance=variance)
+
+    @cached_property
+    def tables(self) -> tuple[LogTable, ...]:
+        """One a material."""
+        return tuple(LogTable.of(self.basis, c) for c in self.coefficients)
+
+    def evaluate(self, angles: Angles, material: NDArray[np.integer]) -> Array:
+        """ρ (n, 3) in 1/sr at n directions, each of the material that its pixel shows."""
+        out = np.zeros((len(material), 3), np.float32)
+        for index, table in enumerate(self.tables):
+            rows = np.flatnonzero(material == index)
+            if len(rows):
+                out[rows] = table.evaluate(Angles(*(a.take(rows) for a in angles)))
+        return out
+
+    def rows(self, angles: Angles, pixels: NDArray[np.intp]) -> tuple[Array, Array]:
+        """(Q̂ (p, k), cosMap (p,)) at some pixels: ∂ρ/∂c = (ρ + ε / cosMap) Q̂."""
+        part = Angles(*(a.take(pixels) for a in angles))
+        _, q = self.basis.rows(part, self.coefficients.shape[2])
+        return q, mapping.cos_map(part)

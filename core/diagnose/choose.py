@@ -1,0 +1,225 @@
+"""Choose the pixels of a diagnosis from every photo, a band of rows at a time.
+
+Half of a photo's share is drawn evenly from everything that shows the object, shadows too; the
+other half where causes betray themselves: beside the edges of shadows and about the highlight. The
+choice looks at geometry alone, never at what a pixel shows, so it does not bias any fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, gaussian_filter
+
+from ..angles import half_difference
+from ..angles.vectors import dot
+from ..capture import Capture
+from ..geometry import PixelRays, RayScene, Window, bands, edges, view_window
+from ..job import inputs
+from ..job.lights import Lights
+from ..job.photos import LitPhoto, LitPhotos
+from ..light import Light
+from ..samples.reservoir import sample_hash
+from ..samples.take import light_surface
+from ..scan import Scan
+from .pixels import Pixels
+
+Array = NDArray[np.float32]
+
+COUNT = 32_000  # pixels of all photos
+REACH = 8  # pixels from the edge of a shadow that are told apart
+HIGHLIGHT = np.radians(15.0)  # θh
+BLOCKS = 6  # parts of a photo along the longer side of what it shows of the object
+OUTLINE = 2  # pixels beside it that belong to no surface surely
+LEAST_COS_O = 0.15  # beyond 81° a pixel sees too much surface
+VEIL = 0.2  # of the diagonal
+STENCIL = np.array([-2, -1, 0, 1, 2])  # derivative of a Gaussian about these
+WIDTH = 1.0  # pixels, of that Gaussian
+
+
+def choose_pixels(
+    capture: Capture,
+    scan: Scan,
+    rays: RayScene,
+    photos: LitPhotos,
+    lights: Lights,
+    count: int = COUNT,
+) -> Generator[float, None, Pixels]:
+    """Yields the fraction done. Raises InputError for photos and masks that cannot be read."""
+    each = max(200, count // max(len(capture.photos), 1))
+    found = []
+    for place in range(len(capture.photos)):
+        yield place / len(capture.photos)
+        found.append(_of_photo(capture, scan, rays, photos, lights, place, each))
+    return Pixels.join(found)
+
+
+def _of_photo(
+    capture: Capture,
+    scan: Scan,
+    rays: RayScene,
+    photos: LitPhotos,
+    lights: Lights,
+    place: int,
+    count: int,
+) -> Pixels:
+    camera = inputs.camera_of(capture, scan, place)
+    masks = inputs.photo_masks(capture, place)
+    photo = photos.read_with_noise(place)
+    light = lights.of(capture, place)
+    lines = PixelRays.of(camera)
+    parts = []
+    for window in bands(camera, REACH + OUTLINE, rays.cover.columns(camera)):
+        part = _of_band(capture, scan, rays, light, place, lines, photo, masks, window)
+        parts.append(_thinned(part, count))
+    pixels = _thinned(Pixels.join(parts), count) if parts else Pixels.none()
+    return _with_photo(pixels, photo)
+
+
+def _of_band(
+    capture: Capture,
+    scan: Scan,
+    rays: RayScene,
+    light: Light,
+    place: int,
+    lines: PixelRays,
+    photo: LitPhoto,
+    masks: Mapping[str, NDArray[np.bool_]],
+    window: Window,
+) -> Pixels:
+    """All of a band that shows a material and no outline; what the photo says comes later."""
+    view = view_window(rays, lines, window)
+    lighting = light_surface(rays, view, light, lines.camera)
+    facing = lighting.cos_i > 0
+    cast = facing & lighting.shadowed
+    lit = view.image(~lighting.shadowed, fill=0)
+    edge = edges.shadow_edge(lit, view.seen)
+    far = np.minimum(distance_transform_edt(~edge), REACH) if edge.any() else np.full(
+        view.shape, REACH
+    )  # fmt: skip
+    where, painted = inputs.material_pixels(capture, scan, view, place, masks)
+    material = np.full(len(view.pixel), -1, np.int16)
+    for index, entry in enumerate(capture.materials):
+        material[where[entry.name]] = index
+    cos_o = dot(view.normal, view.view)
+    wanted = np.zeros(len(view.pixel), bool)
+    wanted[view.wanted] = True
+    outline = view.at(edges.widen(view.silhouette, OUTLINE - 1))
+    rows = np.flatnonzero(wanted & (material >= 0) & ~outline & (cos_o > LEAST_COS_O) & ~painted)
+    incidence = lighting.incidence.select(rows)
+    n, camera = len(rows), lines.camera
+    pixel = view.pixel.take(rows)
+    row, column = np.divmod(pixel, camera.width)
+    half = 0.5 * np.hypot(camera.width, camera.height)
+    none = np.zeros((n, 3), np.float32)
+    return Pixels(
+        photo=np.full(n, place, np.int16),
+        material=material[rows],
+        pixel=pixel,
+        x=((column + 0.5 - camera.width / 2) / half).astype(np.float32),
+        y=((row + 0.5 - camera.height / 2) / half).astype(np.float32),
+        point=view.point[rows],
+        normal=np.asarray(view.normal[rows], np.float32),
+        view=np.asarray(view.view[rows], np.float32),
+        light=np.array(incidence.towards, np.float32),
+        irradiance=np.array(incidence.irradiance, np.float32),
+        distance=np.full(n, np.inf, np.float32)
+        if incidence.distance is None
+        else np.asarray(incidence.distance, np.float32),
+        visible=(~cast[rows]).astype(np.float32),
+        edge=view.at(far.astype(np.float32))[rows],
+        curvature=view.curvature[rows],
+        observed=none,
+        noise=none,
+        slope=np.zeros((n, 2, 3), np.float32),
+        veil=none,
+        usable=photo.usable.ravel().take(pixel),
+        block=np.zeros(n, np.int32),
+    )
+
+
+def _thinned(pixels: Pixels, count: int) -> Pixels:
+    """At most ``count``: half drawn from all, half from those beside shadows and in the highlight.
+    What is drawn of a whole photo does not depend on its bands."""
+    if len(pixels) <= count:
+        return pixels
+    number = sample_hash(pixels.photo, pixels.pixel)
+    theta_h = half_difference(pixels.normal, pixels.light, pixels.view).theta_h
+    telling = (pixels.edge < REACH) | ((theta_h < HIGHLIGHT) & (pixels.visible > 0))
+    chosen = np.zeros(len(pixels), bool)
+    rows = np.flatnonzero(telling)
+    chosen[rows[np.argsort(number[rows])[: count // 2]]] = True
+    chosen[np.argsort(number)[: count - int(chosen.sum())]] = True
+    return pixels.select(chosen)
+
+
+def _with_photo(pixels: Pixels, photo: LitPhoto) -> Pixels:
+    """What the photo shows at the pixels, and which part of it they are in."""
+    height, width = photo.usable.shape
+    flat = photo.radiance.reshape(-1, 3)
+    seen = flat.take(pixels.pixel, axis=0)
+    assert photo.variance is not None
+    variance = photo.variance.reshape(-1, 3).take(pixels.pixel, axis=0)
+    return Pixels(
+        **{
+            **pixels.__dict__,
+            "observed": seen,
+            "noise": np.maximum(variance, np.float32(1e-20)),
+            "slope": _slopes(flat, pixels.pixel, height, width),
+            "veil": _veil(photo.radiance, pixels),
+            "block": _blocks(pixels),
+        }
+    )
+
+
+def _slopes(flat: Array, pixel: NDArray[np.int32], height: int, width: int) -> Array:
+    """(n, 2, 3) derivatives to the right and down, of the photo under a narrow Gaussian."""
+    row, column = np.divmod(pixel, width)
+    bell = np.exp(-0.5 * (STENCIL / WIDTH) ** 2)
+    bell /= bell.sum()
+    rise = STENCIL * bell
+    rise /= np.sum(rise * STENCIL)
+    out = np.zeros((len(pixel), 2, 3), np.float32)
+    for i, down in enumerate(STENCIL):
+        for j, right in enumerate(STENCIL):
+            at = np.clip(row + down, 0, height - 1) * width + np.clip(column + right, 0, width - 1)
+            value = flat.take(at, axis=0)
+            out[:, 0] += np.float32(bell[i] * rise[j]) * value
+            out[:, 1] += np.float32(rise[i] * bell[j]) * value
+    return out
+
+
+def _veil(radiance: Array, pixels: Pixels) -> Array:
+    """(n, 3) the photo blurred widely, at the pixels."""
+    height, width = radiance.shape[:2]
+    step = max(1, max(height, width) // 128)
+    small = np.stack([_shrunk(radiance[..., c], step) for c in range(3)], axis=-1)
+    blur = VEIL * float(np.hypot(small.shape[0], small.shape[1]))
+    small = np.stack(
+        [gaussian_filter(small[..., c], blur, mode="constant") for c in range(3)], axis=-1
+    )
+    row, column = np.divmod(pixels.pixel, width)
+    at = np.minimum(row // step, len(small) - 1), np.minimum(column // step, small.shape[1] - 1)
+    return np.asarray(small[at], np.float32)
+
+
+def _shrunk(channel: Array, step: int) -> Array:
+    """Means over squares of ``step`` pixels."""
+    height, width = (side // step * step for side in channel.shape)
+    if step == 1:
+        return channel
+    cut = channel[:height, :width]
+    return np.asarray(cut.reshape(height // step, step, width // step, step).mean(axis=(1, 3)))
+
+
+def _blocks(pixels: Pixels) -> NDArray[np.int32]:
+    """(n,) numbers: photo, then the square of it that a pixel is in."""
+    if not len(pixels):
+        return pixels.block
+    low_x, low_y = float(pixels.x.min()), float(pixels.y.min())
+    size = max(float(np.ptp(pixels.x)), float(np.ptp(pixels.y)), 1e-6) / BLOCKS
+    column = np.minimum(((pixels.x - low_x) / size).astype(np.int32), BLOCKS - 1)
+    row = np.minimum(((pixels.y - low_y) / size).astype(np.int32), BLOCKS - 1)
+    return np.asarray((pixels.photo.astype(np.int32) * BLOCKS + row) * BLOCKS + column, np.int32)

@@ -1,0 +1,75 @@
+"""How far a pixel may be from a perfect prediction for reasons that need no cause.
+
+Photo noise; the scan's normals, as far as the fit found them to be off; half a pixel at edges of
+shadows and of what the photo shows; and a part of the prediction that no model gets better. Fixed
+before any cause is tried, so that the costs of different causes compare.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .brdfs import BRDFs
+from .model import Model
+from .pixels import Pixels
+
+Array = NDArray[np.floating]
+
+FLOOR = 0.015  # of the prediction
+DARK = 0.004  # of a photo's bright pixels
+NUDGE = 2e-3  # radians
+MISPLACED = 0.15  # pixels, what a good scan's poses are off by
+LEVELS, FEW = 8, 50  # of brightness; pixels that tell
+NORMAL = 0.6745  # median of a normal distribution's magnitude
+BESIDE = 2.0  # pixels from a shadow's edge where the mesh does not know on which side they are
+
+
+def pixel_deviation(pixels: Pixels, brdfs: BRDFs, normal_deviation: float) -> Array:
+    """(n, 3) radiance, inf for clipped pixels; normal_deviation: radians along each tangent."""
+    model = Model(pixels, brdfs)
+    now = model.situation()
+    shown = model.reflected(now)
+    bright = np.zeros(int(pixels.photo.max()) + 1)
+    for photo in np.unique(pixels.photo):
+        bright[photo] = np.percentile(shown[pixels.photo == photo].mean(axis=1), 90)
+    variance = pixels.noise.astype(np.float64)
+    variance += (FLOOR * shown) ** 2 + (DARK * bright[pixels.photo, None]) ** 2
+    variance += np.square(normal_deviation) * _by_normals(model, shown)
+    variance += MISPLACED**2 * np.sum(pixels.slope.astype(np.float64) ** 2, axis=1)
+    beside = np.clip(1 - pixels.edge / BESIDE, 0, 1)[:, None]
+    full = brdfs.evaluate(now.angles, pixels.material) * now.irradiance * now.cos_i[:, None]
+    variance += (0.5 * beside * full) ** 2
+    out = np.sqrt(variance)
+    out[~pixels.usable] = np.inf
+    return np.asarray(out)
+
+
+def as_found(deviation: Array, residual: Array, shown: Array, pixels: Pixels) -> Array:
+    """The deviation where residuals of the model without effects say that it is larger: by
+    brightness, for each material. residual: (n, 3) in units of the deviation; shown: (n, 3) the
+    prediction. Otherwise what is merely not understood would look like proof of anything."""
+    out = deviation.copy()
+    level = shown.mean(axis=1)
+    for material in np.unique(pixels.material):
+        rows = np.flatnonzero((pixels.material == material) & np.isfinite(deviation).all(axis=1))
+        for part in np.array_split(rows[np.argsort(level[rows], kind="stable")], LEVELS):
+            if len(part) >= FEW:
+                scale = np.median(np.abs(residual[part]), axis=0) / NORMAL
+                out[part] *= np.maximum(scale, 1.0)
+    return out
+
+
+def _by_normals(model: Model, shown: Array) -> Array:
+    """(n, 3) sum over two tangents of the squared slope of radiance."""
+    normal = model.pixels.normal.astype(np.float64)
+    helper = np.where(np.abs(normal[:, :1]) < 0.7, [[1.0, 0, 0]], [[0, 1.0, 0]])
+    first = np.cross(normal, helper)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    out = np.zeros_like(shown, dtype=np.float64)
+    now = model.situation()
+    for tangent in (first, np.cross(normal, first)):
+        tilted = (normal + NUDGE * tangent).astype(np.float32)
+        moved = type(now)(now.pixels, tilted, now.light, now.irradiance, now.visible)
+        out += ((model.reflected(moved) - shown) / NUDGE) ** 2
+    return out

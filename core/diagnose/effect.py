@@ -1,0 +1,135 @@
+"""One way in which the forward model may be wrong: what it adds, with which numbers.
+
+A photo comes about in three steps, and an effect may have a part in each: surface and light as they
+really are (``before``), light that reaches the pixel beside that of the lamp (``added``), and what
+the camera makes of it (``after``).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry import RayScene
+from .brdfs import BRDFs
+from .pixels import Pixels
+from .situation import Situation
+
+if TYPE_CHECKING:
+    from .surroundings import Surroundings
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """The unknowns of an effect; all are 0 where there is no effect. names, units: (p,).
+    deviation: (p,) what is usual, of a Gaussian prior. low, high: (p,). step: (p,) for
+    derivatives. start: (p,) where the search begins, None: at 0."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    deviation: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    step: NDArray[np.float64]
+    start: NDArray[np.float64] | None = None
+
+    @classmethod
+    def alike(
+        cls,
+        names: Sequence[str],
+        unit: str,
+        deviation: float,
+        low: float = -np.inf,
+        high: float = np.inf,
+        step: float = 1e-3,
+        start: float = 0.0,
+    ) -> Numbers:
+        """Unknowns of one kind."""
+        p = len(names)
+        return cls(
+            tuple(names), (unit,) * p, np.full(p, deviation), np.full(p, low), np.full(p, high),
+            np.full(p, step), np.full(p, start),
+        )  # fmt: skip
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def begin(self) -> NDArray[np.float64]:
+        """(p,) where the search begins."""
+        return np.zeros(len(self)) if self.start is None else self.start.copy()
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What effects are made for. light: (photos,) which of the lights lit each. lights: their
+    names; distant: which of them are. centre: (3,) of what the photos show; size: its extent, scan
+    units. brdfs: before any effect. rays: the scan's mesh."""
+
+    pixels: Pixels
+    brdfs: BRDFs
+    rays: RayScene
+    light: NDArray[np.intp]
+    lights: tuple[str, ...]
+    distant: NDArray[np.bool_]
+    centre: NDArray[np.float64]
+    size: float
+
+    @cached_property
+    def surroundings(self) -> Surroundings:
+        """What every pixel's point sees around itself."""
+        from .surroundings import Surroundings
+
+        return Surroundings.of(self)
+
+    def glow(self, photo: int) -> Array:
+        """(f, 3) radiance that every face of the mesh sends off in a photo, as a matte surface of
+        the same albedo would; 0 where the lamp does not reach it."""
+        from .glow import face_glow
+
+        return face_glow(self, photo)
+
+
+class Effect(ABC):
+    """One cause of the vocabulary, made for the pixels that it is to explain."""
+
+    cause: str
+
+    @classmethod
+    @abstractmethod
+    def of(cls, setting: Setting) -> Effect | None:
+        """For a capture; None where it cannot be there."""
+
+    @property
+    @abstractmethod
+    def numbers(self) -> Numbers:
+        """The unknowns."""
+
+    def before(self, now: Situation, x: NDArray[np.float64]) -> Situation:
+        """Surface and light with the effect."""
+        return now
+
+    def added(self, now: Situation, brdfs: BRDFs, x: NDArray[np.float64]) -> Array | None:
+        """(n, 3) radiance beside the lamp's."""
+        return None
+
+    def after(self, radiance: Array, now: Situation, x: NDArray[np.float64]) -> Array:
+        """(n, 3) what the camera says of this radiance."""
+        return radiance
+
+    @abstractmethod
+    def sentence(self, x: NDArray[np.float64], deviation: NDArray[np.float64]) -> str:
+        """For an artist."""
+
+
+def of_photo(pixels: Pixels, values: NDArray[np.floating]) -> Array:
+    """(n, …) a photo's value for each of its pixels; values: (photos, …)."""
+    return np.asarray(values)[pixels.photo]

@@ -1,0 +1,38 @@
+"""All effects, one a file, by the words of the vocabulary."""
+
+from __future__ import annotations
+
+from ..effect import Effect, Setting
+from .ambient_light import AmbientLight
+from .anisotropy import Anisotropy
+from .camera_pose import CameraPose
+from .camera_response import CameraResponse
+from .clipping import Clipping
+from .environment_reflection import EnvironmentReflection
+from .interreflection import Interreflection
+from .light_direction import LightDirection
+from .light_intensity import LightIntensity
+from .near_light import NearLight
+from .veiling_glare import VeilingGlare
+from .vignetting import Vignetting
+
+EFFECTS: tuple[type[Effect], ...] = (
+    LightDirection,
+    LightIntensity,
+    NearLight,
+    AmbientLight,
+    CameraResponse,
+    Clipping,
+    Vignetting,
+    VeilingGlare,
+    CameraPose,
+    Interreflection,
+    EnvironmentReflection,
+    Anisotropy,
+)
+
+
+def made_for(setting: Setting) -> list[Effect]:
+    """All effects that may be there."""
+    made = [kind.of(setting) for kind in EFFECTS]
+    return [effect for effect in made if effect is not None]

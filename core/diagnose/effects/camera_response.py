@@ -1,0 +1,44 @@
+"""The photos are not linear: numbers do not grow with light."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effect import Array, Effect, Numbers, Setting
+from ..situation import Situation
+
+USUAL = 0.15
+DARKEST = 1e-4  # of white, where the curve's logarithm is cut off
+
+
+@dataclass(frozen=True)
+class CameraResponse(Effect):
+    """numbers: what the exponent is off by, and how it changes over a factor e of brightness; both
+    about ``grey``, the photos' typical radiance, which stays as it is."""
+
+    grey: float
+    cause = "camera_response"
+
+    @classmethod
+    def of(cls, setting: Setting) -> CameraResponse:
+        return cls(max(float(np.median(setting.pixels.observed)), 1e-9))
+
+    @property
+    def numbers(self) -> Numbers:
+        return Numbers(
+            ("gamma − 1", "its change"), ("", "1/ln"), np.array([USUAL, 0.03]),
+            np.array([-0.7, -0.15]), np.array([1.5, 0.15]), np.array([1e-3, 1e-3]),
+        )  # fmt: skip
+
+    def after(self, radiance: Array, now: Situation, x: np.ndarray) -> Array:
+        level = np.log(np.maximum(radiance / self.grey, DARKEST))
+        return radiance * np.exp(x[0] * level + x[1] * level * np.abs(level))
+
+    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+        way = "flatter" if x[0] < 0 else "steeper"
+        return (
+            f"the photos are not linear: they follow light to the power {1 + x[0]:.2f}, {way} than "
+            "what a linear photo does (a tone curve was applied, or the wrong one was undone)"
+        )

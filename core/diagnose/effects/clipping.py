@@ -1,0 +1,49 @@
+"""Photos are clipped where nobody said so: highlights end at a plateau."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effect import Array, Effect, Numbers, Setting
+from ..situation import Situation
+
+SOFT = 0.01  # of the plateau, over which the end is rounded
+
+
+@dataclass(frozen=True)
+class Clipping(Effect):
+    """numbers: how far the plateau lies below ``top``, the brightest that a channel shows, as a
+    logarithm, for each channel."""
+
+    top: Array
+    cause = "clipping"
+
+    @classmethod
+    def of(cls, setting: Setting) -> Clipping:
+        seen = setting.pixels.observed
+        return cls(np.maximum(np.percentile(seen, 99.95, axis=0), 1e-9).astype(np.float64))
+
+    @property
+    def numbers(self) -> Numbers:
+        # far above the brightest there is no effect: so 0 is a plateau at 8 times the brightest
+        return Numbers.alike(
+            ["red", "green", "blue"], "ln", 2.0, 0.0, 4.0, step=5e-3, start=np.log(8.0)
+        )
+
+    def plateau(self, x: np.ndarray) -> Array:
+        """(3,) radiance that no photo exceeds."""
+        return self.top * 8.0 * np.exp(-x)
+
+    def after(self, radiance: Array, now: Situation, x: np.ndarray) -> Array:
+        plateau = self.plateau(x)
+        over = (radiance - plateau) / (SOFT * plateau)
+        return radiance - SOFT * plateau * np.logaddexp(0.0, over)
+
+    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+        return (
+            "highlights are clipped: no photo exceeds "
+            f"{', '.join(f'{v:.3g}' for v in self.plateau(x))} (red, green, blue), though the "
+            "surface would"
+        )

@@ -1,0 +1,60 @@
+"""The lamps stood elsewhere than the capture says: each direction is off by two angles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..effect import Array, Effect, Numbers, Setting
+from ..situation import Situation
+
+USUAL = np.radians(3.0)
+FARTHEST = np.radians(25.0)
+
+
+@dataclass(frozen=True)
+class LightDirection(Effect):
+    """numbers: for each distant light the tangents of two angles, radians, about ``aside`` and
+    ``other``, (lights, 3) unit vectors across its direction. light: (n,) of each pixel, −1 for
+    one that is not distant."""
+
+    names: tuple[str, ...]
+    aside: Array
+    other: Array
+    light: Array
+    cause = "light_direction"
+
+    @classmethod
+    def of(cls, setting: Setting) -> LightDirection | None:
+        pixels = setting.pixels
+        wanted = [k for k in range(len(setting.lights)) if setting.distant[k]]
+        number = setting.light[pixels.photo]
+        wanted = [k for k in wanted if (number == k).any()]
+        if not wanted:
+            return None
+        aside, other, place = [], [], np.full(len(pixels), -1)
+        for i, k in enumerate(wanted):
+            place[number == k] = i
+            direction = pixels.light[np.flatnonzero(number == k)[0]].astype(np.float64)
+            across = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
+            aside.append(across / np.linalg.norm(across))
+            other.append(np.cross(direction, aside[-1]))
+        names = tuple(setting.lights[k] for k in wanted)
+        return cls(names, np.array(aside), np.array(other), place)
+
+    @property
+    def numbers(self) -> Numbers:
+        names = [f"{name}, {way}" for name in self.names for way in ("first", "second")]
+        return Numbers.alike(names, "rad", USUAL, -FARTHEST, FARTHEST)
+
+    def before(self, now: Situation, x: np.ndarray) -> Situation:
+        moved = x[0::2, None] * self.aside + x[1::2, None] * self.other
+        light = now.light + np.where(self.light[:, None] >= 0, moved[self.light], 0.0)
+        light /= np.linalg.norm(light, axis=1, keepdims=True)
+        return replace(now, light=light.astype(np.float32))
+
+    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+        angle = np.degrees(np.hypot(x[0::2], x[1::2]))
+        said = ", ".join(f"{n} by {a:.1f}°" for n, a in zip(self.names, angle, strict=True))
+        return f"the light came from elsewhere than the capture says: {said}"

@@ -1,0 +1,44 @@
+"""The lens darkens the corners."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effect import Array, Effect, Numbers, Setting
+from ..situation import Situation
+
+
+@dataclass(frozen=True)
+class Vignetting(Effect):
+    """numbers: a, b of the gain 1 + a r² + b r⁴, r (n,) from the photo's centre, 1 in a corner."""
+
+    r2: Array
+    cause = "vignetting"
+
+    @classmethod
+    def of(cls, setting: Setting) -> Vignetting:
+        return cls(np.square(setting.pixels.x) + np.square(setting.pixels.y))
+
+    @property
+    def numbers(self) -> Numbers:
+        return Numbers(
+            ("r²", "r⁴"), ("", ""), np.array([0.4, 0.4]), np.array([-2.0, -2.0]),
+            np.array([1.0, 2.0]), np.array([1e-3, 1e-3]),
+        )  # fmt: skip
+
+    def gain(self, x: np.ndarray) -> Array:
+        """(n,) what the lens lets through."""
+        return np.maximum(1 + x[0] * self.r2 + x[1] * self.r2**2, 0.05)
+
+    def after(self, radiance: Array, now: Situation, x: np.ndarray) -> Array:
+        return radiance * self.gain(x)[:, None]
+
+    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+        gain = self.gain(x)
+        return (
+            "the lens is not equally bright everywhere (vignetting): where the object reaches "
+            f"farthest out, photos are {100 * (gain[np.argmax(self.r2)] - 1):+.0f} % against their "
+            "centre"
+        )

@@ -1,0 +1,47 @@
+"""What every face of the mesh sends off under the lamp: the light of a first bounce."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ..appearance.energy import directional_albedo
+from ..geometry.view import cast_shadow
+from .effect import Setting
+
+Array = NDArray[np.floating]
+
+OBLIQUE = np.radians(45.0)  # the angle whose albedo stands for all
+NEAREST = 8  # pixels that say what a face is made of
+
+
+def face_glow(setting: Setting, photo: int) -> Array:
+    """(f, 3) radiance; a face's material is that of the nearest pixels, its light that of the
+    photo's pixels (a distant lamp's is the same everywhere)."""
+    pixels, mesh = setting.pixels, setting.rays.mesh
+    corners = mesh.vertices[mesh.faces]
+    centre = corners.mean(axis=1)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    one = np.flatnonzero(pixels.photo == photo)[0]
+    towards = np.broadcast_to(pixels.light[one], centre.shape)
+    cosine = np.maximum(normal @ pixels.light[one], 0)
+    facing = np.flatnonzero(cosine > 0)
+    dark = cosine <= 0
+    dark[facing] = cast_shadow(
+        setting.rays, centre[facing], normal[facing].astype(np.float32), towards[facing], None
+    )
+    albedo = np.stack(
+        [
+            np.clip(directional_albedo(table.evaluate, np.array([OBLIQUE]))[0], 0, 1)
+            for table in setting.brdfs.tables
+        ]
+    )
+    if len(albedo) == 1:
+        material = np.zeros(len(centre), np.int64)
+    else:
+        near = cKDTree(pixels.point).query(centre, NEAREST)[1]
+        material = np.round(np.median(pixels.material[near], axis=1)).astype(np.int64)
+    light = pixels.irradiance[one] * np.where(dark, 0, cosine)[:, None]
+    return np.asarray(albedo[material] / np.pi * light, np.float32)

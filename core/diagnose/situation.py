@@ -1,0 +1,65 @@
+"""What surface and light do at every pixel of a diagnosis, as effects change it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import Angles, half_difference
+from ..angles.vectors import dot
+from .pixels import Pixels
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Situation:
+    """At n pixels. normal, light: (n, 3) unit. irradiance: (n, 3) at normal incidence. visible:
+    (n,) part of the light that arrives. stretch: (n,) what ln tan θh grows by where the surface
+    reflects along one direction more widely than across it. boost: (n,) or (n, 3), ln of what the
+    BRDF is larger by than its components say. None: nowhere."""
+
+    pixels: Pixels
+    normal: Array
+    light: Array
+    irradiance: Array
+    visible: Array
+    stretch: Array | None = None
+    boost: Array | None = None
+
+    @classmethod
+    def of(cls, pixels: Pixels) -> Situation:
+        """As the capture says."""
+        return cls(pixels, pixels.normal, pixels.light, pixels.irradiance, pixels.visible)
+
+    @property
+    def cos_i(self) -> Array:
+        """(n,) never below 0."""
+        return np.maximum(dot(self.normal, self.light), 0)
+
+    @property
+    def angles(self) -> Angles:
+        """Of every pixel, radians; below the horizon they mean nothing."""
+        found = half_difference(self.normal, self.light, self.pixels.view)
+        if self.stretch is None:
+            return found
+        theta_h = np.arctan(np.tan(np.minimum(found.theta_h, 1.57)) * np.exp(self.stretch))
+        return Angles(theta_h.astype(np.float32), found.theta_d, found.phi_d)
+
+    @property
+    def received(self) -> Array:
+        """(n, 3) irradiance on the surface, times the boost."""
+        light = self.irradiance * (self.cos_i * self.visible)[:, None]
+        if self.boost is None:
+            return light
+        grown = np.exp(self.boost)
+        return light * (grown if grown.ndim == 2 else grown[:, None])
+
+    def boosted(self, boost: Array) -> Situation:
+        """With more of it."""
+        if self.boost is None:
+            return replace(self, boost=boost)
+        both = [b if b.ndim == 2 else b[:, None] for b in (self.boost, boost)]
+        return replace(self, boost=both[0] + both[1])

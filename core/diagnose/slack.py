@@ -1,0 +1,40 @@
+"""Room for what no mixture of measured materials makes: hats over θh and θd beside the components.
+
+Every material is a little outside the basis. Without some slack whatever bends a BRDF's shape (a
+tone curve, a narrow lamp) would be taken up for the material's sake, and named as a cause. A little
+is always there; ``outside_basis`` is named where much more is asked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..basis import Basis
+
+THETA_H = np.radians([0.0, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 50.0, 90.0])
+THETA_D = np.radians([0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0])
+COUNT = len(THETA_H) * len(THETA_D)
+LITTLE, MUCH = 0.05, 0.5  # of ln(ρ·cosMap + ε), at each node
+
+
+def with_slack(basis: Basis) -> Basis:
+    """The basis with COUNT components more: hats, 1 at a node and linear to the next ones."""
+    nodes = basis.grid.nodes()
+    h, d = _hats(THETA_H, nodes.theta_h), _hats(THETA_D, nodes.theta_d)
+    hats = np.einsum("ihdp,jhdp->ijhdp", h, d).reshape(COUNT, *basis.grid.shape)
+    components = np.concatenate([basis.components, hats.astype(np.float32)])
+    return replace(basis, components=components, training=None)
+
+
+def variances(basis: Basis, slack: float) -> NDArray[np.float64]:
+    """(k + COUNT,) of the coefficients of with_slack(basis) before a photo is seen."""
+    own = np.full(basis.count, basis.coefficient_variance)
+    return np.concatenate([own, np.full(COUNT, slack**2)])
+
+
+def _hats(nodes: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(nodes, …) weights of each at every angle."""
+    return np.stack([np.interp(at, nodes, row) for row in np.eye(len(nodes))])

@@ -1,0 +1,98 @@
+"""Fit a capture, then say what its photos show that the model does not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+
+import numpy as np
+
+from ..basis import Basis
+from ..capture import Capture
+from ..diagnose.brdfs import BRDFs
+from ..diagnose.choose import choose_pixels
+from ..diagnose.deviation import pixel_deviation
+from ..diagnose.effect import Setting
+from ..diagnose.effects import made_for
+from ..diagnose.model import Model
+from ..diagnose.search import Found, search
+from ..fit.measured_result import MeasuredResult
+from ..scan import Scan
+from .fit_job import CaptureResult, FitJob
+from .job import Job, Step, finished
+
+UNSAID = 1.0  # degrees: what a scan's normals are off by where the fit does not say it
+SHARE = 0.5  # of the job, the fit
+
+
+class DiagnoseJob(Job):
+    """``result`` is the fit, ``setting`` what was looked at, ``found`` what is wrong with it; they
+    are there when the job is done. prepare, threads: as FitJob has them."""
+
+    def __init__(
+        self,
+        capture: Capture,
+        basis: Basis | None = None,
+        prepare: Callable[[Scan], Scan] | None = None,
+        threads: int | None = None,
+    ) -> None:
+        super().__init__()
+        self.fit = FitJob(capture, basis, prepare, threads)
+        self.setting: Setting | None = None
+        self.found: Found | None = None
+
+    @property
+    def result(self) -> CaptureResult | None:
+        """The fit without any effect."""
+        return self.fit.result
+
+    def run(self) -> Iterator[Step]:
+        """The fit's steps, then those of the diagnosis."""
+        for step in self.fit.run():
+            yield Step(step.stage, SHARE * step.fraction)
+        result = finished(self.fit.result)
+        self.setting = yield from _stepped(setting_of(result), "looking at the photos", 0.0, 0.1)
+        yield Step("looking at the photos", SHARE + 0.1 * (1 - SHARE))
+        deviation = pixel_deviation(
+            self.setting.pixels, self.setting.brdfs, np.radians(normal_deviation(result))
+        )
+        model = Model(self.setting.pixels, self.setting.brdfs)
+        effects = made_for(self.setting)
+        self.found = yield from _stepped(
+            search(model, deviation, effects), "trying what may be wrong", 0.1, 1.0
+        )
+
+
+def setting_of(result: CaptureResult) -> Generator[float, None, Setting]:
+    """What a diagnosis looks at; yields the fraction done."""
+    capture = result.capture
+    pixels = yield from choose_pixels(
+        capture, result.scan, result.rays, result.photos, result.lights
+    )
+    names = [light.name for light in capture.lights]
+    middle = pixels.point.mean(axis=0)
+    return Setting(
+        pixels=pixels,
+        brdfs=BRDFs.of([m.fit.brdf for m in result.materials]),
+        rays=result.rays,
+        light=np.array([names.index(photo.light) for photo in capture.photos]),
+        lights=tuple(names),
+        distant=np.array([light.distant for light in capture.lights]),
+        centre=middle,
+        size=2 * float(np.percentile(np.linalg.norm(pixels.point - middle, axis=1), 99)),
+    )
+
+
+def normal_deviation(result: CaptureResult) -> float:
+    """Degrees along each tangent that the scan's normals are off by, of the worst material."""
+    said = [m.fit.normal_deviation for m in result.materials if isinstance(m.fit, MeasuredResult)]
+    return max(said, default=UNSAID)
+
+
+def _stepped(steps, stage: str, begin: float, end: float):  # type: ignore[no-untyped-def]
+    """Steps of a part of the diagnosis."""
+    while True:
+        try:
+            done = next(steps)
+        except StopIteration as last:
+            return last.value
+        yield Step(stage, SHARE + (1 - SHARE) * (begin + (end - begin) * done))

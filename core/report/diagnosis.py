@@ -1,0 +1,121 @@
+"""diagnosis.json and the report's section: what the model gets wrong, and what helps."""
+
+from __future__ import annotations
+
+import json
+import os
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..diagnose.coordinates import coordinates, trend
+from ..diagnose.effect import Setting
+from ..diagnose.search import Found, Trial
+from .result_json import program_version
+from .trend_chart import trend_chart
+
+FORMAT = 1
+MOST_SHOWN = 6  # charts: those along which the residual changes most
+STEPS = (0.05, 0.1, 0.2, 0.5, 1.0)  # of a chart's vertical axis
+
+
+def describe(found: Found) -> dict[str, Any]:
+    """The content of diagnosis.json. Costs are nats a pixel and channel; angles are radians."""
+    tried = {t.effect.cause: t for trials in found.rounds for t in trials}
+    first = found.rounds[0] if found.rounds else ()
+    best = [*found.accepted, *(t for t in first if t.effect.cause not in found.causes)]
+    return {
+        "format": FORMAT,
+        "program": {"name": "patina", "version": program_version()},
+        "named": list(found.causes) or ["none"],
+        "baseline": {"held_out": found.unseen_before.mean, "not_noise": found.not_noise_before},
+        "extended": {"held_out": found.unseen_after.mean, "not_noise": found.not_noise_after},
+        "causes": [_cause(t, t in found.accepted) for t in best],
+        "tried": sorted(tried),
+    }
+
+
+def write(path: Path, found: Found) -> None:
+    """Write the file; it appears whole or not at all."""
+    partial = path.with_name(path.name + ".part")
+    partial.write_text(json.dumps(describe(found), indent=1, allow_nan=False) + "\n", "utf-8")
+    os.replace(partial, path)
+
+
+def _cause(trial: Trial, accepted: bool) -> dict[str, Any]:
+    numbers = trial.effect.numbers
+    return {
+        "cause": trial.effect.cause,
+        "accepted": accepted,
+        "sentence": trial.effect.sentence(trial.x, trial.deviation),
+        "held_out_gain": trial.gain,
+        "standard_error": trial.error,
+        "p_value": trial.chance,
+        "rms_change": trial.change,
+        "parameters": {
+            name: {"value": float(v), "standard_error": float(d), "unit": unit}
+            for name, unit, v, d in zip(
+                numbers.names, numbers.units, trial.x, trial.deviation, strict=True
+            )
+        },
+    }
+
+
+def section(found: Found, setting: Setting) -> str:
+    """HTML: the ranking, then the residual along what betrays causes."""
+    rows = "".join(_row(t, t in found.accepted, found) for t in _ranked(found))
+    named = ", ".join(found.causes) or "nothing that can be named"
+    return (
+        f"<h2>What is wrong</h2><p><b>{escape(named)}</b></p>"
+        f"<p class='sub'>{100 * found.not_noise_before:.0f} % of what the prediction misses is "
+        f"neither noise nor the scan's known errors; with what is named in the model "
+        f"{100 * found.not_noise_after:.0f} %. A gain is what the model with a cause predicts "
+        "better of parts of the photos that it was not fitted to, in standard errors.</p>"
+        f"<table><tr><th>cause</th><th>gain</th><th></th><th>what it would mean</th></tr>{rows}"
+        f"</table><div class='charts'>{_charts(found, setting)}</div><p class='sub'>What the "
+        "photos show more than the prediction, relative; red before, blue after; bars: two "
+        "standard errors.</p>"
+    )
+
+
+def _ranked(found: Found) -> list[Trial]:
+    first = found.rounds[0] if found.rounds else ()
+    return [*found.accepted, *(t for t in first if t.effect.cause not in found.causes)]
+
+
+def _row(trial: Trial, accepted: bool, found: Found) -> str:
+    sure = trial.gain / max(trial.error, 1e-9)
+    width = int(np.clip(12 * sure, 0, 160))
+    said = trial.effect.sentence(trial.x, trial.deviation) if accepted else ""
+    style = "background:#2f6fb0" if accepted else "background:#bbb"
+    return (
+        f"<tr><th>{escape(trial.effect.cause)}</th><td>{sure:.1f}</td><td><div style='height:10px;"
+        f"width:{width}px;{style}'></div></td><td>{escape(said)}</td></tr>"
+    )
+
+
+def _charts(found: Found, setting: Setting) -> str:
+    drawn = []
+    block = setting.pixels.block
+    for coordinate in coordinates(setting):
+        trends = []
+        for fitted in (found.before, found.after):
+            shown = fitted.model.predicted()
+            missed = setting.pixels.observed - shown
+            trends.append(trend(coordinate, missed, shown, fitted.deviation, block))
+        before = trends[0]
+        if not len(before.at):
+            continue
+        size = float(np.sqrt(np.mean(before.mean**2)))
+        drawn.append((size, coordinate, trends))
+    drawn.sort(key=lambda d: -d[0])
+    chosen = drawn[:MOST_SHOWN]
+    largest = max((float(np.abs(t.mean).max()) for _, _, ts in chosen for t in ts), default=0.05)
+    most = next((s for s in STEPS if s >= largest), STEPS[-1])
+    return "".join(
+        f"<figure>{trend_chart(c.name, c.unit, ts[0], ts[1] if found.accepted else None, most)}"
+        "</figure>"
+        for _, c, ts in chosen
+    )

@@ -1,0 +1,58 @@
+"""What the photos show more than the prediction, along one coordinate, as SVG."""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+
+from ..diagnose.coordinates import Trend
+
+WIDTH, HEIGHT = 280, 150
+LEFT, RIGHT, TOP, BOTTOM = 40, 8, 20, 24
+COLOURS = ("#b4443c", "#2f6fb0")  # before, after
+
+
+def trend_chart(name: str, unit: str, before: Trend, after: Trend | None, most: float) -> str:
+    """Bars are two standard errors; most: of the vertical axis, relative."""
+    drawn = [before] if after is None else [before, after]
+    at = np.concatenate([t.at for t in drawn] or [np.zeros(1)])
+    if not len(at):
+        return ""
+    low, high = float(at.min()), float(at.max())
+    span = max(high - low, 1e-9)
+
+    def x(value: float) -> float:
+        return LEFT + (value - low) / span * (WIDTH - LEFT - RIGHT)
+
+    def y(value: float) -> float:
+        part = np.clip(value / most, -1, 1)
+        return float(TOP + (1 - part) / 2 * (HEIGHT - TOP - BOTTOM))
+
+    lines = [
+        f"<line x1='{LEFT}' x2='{WIDTH - RIGHT}' y1='{y(0):.1f}' y2='{y(0):.1f}' stroke='#999'/>"
+    ]
+    for trend, colour in zip(drawn, COLOURS, strict=False):
+        points = " ".join(
+            f"{x(a):.1f},{y(m):.1f}" for a, m in zip(trend.at, trend.mean, strict=True)
+        )
+        lines.append(
+            f"<polyline points='{points}' fill='none' stroke='{colour}' stroke-width='1.6'/>"
+        )
+        for a, m, e in zip(trend.at, trend.mean, trend.error, strict=True):
+            lines.append(
+                f"<line x1='{x(a):.1f}' x2='{x(a):.1f}' y1='{y(m - 2 * e):.1f}' "
+                f"y2='{y(m + 2 * e):.1f}' stroke='{colour}' stroke-opacity='.45'/>"
+            )
+    label = escape(name + (f" ({unit})" if unit else ""))
+    return (
+        f"<svg viewBox='0 0 {WIDTH} {HEIGHT}' width='{WIDTH}' height='{HEIGHT}' role='img' "
+        f"aria-label='{label}' font-size='10' font-family='sans-serif' fill='currentColor'>"
+        f"<text x='{LEFT}' y='12' font-weight='bold'>{label}</text>"
+        f"<text x='{LEFT - 4}' y='{y(most) + 4:.0f}' text-anchor='end'>{100 * most:+.0f} %</text>"
+        f"<text x='{LEFT - 4}' y='{y(-most) + 4:.0f}' text-anchor='end'>{-100 * most:+.0f} %</text>"
+        f"<text x='{LEFT - 4}' y='{y(0) + 4:.0f}' text-anchor='end'>0</text>"
+        f"<text x='{LEFT}' y='{HEIGHT - 6}'>{low:.3g}</text>"
+        f"<text x='{WIDTH - RIGHT}' y='{HEIGHT - 6}' text-anchor='end'>{high:.3g}</text>"
+        f"{''.join(lines)}</svg>"
+    )

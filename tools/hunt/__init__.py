@@ -1,0 +1,1 @@
+"""Captures with a hidden effect, and whether `diagnose` finds it."""

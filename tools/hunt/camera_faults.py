@@ -1,0 +1,50 @@
+"""What cameras do to light: each an operation on pictures, without a word of Patina's."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+Array = np.ndarray
+
+
+def tone(photos: list[Array], gamma: float) -> list[Array]:
+    """A power curve that leaves 18 % of the white where it is."""
+    grey = 0.18 * max(float(np.percentile(p, 99)) for p in photos)
+    return [grey * np.power(np.maximum(p, 0) / grey, gamma) for p in photos]
+
+
+def clipped(photos: list[Array], level: float) -> list[Array]:
+    """Nothing above a level; level is of the photos' brightest."""
+    top = max(float(p.max()) for p in photos)
+    return [np.minimum(p, level * top) for p in photos]
+
+
+def vignetted(photos: list[Array], corner: float) -> list[Array]:
+    """cos⁴ of a lens whose corners are darker by this part."""
+    height, width = photos[0].shape[:2]
+    y, x = np.mgrid[:height, :width] + 0.5
+    r2 = ((x - width / 2) ** 2 + (y - height / 2) ** 2) / (0.25 * (width**2 + height**2))
+    tangent2 = (1 - corner) ** -0.5 - 1
+    return [p * (1 / (1 + tangent2 * r2) ** 2)[..., None] for p in photos]
+
+
+def veiled(photos: list[Array], part: float) -> list[Array]:
+    """Part of the light lands elsewhere: half evenly, half about where it came from."""
+    out = []
+    for p in photos:
+        wide = 0.2 * np.hypot(*p.shape[:2])
+        blur = np.stack([gaussian_filter(p[..., c], wide, mode="constant") for c in range(3)], -1)
+        out.append((1 - part) * p + part * (0.5 * blur + 0.5 * p.mean(axis=(0, 1))))
+    return out
+
+
+def with_noise(photos: list[Array], rng: np.random.Generator, well: float = 20_000) -> list[Array]:
+    """Shot and read noise of a camera; the brightest percent is exposed to white."""
+    white = max(float(np.percentile(p, 99)) for p in photos)
+    out = []
+    for p in photos:
+        electrons = p / white * well
+        spread = np.sqrt(np.maximum(electrons, 0) + 4.0**2)
+        out.append((electrons + spread * rng.standard_normal(p.shape)) / well * white)
+    return out

@@ -1,0 +1,38 @@
+"""An object drawn from a seed: a lumpy solid with a waist and two horns, so that it shades and
+lights itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+
+from ..demo_shape import Surface, vertex_normals
+
+LUMPS = 7
+
+
+def lumpy(seed: int, subdivisions: int = 6) -> Surface:
+    """About 80,000 triangles around the origin, radius about 0.5, outward."""
+    rng = np.random.default_rng(seed)
+    ball = trimesh.creation.icosphere(subdivisions=subdivisions)
+    p = np.asarray(ball.vertices, np.float64)
+    radius = np.full(len(p), 0.36)
+    for _ in range(LUMPS):
+        at = _direction(rng)
+        sharp = rng.uniform(2.0, 12.0)
+        radius += rng.uniform(-0.09, 0.11) * np.exp(sharp * (p @ at - 1.0))
+    for _ in range(2):
+        at = _direction(rng)
+        radius += rng.uniform(0.15, 0.22) * np.exp(rng.uniform(35, 60) * (p @ at - 1.0))
+    waist = _direction(rng)
+    radius *= 1 - rng.uniform(0.1, 0.25) * np.exp(-(((p @ waist) / 0.22) ** 2))
+    wave = _direction(rng)
+    radius += 0.006 * np.sin(rng.uniform(14, 22) * (p @ wave) + rng.uniform(0, 6))
+    points = p * radius[:, None]
+    triangles = np.asarray(ball.faces, np.int64)
+    return Surface(points, triangles, vertex_normals(points, triangles))
+
+
+def _direction(rng: np.random.Generator) -> np.ndarray:
+    v = rng.normal(size=3)
+    return v / np.linalg.norm(v)

@@ -1,0 +1,99 @@
+"""The hunt's photographs: Cycles, path tracing the material as OSL or with closures of its own."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from patina.core.appearance.principled_fit import fit_principled
+from patina.core.basis import PrincipalBRDF
+from patina.scene import materials, osl_files
+from patina.scene.lamps import update_lamps
+
+from ..demo_render import Array, Camera, Studio
+from ..demo_shape import Surface
+
+BOUNCES = 4
+SAMPLES = 9
+
+
+class HuntStudio(Studio):
+    """One object under one sun, or under a lamp that stands somewhere."""
+
+    def __init__(self, samples: int = SAMPLES) -> None:
+        super().__init__(samples)
+        self.scene.cycles.shading_system = True
+        self.point: bpy.types.Object | None = None
+
+    def shape(self, surface: Surface) -> None:
+        """Put the object there."""
+        self.show(surface, np.zeros(len(surface.points)))
+
+    def measured(self, brdf: PrincipalBRDF) -> bpy.types.Material:
+        """The BRDF itself, as Patina's OSL material."""
+        files = osl_files.ensure_files(brdf)
+        fit = fit_principled(brdf.evaluate, coat=False, nodes=(12, 6, 4))
+        return materials.create_material("measured", brdf, fit, files)
+
+    def near(self, position: Array, irradiance: float, centre: Array) -> None:
+        """A lamp without size at a place, as bright at ``centre`` as a sun of this irradiance."""
+        if self.point is None:
+            lamp = bpy.data.lights.new("near", "POINT")
+            lamp.shadow_soft_size = 0.0
+            self.point = bpy.data.objects.new("near", lamp)
+            self.scene.collection.objects.link(self.point)
+        distance = float(np.linalg.norm(position - centre))
+        # Blender's watts of a point lamp: intensity W / (4π · π) per sr and unit of radiance
+        self.point.data.energy = 4 * np.pi**2 * irradiance / np.pi * distance**2
+        self.point.location = position
+        self.lamp.hide_render = True
+
+    def room(self, radiance: float) -> None:
+        """Even light from all around."""
+        self._world(lambda nodes: None, radiance)
+
+    def window(self, direction: Array, radiance: float, width: float) -> None:
+        """A bright spot of the room, radians wide, and nothing else."""
+
+        def spot(nodes: bpy.types.Nodes) -> bpy.types.NodeSocket:
+            tree = nodes.id_data
+            where = nodes.new("ShaderNodeTexCoord").outputs["Generated"]
+            dot = nodes.new("ShaderNodeVectorMath")
+            dot.operation = "DOT_PRODUCT"
+            dot.inputs[1].default_value = direction
+            tree.links.new(where, dot.inputs[0])
+            above = nodes.new("ShaderNodeMath")
+            above.operation = "GREATER_THAN"
+            above.inputs[1].default_value = float(np.cos(width / 2))
+            tree.links.new(dot.outputs["Value"], above.inputs[0])
+            return above.outputs[0]
+
+        self._world(spot, radiance)
+
+    def _world(self, made, radiance: float) -> None:  # type: ignore[no-untyped-def]
+        tree = self.scene.world.node_tree
+        tree.nodes.clear()
+        background = tree.nodes.new("ShaderNodeBackground")
+        background.inputs["Strength"].default_value = radiance
+        output = tree.nodes.new("ShaderNodeOutputWorld")
+        tree.links.new(background.outputs[0], output.inputs["Surface"])
+        color = made(tree.nodes)
+        if color is not None:
+            tree.links.new(color, background.inputs["Color"])
+        else:
+            background.inputs["Color"].default_value = (1, 1, 1, 1)
+
+    def bounce(self, count: int) -> None:
+        """How often light may bounce."""
+        cycles = self.scene.cycles
+        cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = count
+        cycles.transparent_max_bounces = 16
+
+    def noise_free(self, samples: int) -> None:
+        """More samples, for light that Cycles draws at random."""
+        self.scene.cycles.samples = samples
+
+    def photo(self, camera: Camera) -> Array:
+        """(h, w, 3) linear radiance, 0 beside the object."""
+        update_lamps(self.scene)
+        return self.photograph(camera)[..., :3]
