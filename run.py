@@ -19,6 +19,7 @@ COMMANDS = {
     "build": ("tools.build:main", "the extension's zips, one per platform, into dist/"),
     "pictures": ("tools.make_pictures", "the pictures of docs/images, made anew"),
     "experiments": ("tools.experiments", "the paper's experiment, docs/experiments.md anew"),
+    "hunt": ("tools.hunt.table", "captures with a hidden effect, and whether it is found"),
     "bench": ("tools.bench_main", "the measurements behind the figures in docs/"),
 }
 """Command → what runs and what it does: MODULE:FUNCTION is called here with the arguments, a

@@ -46,7 +46,11 @@ def types(python: Path) -> int:
 
 def python_tests(python: Path, arguments: Sequence[str]) -> int:
     """Run pytest; without arguments of the user's on the folders named in pyproject.toml."""
-    folders = [path for path in (ROOT / "tests/core", ROOT / "tests/wheel") if path.is_dir()]
+    folders = [
+        path
+        for path in (ROOT / "tests/core", ROOT / "tests/wheel", ROOT / "tests/hunt")
+        if path.is_dir()
+    ]
     named = any(Path(word.split("::")[0]).exists() for word in arguments)
     return call(
         [

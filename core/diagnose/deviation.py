@@ -46,9 +46,10 @@ def pixel_deviation(pixels: Pixels, brdfs: BRDFs, normal_deviation: float) -> Ar
 
 
 def as_found(deviation: Array, residual: Array, shown: Array, pixels: Pixels) -> Array:
-    """The deviation where residuals of the model without effects say that it is larger: by
-    brightness, for each material. residual: (n, 3) in units of the deviation; shown: (n, 3) the
-    prediction. Otherwise what is merely not understood would look like proof of anything."""
+    """The deviation as residuals of the model without effects say it is: by brightness, for each
+    material, but never below the photos' noise. residual: (n, 3) in units of the deviation; shown:
+    (n, 3) the prediction. Taken for smaller than it is, what is merely not understood would look
+    like proof of anything; for larger, nothing small would be found."""
     out = deviation.copy()
     level = shown.mean(axis=1)
     for material in np.unique(pixels.material):
@@ -56,8 +57,8 @@ def as_found(deviation: Array, residual: Array, shown: Array, pixels: Pixels) ->
         for part in np.array_split(rows[np.argsort(level[rows], kind="stable")], LEVELS):
             if len(part) >= FEW:
                 scale = np.median(np.abs(residual[part]), axis=0) / NORMAL
-                out[part] *= np.maximum(scale, 1.0)
-    return out
+                out[part] *= np.maximum(scale, 1e-3)
+    return np.maximum(out, np.sqrt(pixels.noise))
 
 
 def _by_normals(model: Model, shown: Array) -> Array:

@@ -14,7 +14,7 @@ from ..demo_render import Array, Camera, Studio
 from ..demo_shape import Surface
 
 BOUNCES = 4
-SAMPLES = 9
+SAMPLES = 36
 
 
 class HuntStudio(Studio):
@@ -95,5 +95,6 @@ class HuntStudio(Studio):
 
     def photo(self, camera: Camera) -> Array:
         """(h, w, 3) linear radiance, 0 beside the object."""
+        bpy.context.view_layer.update()  # lamps are read from their evaluated places
         update_lamps(self.scene)
         return self.photograph(camera)[..., :3]

@@ -23,7 +23,7 @@ class Clipping(Effect):
     @classmethod
     def of(cls, setting: Setting) -> Clipping:
         seen = setting.pixels.observed
-        return cls(np.maximum(np.percentile(seen, 99.95, axis=0), 1e-9).astype(np.float64))
+        return cls(np.maximum(seen.max(axis=0), 1e-9).astype(np.float64))
 
     @property
     def numbers(self) -> Numbers:

@@ -5,57 +5,76 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..effect import Array, Effect, Numbers, Setting
 from ..situation import Situation
+from .light_direction import LightDirection
 
 USUAL = 0.3  # sizes of the object over the distance
 NEAREST = 1.2  # the lamp is not within the object: sizes of it from the centre
+ASIDE, BRIGHTER = np.radians(1.0), 0.05  # what may be measured elsewhere than at the centre
+EACH = 4
 
 
 @dataclass(frozen=True)
 class NearLight(Effect):
-    """numbers: for each distant light the object's size over the lamp's distance from ``centre``
-    (3,). light: (n,) of each pixel, −1 for one that is not distant. Irradiance is what the capture
-    says at the centre."""
+    """numbers: for each distant light the object's size over the lamp's distance, then two angles
+    and ln of a gain: where direction and irradiance were measured, a near lamp's are others than at
+    the object's centre. from_afar: the same lights as distant ones; offset: (n, 3) from the centre,
+    in sizes."""
 
-    names: tuple[str, ...]
-    light: Array
+    from_afar: LightDirection
     offset: Array
     size: float
     cause = "near_light"
 
     @classmethod
     def of(cls, setting: Setting) -> NearLight | None:
-        pixels = setting.pixels
-        number = setting.light[pixels.photo]
-        wanted = [k for k in range(len(setting.lights)) if setting.distant[k]]
-        wanted = [k for k in wanted if (number == k).any()]
-        if not wanted:
+        from_afar = LightDirection.of(setting)
+        if from_afar is None:
             return None
-        place = np.full(len(pixels), -1)
-        for i, k in enumerate(wanted):
-            place[number == k] = i
-        offset = ((pixels.point - setting.centre) / setting.size).astype(np.float32)
-        return cls(tuple(setting.lights[k] for k in wanted), place, offset, setting.size)
+        offset = ((setting.pixels.point - setting.centre) / setting.size).astype(np.float32)
+        return cls(from_afar, offset, setting.size)
 
     @property
     def numbers(self) -> Numbers:
-        return Numbers.alike(self.names, "size / distance", USUAL, 0.0, 1 / NEAREST)
+        names, units = [], []
+        for light in self.from_afar.names:
+            names += [f"{light}, {what}" for what in ("nearness", "first", "second", "gain")]
+            units += ["size / distance", "rad", "rad", "ln"]
+        count = len(self.from_afar.names)
+        return Numbers(
+            tuple(names), tuple(units),
+            np.tile([USUAL, ASIDE, ASIDE, BRIGHTER], count),
+            np.tile([0.0, -0.2, -0.2, -0.5], count),
+            np.tile([1 / NEAREST, 0.2, 0.2, 0.5], count),
+            np.full(EACH * count, 1e-3),
+        )  # fmt: skip
+
+    def nearness(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(lights,) sizes of the object over the distance."""
+        return x[::EACH]
 
     def before(self, now: Situation, x: np.ndarray) -> Situation:
-        # lamp at light/x, in sizes; towards it from a point: light − x · offset, times 1/x
-        inverse = np.where(self.light >= 0, x[self.light], 0.0).astype(np.float32)
+        angles = np.stack([x[1::EACH], x[2::EACH]], axis=1).ravel()
+        now = self.from_afar.before(now, angles)
+        light = self.from_afar.light
+        # a lamp at light / nearness, in sizes: seen from a point it is at light − nearness · offset
+        inverse = np.where(light >= 0, x[::EACH][light], 0.0).astype(np.float32)
+        gain = np.where(light >= 0, np.exp(x[3::EACH])[light], 1.0).astype(np.float32)
         towards = now.light - inverse[:, None] * self.offset
         length = np.linalg.norm(towards, axis=1, keepdims=True)
-        return replace(now, light=towards / length, irradiance=now.irradiance / length**2)
+        irradiance = now.irradiance * gain[:, None] / length**2
+        return replace(now, light=towards / length, irradiance=irradiance)
 
     def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
-        nearest = int(np.argmax(x))
-        nearness = max(float(x[nearest]), 1e-9)
-        unevenness = 100 * ((1 + nearness / 2) ** 2 / (1 - min(nearness, 1.9) / 2) ** 2 - 1)
+        nearest = int(np.argmax(self.nearness(x)))
+        nearness = max(float(self.nearness(x)[nearest]), 1e-9)
+        half = min(nearness / 2, 0.9)
+        unevenness = 100 * (((1 + half) / (1 - half)) ** 2 - 1)
         return (
-            f"the lamp ({self.names[nearest]}) stood near, about {self.size / nearness:.3g} scan "
-            f"units away ({1 / nearness:.1f} times the object's size): the near side gets up to "
-            f"{unevenness:.0f} % more light than the far one"
+            f"the lamp ({self.from_afar.names[nearest]}) stood near, about "
+            f"{self.size / nearness:.3g} scan units away ({1 / nearness:.1f} times the object's "
+            f"size): the near side gets up to {unevenness:.0f} % more light than the far one"
         )

@@ -1,0 +1,192 @@
+"""Effects, the joint fit and the judgement of gains, on pixels whose truth is written down here."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from patina.core.basis import Basis, PrincipalBRDF
+from patina.core.diagnose import search as searching
+from patina.core.diagnose.brdfs import BRDFs
+from patina.core.diagnose.deviation import as_found, pixel_deviation
+from patina.core.diagnose.effect import Setting
+from patina.core.diagnose.effects import EFFECTS
+from patina.core.diagnose.effects.camera_response import CameraResponse
+from patina.core.diagnose.effects.light_direction import LightDirection
+from patina.core.diagnose.effects.light_intensity import LightIntensity
+from patina.core.diagnose.effects.near_light import NearLight
+from patina.core.diagnose.effects.vignetting import Vignetting
+from patina.core.diagnose.held_out import predict_unseen
+from patina.core.diagnose.model import Model
+from patina.core.diagnose.pixels import Pixels
+from patina.core.diagnose.situation import Situation
+from patina.core.diagnose.solve import fit, slopes_of
+from patina.core.geometry import RayScene
+from patina.core.scan import Mesh
+from patina.core.steps import drained
+
+PHOTOS, EACH, SIZE = 6, 900, 0.8
+NOISE = 0.01
+
+
+def lit_ball(seed: int = 0) -> Setting:
+    """Pixels of a ball in six photos under three lights, of a material of the basis, with noise;
+    radiance is summed by hand here: ρ E cos θi."""
+    rng = np.random.default_rng(seed)
+    basis = Basis.default()
+    brdf = PrincipalBRDF(basis, basis.training[30:33])
+    parts = []
+    for photo in range(PHOTOS):
+        turn = 2 * np.pi * photo / PHOTOS
+        eye = np.array([np.cos(turn), np.sin(turn), 0.3]) / np.hypot(1, 0.3)
+        side = np.cross(eye, [0, 0, 1.0])
+        side /= np.linalg.norm(side)
+        light = np.cos(0.5 + 0.3 * (photo // 2)) * eye + np.sin(0.5 + 0.3 * (photo // 2)) * side
+        normal = rng.normal(size=(4 * EACH, 3))
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        normal = normal[(normal @ eye > 0.2) & (normal @ light > 0.05)][:EACH]
+        n = len(normal)
+        across = np.cross(side, eye)
+        x, y = (0.4 * normal @ side).astype(np.float32), (0.4 * normal @ across).astype(np.float32)
+        vector = np.ones((n, 3), np.float32)
+        parts.append(
+            Pixels(
+                photo=np.full(n, photo, np.int16), material=np.zeros(n, np.int16),
+                pixel=np.arange(n, dtype=np.int32), x=x, y=y, point=0.4 * normal,
+                normal=normal.astype(np.float32), view=(eye * vector).astype(np.float32),
+                light=(light * vector).astype(np.float32), irradiance=np.float32(np.pi) * vector,
+                distance=np.full(n, np.inf, np.float32), visible=np.ones(n, np.float32),
+                edge=np.full(n, 8, np.float32), curvature=np.zeros(n, np.float32),
+                observed=vector, noise=vector, slope=np.zeros((n, 2, 3), np.float32),
+                veil=vector, usable=np.ones(n, bool),
+                block=(36 * photo + 6 * (x > 0) + 3 * (y > 0)
+                       + np.digitize(np.hypot(x, y), (0.15, 0.28))).astype(np.int32),
+            )
+        )  # fmt: skip
+    pixels = Pixels.join(parts)
+    now = Situation.of(pixels)
+    rho = brdf.evaluate(now.angles)
+    radiance = rho * np.pi * np.sum(pixels.normal * pixels.light, axis=1, keepdims=True)
+    noisy = radiance * (1 + NOISE * rng.standard_normal(radiance.shape))
+    pixels = replace(
+        pixels, observed=noisy.astype(np.float32), noise=np.square(NOISE * radiance),
+        veil=np.broadcast_to(radiance.mean(axis=0), radiance.shape),
+    )  # fmt: skip
+    triangle = Mesh(np.eye(3) * 1e-3, np.array([[0, 1, 2]], np.int32))
+    return Setting(
+        pixels, BRDFs.of([brdf]), RayScene.build(triangle), np.arange(PHOTOS) // 2,
+        ("a", "b", "c"), np.ones(3, bool), np.zeros(3), SIZE,
+    )  # fmt: skip
+
+
+def changed(setting: Setting, observed: np.ndarray) -> Setting:
+    return replace(setting, pixels=replace(setting.pixels, observed=observed.astype(np.float32)))
+
+
+def searched(setting: Setting, kinds=(LightDirection, LightIntensity, NearLight, CameraResponse,
+                                      Vignetting)) -> searching.Found:  # fmt: skip
+    deviation = pixel_deviation(setting.pixels, setting.brdfs, np.radians(0.2))
+    effects = [kind.of(setting) for kind in kinds]
+    return drained(searching.search(Model(setting.pixels, setting.brdfs), deviation, effects))
+
+
+def test_nothing_is_named_where_nothing_is_wrong():
+    found = searched(lit_ball())
+    assert found.causes == ()
+    assert found.unseen_after is found.unseen_before
+
+
+def test_a_lamp_that_drifts_is_named_and_measured():
+    setting = lit_ball(1)
+    drift = np.array([0.0, 0.08, -0.05, 0.03, 0.06, -0.12])
+    gains = np.exp(drift)[setting.pixels.photo]
+    found = searched(changed(setting, setting.pixels.observed * gains[:, None]))
+    assert found.causes == ("light_intensity",)
+    x = found.accepted[0].x
+    np.testing.assert_allclose(x - x.mean(), drift - drift.mean(), atol=0.02)
+    assert found.unseen_after.mean < found.unseen_before.mean
+
+
+def test_a_dark_corner_is_named_and_measured():
+    setting = lit_ball(2)
+    r2 = np.square(setting.pixels.x) + np.square(setting.pixels.y)
+    gain = 1 - 0.6 * r2  # 10 % at the ball's outline
+    found = searched(changed(setting, setting.pixels.observed * gain[:, None]))
+    assert found.causes == ("vignetting",)
+    ours = found.accepted[0].effect.gain(found.accepted[0].x)
+    np.testing.assert_allclose(ours / ours.max(), gain / gain.max(), atol=0.015)
+
+
+def test_a_near_lamp_is_named_and_its_distance_found():
+    setting = lit_ball(3)
+    pixels, distance = setting.pixels, 2.5
+    offset = distance * pixels.light - pixels.point
+    away = np.linalg.norm(offset, axis=1, keepdims=True)
+    towards = (offset / away).astype(np.float32)
+    rho = BRDFs.of([PrincipalBRDF(Basis.default(), Basis.default().training[30:33])]).evaluate(
+        replace(Situation.of(pixels), light=towards).angles, pixels.material
+    )
+    cosine = np.maximum(np.sum(pixels.normal * towards, axis=1, keepdims=True), 0)
+    radiance = rho * np.pi * (distance / away) ** 2 * cosine
+    noise = 1 + NOISE * np.random.default_rng(3).standard_normal(radiance.shape)
+    found = searched(changed(setting, radiance * noise))
+    assert found.causes == ("near_light",)
+    trial = found.accepted[0]
+    np.testing.assert_allclose(SIZE / trial.effect.nearness(trial.x), distance, rtol=0.15)
+
+
+def test_slopes_are_those_of_finite_differences():
+    setting = lit_ball()
+    effect = LightDirection.of(setting)
+    x = np.array([0.02, -0.01, 0.0, 0.01, 0.03, 0.0])
+    model = Model(setting.pixels, setting.brdfs, (effect,), (x,))
+    fitted = fit(model, np.ones((len(setting.pixels), 3)), steps=0)
+    slopes = slopes_of(fitted)
+    rng = np.random.default_rng(0)
+    step = 1e-3 * rng.standard_normal(setting.brdfs.coefficients.shape)
+    moved = replace(model, brdfs=replace(model.brdfs, coefficients=model.brdfs.coefficients + step))
+    found = moved.predicted() - model.predicted()
+    expected = slopes.rho * (slopes.q @ step[0].T)
+    scale = np.abs(found).max()
+    np.testing.assert_allclose(expected / scale, found / scale, atol=0.02)
+
+
+@pytest.mark.parametrize("kind", EFFECTS, ids=lambda kind: kind.cause)
+def test_no_effect_is_no_change(kind):
+    """All numbers 0: the model as it was; and every effect has something to say."""
+    setting = lit_ball()
+    effect = kind.of(setting)
+    if effect is None:
+        pytest.skip("cannot be there on a ball alone")
+    zero = np.zeros(len(effect.numbers))
+    plain = Model(setting.pixels, setting.brdfs)
+    with_it = replace(plain, effects=(effect,), x=(zero,))
+    np.testing.assert_allclose(with_it.predicted(), plain.predicted(), rtol=2e-3, atol=1e-6)
+    small = effect.numbers.step
+    assert len(effect.sentence(np.clip(small, effect.numbers.low, effect.numbers.high), small)) > 20
+
+
+def test_what_is_not_understood_is_no_proof():
+    """Residuals ten times too large for no reason: deviations grow, nothing is named."""
+    setting = lit_ball(4)
+    rng = np.random.default_rng(5)
+    wild = setting.pixels.observed * (1 + 0.15 * rng.standard_normal((len(setting.pixels), 3)))
+    found = searched(changed(setting, wild))
+    assert found.causes == ()
+    assert found.not_noise_before > 0.8
+    deviation = pixel_deviation(setting.pixels, setting.brdfs, np.radians(0.2))
+    shown = Model(setting.pixels, setting.brdfs).predicted()
+    residual = (wild - shown) / deviation
+    found = as_found(deviation, residual, shown, setting.pixels)
+    assert np.median(found / shown) == pytest.approx(0.15, rel=0.1)
+
+
+def test_unseen_squares_cost_more_than_seen_ones():
+    setting = lit_ball(6)
+    deviation = pixel_deviation(setting.pixels, setting.brdfs, np.radians(0.2))
+    fitted = fit(Model(setting.pixels, setting.brdfs), deviation)
+    unseen = predict_unseen(fitted)
+    assert unseen.cost.sum() > fitted.cost
+    assert unseen.cost.sum() < 1.3 * fitted.cost
