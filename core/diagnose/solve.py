@@ -20,7 +20,7 @@ Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
 
 DEGREES = 4.0  # of freedom of the Student t
-STEPS, HALVINGS = 8, 5
+STEPS, HALVINGS = 25, 5
 SETTLED = 1e-4  # of the cost
 RISE = 1e-3  # relative, for the slope of what the camera does
 

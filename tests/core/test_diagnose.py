@@ -121,7 +121,7 @@ def test_a_dark_corner_is_named_and_measured():
 
 def test_a_near_lamp_is_named_and_its_distance_found():
     setting = lit_ball(3)
-    pixels, distance = setting.pixels, 2.5
+    pixels, distance = setting.pixels, 8.0
     offset = distance * pixels.light - pixels.point
     away = np.linalg.norm(offset, axis=1, keepdims=True)
     towards = (offset / away).astype(np.float32)

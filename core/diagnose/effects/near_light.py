@@ -15,6 +15,7 @@ USUAL = 0.3  # sizes of the object over the distance
 NEAREST = 1.2  # the lamp is not within the object: sizes of it from the centre
 ASIDE, BRIGHTER = np.radians(1.0), 0.05  # what may be measured elsewhere than at the centre
 EACH = 4
+START = 0.15  # of the nearness: away from its bound, where steps are cut short
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,7 @@ class NearLight(Effect):
             np.tile([0.0, -0.2, -0.2, -0.5], count),
             np.tile([1 / NEAREST, 0.2, 0.2, 0.5], count),
             np.full(EACH * count, 1e-3),
+            np.tile([START, 0.0, 0.0, 0.0], count),
         )  # fmt: skip
 
     def nearness(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
