@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from ..core.capture import read_capture
-from ..core.job import finished
+from ..core.job import FitJob, finished
 from ..core.job.diagnose_job import DiagnoseJob
 from ..core.report import diagnosis
 from ..core.report.page import page
+from . import capture_arguments
 from .progress import Progress
 from .solve import check_threads
 from .staging import check_out, staged_folder
@@ -18,17 +18,13 @@ HELP = "fit a capture and say what is wrong with it"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("capture", type=Path, help="the capture file (*.capture.toml)")
-    parser.add_argument("--out", type=Path, required=True, help="folder for the diagnosis")
-    parser.add_argument(
-        "--threads", type=int, metavar="N", help="look at the photos on N threads (default: cores)"
-    )
+    capture_arguments.add_arguments(parser, "the diagnosis")
 
 
 def run(arguments: argparse.Namespace) -> None:
     check_threads(arguments.threads)
     out = check_out(arguments.out)
-    job = DiagnoseJob(read_capture(arguments.capture), threads=arguments.threads)
+    job = DiagnoseJob(FitJob(read_capture(arguments.capture), threads=arguments.threads))
     job.drain(Progress(share=0.97))
     found, setting = finished(job.found), finished(job.setting)
     with staged_folder(out) as folder:

@@ -15,6 +15,7 @@ from ..core.job import CaptureResult, FitJob, Stage, finished
 from ..core.job.job import Step, peak_memory
 from ..core.report import result_json, write_report
 from ..core.report.figures import reach
+from . import capture_arguments
 from .progress import Progress
 from .solve import check_threads
 from .staging import check_out, staged_folder
@@ -23,11 +24,7 @@ HELP = "fit every material of a capture and write them"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("capture", type=Path, help="the capture file (*.capture.toml)")
-    parser.add_argument("--out", type=Path, required=True, help="folder for the results")
-    parser.add_argument(
-        "--threads", type=int, metavar="N", help="look at the photos on N threads (default: cores)"
-    )
+    capture_arguments.add_arguments(parser, "the results")
 
 
 def run(arguments: argparse.Namespace) -> None:

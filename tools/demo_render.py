@@ -52,6 +52,14 @@ class Camera:
         """The centre of projection in the scan's frame."""
         return -self.rotation.T @ self.translation
 
+    @property
+    def to_world(self) -> Array:
+        """(4, 4) from Blender's camera (x right, y up, looking down −z) to the scan's frame."""
+        pose = np.eye(4)
+        pose[:3, :3] = self.rotation.T @ np.diag([1.0, -1.0, -1.0])
+        pose[:3, 3] = self.position
+        return pose
+
     def project(self, points: Array) -> Array:
         """Return pixel coordinates (n, 2) of points (n, 3)."""
         seen = points @ self.rotation.T + self.translation
@@ -149,10 +157,7 @@ class Studio:
         lens.lens = camera.focal * lens.sensor_width / width
         lens.shift_x = (width / 2 - camera.centre[0]) / width
         lens.shift_y = (camera.centre[1] - height / 2) / width
-        pose = np.eye(4)
-        pose[:3, :3] = camera.rotation.T @ np.diag([1.0, -1.0, -1.0])
-        pose[:3, 3] = camera.position
-        self.lens.matrix_world = Matrix(pose.tolist())
+        self.lens.matrix_world = Matrix(camera.to_world.tolist())
         render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
         with tempfile.TemporaryDirectory() as folder:
             render.filepath = str(Path(folder) / "photo.exr")

@@ -29,6 +29,15 @@ def cross(a: Array, b: Array) -> tuple[Array, Array, Array]:
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
+def tangents(axis: Array) -> tuple[Array, Array]:
+    """Two units (n, 3) square to unit vectors (n, 3) and to each other: axis = first × second.
+    float64."""
+    helper = np.where(np.abs(axis[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    first = np.cross(axis, helper)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return first, np.cross(axis, first)
+
+
 def length(x: Array, y: Array, z: Array) -> Array:
     """(...) lengths of vectors given by components."""
     total: Array = x * x

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..angles.vectors import tangents
 from ..errors import PatinaError
 from ..light import DistantLight, Light, MountedLight, NearLight
 
@@ -55,9 +56,7 @@ def movable(light: Light, reach: float) -> Movable:
 
 def _direction(light: DistantLight) -> Movable:
     direction = light.direction
-    aside = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
-    aside /= np.linalg.norm(aside)
-    other = np.cross(direction, aside)
+    aside, other = (v[0] for v in tangents(direction[None]))
 
     def turned(x: Array) -> Light:
         moved = direction + np.tan(x[0]) * aside + np.tan(x[1]) * other

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -36,12 +36,6 @@ class BRDFs:
         variance = slack.variances(basis, slack.LITTLE)
         return cls(slack.with_slack(basis), coefficients, variance)
 
-    def loose(self) -> BRDFs:
-        """The same where materials may be far outside the basis."""
-        variance = self.variance.copy()
-        variance[-slack.COUNT :] = slack.MUCH**2
-        return replace(self, variance=variance)
-
     @cached_property
     def tables(self) -> tuple[LogTable, ...]:
         """One a material."""
@@ -56,8 +50,7 @@ class BRDFs:
                 out[rows] = table.evaluate(Angles(*(a.take(rows) for a in angles)))
         return out
 
-    def rows(self, angles: Angles, pixels: NDArray[np.intp]) -> tuple[Array, Array]:
-        """(Q̂ (p, k), cosMap (p,)) at some pixels: ∂ρ/∂c = (ρ + ε / cosMap) Q̂."""
-        part = Angles(*(a.take(pixels) for a in angles))
-        _, q = self.basis.rows(part, self.coefficients.shape[2])
-        return q, mapping.cos_map(part)
+    def rows(self, angles: Angles) -> tuple[Array, Array]:
+        """(Q̂ (n, k), cosMap (n,)): ∂ρ/∂c = (ρ + ε / cosMap) Q̂."""
+        _, q = self.basis.rows(angles, self.coefficients.shape[2])
+        return q, mapping.cos_map(angles)

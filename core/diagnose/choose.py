@@ -8,6 +8,7 @@ choice looks at geometry alone, never at what a pixel shows, so it does not bias
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter
 from ..angles import half_difference
 from ..angles.vectors import dot
 from ..capture import Capture
+from ..errors import FitError
 from ..geometry import PixelRays, RayScene, Window, bands, edges, view_window
 from ..job import inputs
 from ..job.lights import Lights
@@ -47,12 +49,16 @@ def choose_pixels(
     lights: Lights,
     count: int = COUNT,
 ) -> Generator[float, None, Pixels]:
-    """Yields the fraction done. Raises InputError for photos and masks that cannot be read."""
+    """Yields the fraction done. Raises InputError for photos and masks that cannot be read,
+    FitError where no photo shows a material."""
     each = max(200, count // max(len(capture.photos), 1))
     found = []
     for place in range(len(capture.photos)):
         yield place / len(capture.photos)
-        found.append(_of_photo(capture, scan, rays, photos, lights, place, each))
+        part = _of_photo(capture, scan, rays, photos, lights, place, each)
+        found += [] if part is None else [part]
+    if not found:
+        raise FitError("no photo shows a material, in light or in shadow: expected one that does")
     return Pixels.join(found)
 
 
@@ -64,7 +70,8 @@ def _of_photo(
     lights: Lights,
     place: int,
     count: int,
-) -> Pixels:
+) -> Pixels | None:
+    """None where nothing of the object is in the photo."""
     camera = inputs.camera_of(capture, scan, place)
     masks = inputs.photo_masks(capture, place)
     photo = photos.read_with_noise(place)
@@ -74,8 +81,8 @@ def _of_photo(
     for window in bands(camera, REACH + OUTLINE, rays.cover.columns(camera)):
         part = _of_band(capture, scan, rays, light, place, lines, photo, masks, window)
         parts.append(_thinned(part, count))
-    pixels = _thinned(Pixels.join(parts), count) if parts else Pixels.none()
-    return _with_photo(pixels, photo)
+    pixels = Pixels.join(parts) if parts else None
+    return _with_photo(_thinned(pixels, count), photo) if pixels else None
 
 
 def _of_band(
@@ -125,9 +132,6 @@ def _of_band(
         view=np.asarray(view.view[rows], np.float32),
         light=np.array(incidence.towards, np.float32),
         irradiance=np.array(incidence.irradiance, np.float32),
-        distance=np.full(n, np.inf, np.float32)
-        if incidence.distance is None
-        else np.asarray(incidence.distance, np.float32),
         visible=(~cast[rows]).astype(np.float32),
         edge=view.at(far.astype(np.float32))[rows],
         curvature=view.curvature[rows],
@@ -162,15 +166,13 @@ def _with_photo(pixels: Pixels, photo: LitPhoto) -> Pixels:
     seen = flat.take(pixels.pixel, axis=0)
     assert photo.variance is not None
     variance = photo.variance.reshape(-1, 3).take(pixels.pixel, axis=0)
-    return Pixels(
-        **{
-            **pixels.__dict__,
-            "observed": seen,
-            "noise": np.maximum(variance, np.float32(1e-20)),
-            "slope": _slopes(flat, pixels.pixel, height, width),
-            "veil": _veil(photo.radiance, pixels),
-            "block": _blocks(pixels),
-        }
+    return replace(
+        pixels,
+        observed=seen,
+        noise=np.maximum(variance, np.float32(1e-20)),
+        slope=_slopes(flat, pixels.pixel, height, width),
+        veil=_veil(photo.radiance, pixels),
+        block=_blocks(pixels),
     )
 
 
@@ -216,8 +218,6 @@ def _shrunk(channel: Array, step: int) -> Array:
 
 def _blocks(pixels: Pixels) -> NDArray[np.int32]:
     """(n,) numbers: photo, then the square of it that a pixel is in."""
-    if not len(pixels):
-        return pixels.block
     low_x, low_y = float(pixels.x.min()), float(pixels.y.min())
     size = max(float(np.ptp(pixels.x)), float(np.ptp(pixels.y)), 1e-6) / BLOCKS
     column = np.minimum(((pixels.x - low_x) / size).astype(np.int32), BLOCKS - 1)

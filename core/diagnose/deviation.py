@@ -7,9 +7,12 @@ before any cause is tried, so that the costs of different causes compare.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from ..angles.vectors import tangents
 from .brdfs import BRDFs
 from .model import Model
 from .pixels import Pixels
@@ -64,13 +67,9 @@ def as_found(deviation: Array, residual: Array, shown: Array, pixels: Pixels) ->
 def _by_normals(model: Model, shown: Array) -> Array:
     """(n, 3) sum over two tangents of the squared slope of radiance."""
     normal = model.pixels.normal.astype(np.float64)
-    helper = np.where(np.abs(normal[:, :1]) < 0.7, [[1.0, 0, 0]], [[0, 1.0, 0]])
-    first = np.cross(normal, helper)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
     out = np.zeros_like(shown, dtype=np.float64)
     now = model.situation()
-    for tangent in (first, np.cross(normal, first)):
-        tilted = (normal + NUDGE * tangent).astype(np.float32)
-        moved = type(now)(now.pixels, tilted, now.light, now.irradiance, now.visible)
+    for tangent in tangents(normal):
+        moved = replace(now, normal=(normal + NUDGE * tangent).astype(np.float32))
         out += ((model.reflected(moved) - shown) / NUDGE) ** 2
     return out

@@ -128,8 +128,3 @@ class Effect(ABC):
     @abstractmethod
     def sentence(self, x: NDArray[np.float64], deviation: NDArray[np.float64]) -> str:
         """For an artist."""
-
-
-def of_photo(pixels: Pixels, values: NDArray[np.floating]) -> Array:
-    """(n, …) a photo's value for each of its pixels; values: (photos, …)."""
-    return np.asarray(values)[pixels.photo]

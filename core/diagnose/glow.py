@@ -20,10 +20,8 @@ def face_glow(setting: Setting, photo: int) -> Array:
     """(f, 3) radiance; a face's material is that of the nearest pixels, its light that of the
     photo's pixels (a distant lamp's is the same everywhere)."""
     pixels, mesh = setting.pixels, setting.rays.mesh
-    corners = mesh.vertices[mesh.faces]
-    centre = corners.mean(axis=1)
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    centre = mesh.vertices[mesh.faces].mean(axis=1)
+    normal = mesh.face_normals
     one = np.flatnonzero(pixels.photo == photo)[0]
     towards = np.broadcast_to(pixels.light[one], centre.shape)
     cosine = np.maximum(normal @ pixels.light[one], 0)

@@ -26,6 +26,11 @@ class Model:
     effects: tuple[Effect, ...] = ()
     x: tuple[Vector, ...] = ()
 
+    @property
+    def usual(self) -> Vector:
+        """(p,) deviations of the numbers of all effects, before a photo is seen."""
+        return np.concatenate([e.numbers.deviation for e in self.effects] + [np.zeros(0)])
+
     def situation(self, x: Sequence[Vector] | None = None) -> Situation:
         """Surface and light with all effects."""
         now = Situation.of(self.pixels)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +15,12 @@ class Pixels:
 
     photo, material: (n,) int16 numbers in the capture. pixel: (n,) int32 flat index in the photo.
     x, y: (n,) float32 from the photo's centre, 1 at half its diagonal. point: (n, 3) float64;
-    normal, view, light: (n, 3) unit; scan frame. irradiance: (n, 3) at normal incidence. distance:
-    (n,) to the light, inf for a distant one. visible: (n,) 1 where the mesh lets the light through,
-    0 in its cast shadow. edge: (n,) pixels to the next edge of a shadow, at most REACH. curvature:
-    (n,) 1/pixel, NaN unknown. observed: (n, 3) radiance; noise: (n, 3) its variance by the photo's
-    own noise. shift: (n, 2, 3) what a pixel to the right and a pixel down show more, as a fraction
-    of the photo's typical radiance (NaN unknown). usable: (n,) not clipped. block: (n,) int32 the
-    part of its photo each is in.
+    normal, view, light: (n, 3) unit; scan frame. irradiance: (n, 3) at normal incidence.
+    visible: (n,) 1 where the mesh lets the light through, 0 in its cast shadow. edge: (n,) pixels
+    to the next edge of a shadow, at most REACH. curvature: (n,) 1/pixel, NaN unknown. observed: (n,
+    3) radiance; noise: (n, 3) its variance by the photo's own noise. slope: (n, 2, 3) what the
+    photo shows more a pixel to the right and a pixel down; veil: (n, 3) the photo blurred widely.
+    usable: (n,) not clipped. block: (n,) int32 the part of its photo each is in.
     """
 
     photo: NDArray[np.int16]
@@ -35,7 +33,6 @@ class Pixels:
     view: NDArray[np.float32]
     light: NDArray[np.float32]
     irradiance: NDArray[np.float32]
-    distance: NDArray[np.float32]
     visible: NDArray[np.float32]
     edge: NDArray[np.float32]
     curvature: NDArray[np.float32]
@@ -52,28 +49,6 @@ class Pixels:
     def select(self, which: NDArray | slice) -> Pixels:
         """The rows of a boolean mask, an index array or a slice."""
         return Pixels(**{f.name: getattr(self, f.name)[which] for f in fields(self)})
-
-    @staticmethod
-    def none() -> Pixels:
-        """No pixels at all."""
-        columns = {"point": (0, 3), "slope": (0, 2, 3)}
-        vectors = ("normal", "view", "light", "irradiance", "observed", "noise", "veil")
-        kinds: dict[str, Any] = {
-            "photo": np.int16,
-            "material": np.int16,
-            "pixel": np.int32,
-            "block": np.int32,
-        }
-        kinds |= {"point": np.float64, "usable": np.bool_}
-        return Pixels(
-            **{
-                f.name: np.zeros(
-                    columns.get(f.name, (0, 3) if f.name in vectors else (0,)),
-                    kinds.get(f.name, np.float32),
-                )
-                for f in fields(Pixels)
-            }
-        )
 
     @staticmethod
     def join(parts: Sequence[Pixels]) -> Pixels:

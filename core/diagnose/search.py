@@ -75,6 +75,12 @@ class Found:
     not_noise_after: float
 
     @property
+    def ranked(self) -> list[Trial]:
+        """What is accepted, then the rest of the first round, best first."""
+        first = self.rounds[0] if self.rounds else ()
+        return [*self.accepted, *(t for t in first if t.effect.cause not in self.causes)]
+
+    @property
     def causes(self) -> tuple[str, ...]:
         """By the words of the vocabulary, in the order of acceptance."""
         return tuple(trial.effect.cause for trial in self.accepted)
@@ -86,7 +92,7 @@ def search(
     """Yields the fraction done."""
     now = fit(model, deviation)
     expected = deviation
-    deviation = as_found(deviation, now.residual, now.model.predicted(), model.pixels)
+    deviation = as_found(deviation, now.residual, now.shown, model.pixels)
     now = before = fit(now.model, deviation)
     unseen = unseen_before = predict_unseen(before)
     accepted: list[Trial] = []
@@ -139,11 +145,9 @@ def _try(now: Fitted, unseen: Unseen, effect: Effect) -> Trial:
     predicted = predict_unseen(fitted)
     gains = unseen.cost - predicted.cost
     by_block = np.bincount(model.pixels.block, gains)
-    shown, without = fitted.model.predicted(), model.predicted()
     counted = np.isfinite(now.deviation).all(axis=1)
-    change = np.sqrt(
-        np.sum((shown - without)[counted] ** 2) / max(np.sum(shown[counted] ** 2), 1e-30)
-    )
+    shown = fitted.shown[counted]
+    change = np.sqrt(np.sum((shown - now.shown[counted]) ** 2) / max(np.sum(shown**2), 1e-30))
     spread = np.sqrt(np.sum((by_block - by_block.sum() / len(by_block)) ** 2))
     return Trial(effect, fitted, predicted, float(gains.sum()), float(spread), float(change))
 
@@ -191,6 +195,6 @@ def _scores(now: Fitted, effect: Effect, of: NDArray[np.intp]) -> tuple[Array, A
     start = effect.numbers.begin
     wider = Fitted(
         replace(model, effects=(*model.effects, effect), x=(*model.x, start)),
-        now.deviation, now.residual, now.cost,
+        now.deviation, now.shown, now.residual, now.cost,
     )  # fmt: skip
     return scores(wider, slopes_of(wider), of, len(effect.numbers))

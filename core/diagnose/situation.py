@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,7 @@ Array = NDArray[np.floating]
 class Situation:
     """At n pixels. normal, light: (n, 3) unit. irradiance: (n, 3) at normal incidence. visible:
     (n,) part of the light that arrives. stretch: (n,) what ln tan θh grows by where the surface
-    reflects along one direction more widely than across it. boost: (n,) or (n, 3), ln of what the
-    BRDF is larger by than its components say. None: nowhere."""
+    reflects along one direction more widely than across it. None: nowhere."""
 
     pixels: Pixels
     normal: Array
@@ -27,7 +26,6 @@ class Situation:
     irradiance: Array
     visible: Array
     stretch: Array | None = None
-    boost: Array | None = None
 
     @classmethod
     def of(cls, pixels: Pixels) -> Situation:
@@ -50,16 +48,5 @@ class Situation:
 
     @property
     def received(self) -> Array:
-        """(n, 3) irradiance on the surface, times the boost."""
-        light = self.irradiance * (self.cos_i * self.visible)[:, None]
-        if self.boost is None:
-            return light
-        grown = np.exp(self.boost)
-        return light * (grown if grown.ndim == 2 else grown[:, None])
-
-    def boosted(self, boost: Array) -> Situation:
-        """With more of it."""
-        if self.boost is None:
-            return replace(self, boost=boost)
-        both = [b if b.ndim == 2 else b[:, None] for b in (self.boost, boost)]
-        return replace(self, boost=both[0] + both[1])
+        """(n, 3) irradiance on the surface."""
+        return self.irradiance * (self.cos_i * self.visible)[:, None]

@@ -27,11 +27,13 @@ RISE = 1e-3  # relative, for the slope of what the camera does
 
 @dataclass(frozen=True)
 class Fitted:
-    """model at its optimum. deviation: (n, 3) of every pixel, fixed; residual: (n, 3) in units of
-    it. cost: of the pixels, in nats, the prior not counted."""
+    """model at its optimum. deviation: (n, 3) of every pixel, fixed; shown: (n, 3) the prediction;
+    residual: (n, 3) what photos show more, in units of the deviation. cost: of the pixels, in nats,
+    the prior not counted."""
 
     model: Model
     deviation: Array
+    shown: Array
     residual: Array
     cost: float
 
@@ -78,8 +80,7 @@ def slopes_of(fitted: Fitted) -> Slopes:
     model, deviation = fitted.model, fitted.deviation
     now = model.situation()
     angles = now.angles
-    everything = np.arange(len(model.pixels))
-    q, weight = model.brdfs.rows(angles, everything)
+    q, weight = model.brdfs.rows(angles)
     rho = model.brdfs.evaluate(angles, model.pixels.material)
     received = now.received
     reflected = rho * received
@@ -107,8 +108,9 @@ def _moved(model: Model, place: int, index: int) -> Array:
 
 
 def _at(model: Model, deviation: Array) -> Fitted:
-    residual = (model.pixels.observed - model.predicted()) / deviation
-    return Fitted(model, deviation, residual, float(robust(residual).sum()))
+    shown = model.predicted()
+    residual = (model.pixels.observed - shown) / deviation
+    return Fitted(model, deviation, shown, residual, float(robust(residual).sum()))
 
 
 def _prior(model: Model) -> float:
@@ -177,7 +179,7 @@ class Equations:
         model = fitted.model
         variance = model.brdfs.variance
         m, _, k = model.brdfs.coefficients.shape
-        usual = np.concatenate([e.numbers.deviation for e in model.effects] + [np.zeros(0)])
+        usual = model.usual
         own = self.own + np.diag(1 / usual**2)
         right = self.own_pull - fitted.numbers / usual**2
         pull = self.pull - model.brdfs.coefficients / variance
@@ -208,8 +210,7 @@ def scores(fitted: Fitted, slopes: Slopes, of: NDArray[np.intp], last: int) -> t
     variance = model.brdfs.variance
     groups = int(of.max()) + 1
     p = slopes.x.shape[2]
-    usual = np.concatenate([e.numbers.deviation for e in model.effects] + [np.zeros(0)])
-    own = whole.own + np.diag(1 / usual**2)
+    own = whole.own + np.diag(1 / model.usual**2)
     pull = np.zeros((groups, p))
     for index in range(len(model.brdfs.coefficients)):
         mine = np.flatnonzero(model.pixels.material == index)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import half_difference
+from ..angles.vectors import tangents
 from ..geometry import RayScene
 from ..geometry.view import SHADOW_LIFT
 from .brdfs import BRDFs
@@ -63,10 +64,7 @@ def _part(pixels: Pixels, brdfs: BRDFs, rays: RayScene, seed: int) -> tuple[NDAr
     rng = np.random.default_rng(seed)
     n, d = len(pixels), 2 * EACH
     normal, view = pixels.normal.astype(np.float64), pixels.view.astype(np.float64)
-    helper = np.where(np.abs(normal[:, :1]) < 0.7, [[1.0, 0, 0]], [[0, 1.0, 0]])
-    first = np.cross(normal, helper)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    frame = np.stack([first, np.cross(normal, first), normal], axis=1)  # (n, 3, 3), rows
+    frame = np.stack([*tangents(normal), normal], axis=1)  # (n, 3, 3), rows
     u = (np.arange(EACH) + rng.random((n, EACH))) / EACH
     turn = 2 * np.pi * (0.61803399 * np.arange(EACH) + rng.random((n, 1)))
     sine = np.sqrt(u)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator, Iterator
 
 import numpy as np
 
-from ..basis import Basis
-from ..capture import Capture
 from ..diagnose.brdfs import BRDFs
 from ..diagnose.choose import choose_pixels
 from ..diagnose.deviation import pixel_deviation
@@ -16,7 +14,6 @@ from ..diagnose.effects import made_for
 from ..diagnose.model import Model
 from ..diagnose.search import Found, search
 from ..fit.measured_result import MeasuredResult
-from ..scan import Scan
 from .fit_job import CaptureResult, FitJob
 from .job import Job, Step, finished
 
@@ -26,17 +23,11 @@ SHARE = 0.5  # of the job, the fit
 
 class DiagnoseJob(Job):
     """``result`` is the fit, ``setting`` what was looked at, ``found`` what is wrong with it; they
-    are there when the job is done. prepare, threads: as FitJob has them."""
+    are there when the job is done."""
 
-    def __init__(
-        self,
-        capture: Capture,
-        basis: Basis | None = None,
-        prepare: Callable[[Scan], Scan] | None = None,
-        threads: int | None = None,
-    ) -> None:
+    def __init__(self, fit: FitJob) -> None:
         super().__init__()
-        self.fit = FitJob(capture, basis, prepare, threads)
+        self.fit = fit
         self.setting: Setting | None = None
         self.found: Found | None = None
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..angles.vectors import tangents
 from ..errors import InputError
 from ..scan.camera import Camera
 
@@ -183,10 +184,8 @@ def _from_cone(origin: Array | None, axis: Array, half_angle: float) -> Sphere:
 def _frame(direction: Array) -> tuple[Array, Array, Array]:
     """(direction, and two units perpendicular to it and each other)."""
     axis = direction / np.linalg.norm(direction)
-    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    across = np.cross(axis, helper)
-    across /= np.linalg.norm(across)
-    return axis, across, np.cross(axis, across)
+    across, along = tangents(axis[None])
+    return axis, across[0], along[0]
 
 
 def _angle(directions: Array, axis: Array) -> Array:

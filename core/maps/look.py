@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import half_difference
-from ..angles.vectors import dot
+from ..angles.vectors import dot, tangents
 from ..capture import Capture
 from ..geometry import RayScene
 from ..geometry.view import SHADOW_LIFT, cast_shadow
@@ -176,10 +176,7 @@ class PhotoLook:
         radius = angular_radius(self.light, light)
         if radius is None:
             return blocked
-        helper = np.where(np.abs(light.towards[:, :1]) < 0.7, [[1.0, 0, 0]], [[0, 1.0, 0]])
-        first = np.cross(light.towards, helper)
-        first /= np.linalg.norm(first, axis=1, keepdims=True)
-        second = np.cross(light.towards, first)
+        first, second = tangents(light.towards)
         for k in range(LIMB):
             turn = 2 * np.pi * k / LIMB
             aside = np.tan(radius)[:, None] * (np.cos(turn) * first + np.sin(turn) * second)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..angles.vectors import tangents
 from ..geometry import RayScene, SurfaceView
 from ..geometry.view import SHADOW_LIFT
 from ..light import DistantLight, Light
@@ -138,10 +139,7 @@ class _Points:
         self.distance, self.radius, self.turn = distance, radius, turn
         self.start = point + SHADOW_LIFT * rays.mesh.size * normal
         # two axes square to the light
-        helper = np.where(np.abs(towards[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-        self.across = np.cross(towards, helper)
-        self.across /= np.linalg.norm(self.across, axis=1, keepdims=True)
-        self.along = np.cross(towards, self.across)
+        self.across, self.along = tangents(towards)
 
     def seen(self, samples: int) -> NDArray[np.float32]:
         """(n,) fraction of the light, from ``samples`` rays where it takes as many."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -13,7 +11,7 @@ import numpy as np
 from ..diagnose.coordinates import coordinates, trend
 from ..diagnose.effect import Setting
 from ..diagnose.search import Found, Trial
-from .result_json import program_version
+from .result_json import program_version, write_json
 from .trend_chart import trend_chart
 
 FORMAT = 1
@@ -24,24 +22,20 @@ STEPS = (0.05, 0.1, 0.2, 0.5, 1.0)  # of a chart's vertical axis
 def describe(found: Found) -> dict[str, Any]:
     """The content of diagnosis.json. Costs are nats a pixel and channel; angles are radians."""
     tried = {t.effect.cause: t for trials in found.rounds for t in trials}
-    first = found.rounds[0] if found.rounds else ()
-    best = [*found.accepted, *(t for t in first if t.effect.cause not in found.causes)]
     return {
         "format": FORMAT,
         "program": {"name": "patina", "version": program_version()},
         "named": list(found.causes) or ["none"],
         "baseline": {"held_out": found.unseen_before.mean, "not_noise": found.not_noise_before},
         "extended": {"held_out": found.unseen_after.mean, "not_noise": found.not_noise_after},
-        "causes": [_cause(t, t in found.accepted) for t in best],
+        "causes": [_cause(t, t in found.accepted) for t in found.ranked],
         "tried": sorted(tried),
     }
 
 
 def write(path: Path, found: Found) -> None:
     """Write the file; it appears whole or not at all."""
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(json.dumps(describe(found), indent=1, allow_nan=False) + "\n", "utf-8")
-    os.replace(partial, path)
+    write_json(path, describe(found))
 
 
 def _cause(trial: Trial, accepted: bool) -> dict[str, Any]:
@@ -65,7 +59,7 @@ def _cause(trial: Trial, accepted: bool) -> dict[str, Any]:
 
 def section(found: Found, setting: Setting) -> str:
     """HTML: the ranking, then the residual along what betrays causes."""
-    rows = "".join(_row(t, t in found.accepted, found) for t in _ranked(found))
+    rows = "".join(_row(t, t in found.accepted, found) for t in found.ranked)
     named = ", ".join(found.causes) or "nothing that can be named"
     return (
         f"<h2>What is wrong</h2><p><b>{escape(named)}</b></p>"
@@ -78,11 +72,6 @@ def section(found: Found, setting: Setting) -> str:
         "photos show more than the prediction, relative; red before, blue after; bars: two "
         "standard errors.</p>"
     )
-
-
-def _ranked(found: Found) -> list[Trial]:
-    first = found.rounds[0] if found.rounds else ()
-    return [*found.accepted, *(t for t in first if t.effect.cause not in found.causes)]
 
 
 def _row(trial: Trial, accepted: bool, found: Found) -> str:
@@ -102,9 +91,8 @@ def _charts(found: Found, setting: Setting) -> str:
     for coordinate in coordinates(setting):
         trends = []
         for fitted in (found.before, found.after):
-            shown = fitted.model.predicted()
-            missed = setting.pixels.observed - shown
-            trends.append(trend(coordinate, missed, shown, fitted.deviation, block))
+            missed = setting.pixels.observed - fitted.shown
+            trends.append(trend(coordinate, missed, fitted.shown, fitted.deviation, block))
         before = trends[0]
         if not len(before.at):
             continue

@@ -35,10 +35,13 @@ def program_version() -> str:
 
 def write(path: Path, result: CaptureResult, stages: Sequence[Stage], notes: Sequence[str]) -> None:
     """Write the file; it appears whole or not at all."""
+    write_json(path, describe(result, stages, notes))
+
+
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Write a file of this content; it appears whole or not at all."""
     partial = path.with_name(path.name + ".part")
-    partial.write_text(
-        json.dumps(describe(result, stages, notes), indent=1, allow_nan=False) + "\n", "utf-8"
-    )
+    partial.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", "utf-8")
     os.replace(partial, path)
 
 

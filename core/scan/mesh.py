@@ -49,12 +49,19 @@ class Mesh:
     notes: tuple[str, ...] = ()
 
     @cached_property
+    def face_normals(self) -> NDArray[np.float64]:
+        """(f, 3) unit normals of the flat triangles, 0 of those without area."""
+        corners = self.vertices[self.faces]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        return normals
+
+    @cached_property
     def vertex_normals(self) -> NDArray[np.float64]:
         """(v, 3) unit normals, the mean of the adjoining faces weighted by their angles
         (Thürmer & Wüthrich 1998: independent of how a surface is cut into triangles)."""
         corners = self.vertices[self.faces]
-        face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        face_normals /= np.maximum(np.linalg.norm(face_normals, axis=1, keepdims=True), 1e-300)
+        face_normals = self.face_normals
         # vertices may be split where a texture has seams; the surface is smooth across them
         first, welded = distinct_places(self.vertices)
         joints = welded[self.faces]

@@ -53,9 +53,7 @@ class OnMesh:
             hits = self.rays.first_hits(camera.ray_starts(found.pixels), directions)
             there = sound & (hits.face >= 0)
             met = Hits(hits.face[there], hits.u[there], hits.v[there])
-            corners = self.rays.mesh.vertices[self.rays.mesh.faces[met.face]]
-            normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+            normal = self.rays.mesh.face_normals[met.face]
             steep = np.abs(np.einsum("ij,ij->i", normal, directions[there])) > FLATTEST
             points[np.flatnonzero(there)[steep]] = self.rays.points(met)[steep]
         known = np.isfinite(points[:, 0])

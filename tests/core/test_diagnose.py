@@ -57,7 +57,7 @@ def lit_ball(seed: int = 0) -> Setting:
                 pixel=np.arange(n, dtype=np.int32), x=x, y=y, point=0.4 * normal,
                 normal=normal.astype(np.float32), view=(eye * vector).astype(np.float32),
                 light=(light * vector).astype(np.float32), irradiance=np.float32(np.pi) * vector,
-                distance=np.full(n, np.inf, np.float32), visible=np.ones(n, np.float32),
+                visible=np.ones(n, np.float32),
                 edge=np.full(n, 8, np.float32), curvature=np.zeros(n, np.float32),
                 observed=vector, noise=vector, slope=np.zeros((n, 2, 3), np.float32),
                 veil=vector, usable=np.ones(n, bool),

@@ -10,6 +10,7 @@ pytest.importorskip("bpy")
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 
 from patina.core.capture import read_capture  # noqa: E402
+from patina.core.job import FitJob  # noqa: E402
 from patina.core.job.diagnose_job import DiagnoseJob  # noqa: E402
 from patina.scene import materials  # noqa: E402
 from tools.hunt.make import make  # noqa: E402
@@ -25,7 +26,7 @@ def test_what_is_hidden_is_named(cause, tmp_path):
     strength, seed = CASES[cause]
     truth = make(tmp_path, cause, strength, seed)
     assert truth.strength == pytest.approx(strength, rel=0.2)
-    job = DiagnoseJob(read_capture(tmp_path / "hunt.capture.toml"))
+    job = DiagnoseJob(FitJob(read_capture(tmp_path / "hunt.capture.toml")))
     job.drain()
     found = job.found
     assert (found.causes or ("none",)) == (cause,)

@@ -107,7 +107,7 @@ def _shots(rng: np.random.Generator) -> list[Shot]:
         camera = Camera(rotation, -rotation @ eye, FOCAL, centre, SIZE)
         shots.append(Shot(camera, np.zeros(3)))
     for k in range(LIGHTS):
-        pair = (k, (k + LIGHTS) % PHOTOS) if rng.random() < 0 else (2 * k, 2 * k + 1)
+        pair = (2 * k, 2 * k + 1)
         first = shots[pair[0]].camera
         away, about = AWAY[k % len(AWAY)], rng.uniform(0, 2 * np.pi)
         local = np.array(
@@ -243,16 +243,16 @@ def _near(studio, shots, plain, strength, rng):  # type: ignore[no-untyped-def]
     return lit(min(size, 1.2)), shots, {"1 / distance": min(size, 1.2)}
 
 
+def _in_part(whole, shots, plain, strength, name, most):  # type: ignore[no-untyped-def]
+    """Of light that adds up, as much as changes the photos by the wanted RMS."""
+    size = min(most, strength / max(_rms(whole, plain), 1e-9))
+    return [p + size * (w - p) for p, w in zip(plain, whole, strict=True)], shots, {name: size}
+
+
 def _room(studio, shots, plain, strength, rng):  # type: ignore[no-untyped-def]
     studio.room(1.0)
     studio.noise_free(100)
-    whole = _photograph(studio, shots)
-    size = strength / _rms(whole, plain)
-    return (
-        [p + size * (w - p) for p, w in zip(plain, whole, strict=True)],
-        shots,
-        {"radiance": size},
-    )
+    return _in_part(_photograph(studio, shots), shots, plain, strength, "radiance", 1e9)
 
 
 def _window(studio, shots, plain, strength, rng):  # type: ignore[no-untyped-def]
@@ -261,21 +261,13 @@ def _window(studio, shots, plain, strength, rng):  # type: ignore[no-untyped-def
     at /= np.linalg.norm(at)
     studio.window(at, 1.0, np.radians(rng.uniform(15, 40)))
     studio.noise_free(128)
-    whole = _photograph(studio, shots)
-    size = strength / _rms(whole, plain)
-    return (
-        [p + size * (w - p) for p, w in zip(plain, whole, strict=True)],
-        shots,
-        {"radiance": size},
-    )
+    return _in_part(_photograph(studio, shots), shots, plain, strength, "radiance", 1e9)
 
 
 def _bounced(studio, shots, plain, strength, rng):  # type: ignore[no-untyped-def]
     studio.bounce(BOUNCES)
     studio.noise_free(100)
-    whole = _photograph(studio, shots)
-    size = min(1.0, strength / max(_rms(whole, plain), 1e-9))
-    return [p + size * (w - p) for p, w in zip(plain, whole, strict=True)], shots, {"part": size}
+    return _in_part(_photograph(studio, shots), shots, plain, strength, "part", 1.0)
 
 
 MAKERS = {
@@ -301,14 +293,11 @@ def _write(folder: Path, surface, shots: list[Shot], photos: list[Array]) -> Non
     frames = []
     for k, shot in enumerate(shots):
         camera = shot.camera
-        pose = np.eye(4)
-        pose[:3, :3] = camera.rotation.T @ np.diag([1.0, -1.0, -1.0])
-        pose[:3, 3] = camera.position
         frames.append(
             {
                 "file_path": f"view_{k}.jpg", "fl_x": camera.focal, "fl_y": camera.focal,
                 "cx": camera.centre[0], "cy": camera.centre[1], "w": SIZE[0], "h": SIZE[1],
-                "transform_matrix": pose.tolist(),
+                "transform_matrix": camera.to_world.tolist(),
             }
         )  # fmt: skip
     (folder / "transforms.json").write_text(json.dumps({"frames": frames}), "utf-8")

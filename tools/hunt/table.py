@@ -45,6 +45,7 @@ def main() -> int:
 def _one(cause: str, strength: float, seed: int) -> tuple[str, ...]:
     """Make, diagnose, print the row; what was named."""
     from patina.core.capture import read_capture
+    from patina.core.job import FitJob
     from patina.core.job.diagnose_job import DiagnoseJob
 
     from .make import make
@@ -53,7 +54,7 @@ def _one(cause: str, strength: float, seed: int) -> tuple[str, ...]:
         since = time.perf_counter()
         truth = make(Path(folder), cause, strength, seed)
         made = time.perf_counter()
-        job = DiagnoseJob(read_capture(Path(folder) / "hunt.capture.toml"))
+        job = DiagnoseJob(FitJob(read_capture(Path(folder) / "hunt.capture.toml")))
         job.drain()
         done = time.perf_counter()
     assert job.found is not None

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...angles.vectors import tangents
 from ..effect import Array, Effect, Numbers, Setting
 from ..situation import Situation
 
@@ -33,15 +34,12 @@ class LightDirection(Effect):
         wanted = [k for k in wanted if (number == k).any()]
         if not wanted:
             return None
-        aside, other, place = [], [], np.full(len(pixels), -1)
+        directions, place = np.empty((len(wanted), 3)), np.full(len(pixels), -1)
         for i, k in enumerate(wanted):
             place[number == k] = i
-            direction = pixels.light[np.flatnonzero(number == k)[0]].astype(np.float64)
-            across = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
-            aside.append(across / np.linalg.norm(across))
-            other.append(np.cross(direction, aside[-1]))
+            directions[i] = pixels.light[np.flatnonzero(number == k)[0]]
         names = tuple(setting.lights[k] for k in wanted)
-        return cls(names, np.array(aside), np.array(other), place)
+        return cls(names, *tangents(directions), place)
 
     @property
     def numbers(self) -> Numbers:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, cg
 
 from ...angles import half_difference
-from ...angles.vectors import dot
+from ...angles.vectors import dot, tangents
 from ...basis import mapping
 from ...basis.log_table import LogTable
 from ...samples import SampleTable
@@ -91,9 +91,7 @@ def _linearised(
     grey: LogTable, normal: Array, table: SampleTable, observed: Array
 ) -> tuple[Array, Array]:
     """(∂ ln L/∂n (n, 3) in the tangent plane, misfit (n,) of ln L)."""
-    helper = np.where(np.abs(normal[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    first = _unit(np.cross(normal, helper))
-    second = np.cross(normal, first)
+    first, second = tangents(normal)
     base = _log_reflected(grey, normal, table)
     one = (_log_reflected(grey, _unit(normal + NUDGE * first), table) - base) / NUDGE
     two = (_log_reflected(grey, _unit(normal + NUDGE * second), table) - base) / NUDGE
