@@ -32,7 +32,7 @@ def pixel_deviation(pixels: Pixels, brdfs: BRDFs, normal_deviation: float) -> Ar
     """(n, 3) radiance, inf for clipped pixels; normal_deviation: radians along each tangent."""
     model = Model(pixels, brdfs)
     now = model.situation()
-    shown = model.reflected(now)
+    shown = model.reflected([now])
     bright = np.zeros(int(pixels.photo.max()) + 1)
     for photo in np.unique(pixels.photo):
         bright[photo] = np.percentile(shown[pixels.photo == photo].mean(axis=1), 90)
@@ -71,5 +71,5 @@ def _by_normals(model: Model, shown: Array) -> Array:
     now = model.situation()
     for tangent in tangents(normal):
         moved = replace(now, normal=(normal + NUDGE * tangent).astype(np.float32))
-        out += ((model.reflected(moved) - shown) / NUDGE) ** 2
+        out += ((model.reflected([moved]) - shown) / NUDGE) ** 2
     return out

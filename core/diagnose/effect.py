@@ -98,6 +98,12 @@ class Setting:
         return face_glow(self, photo)
 
 
+def felt_by(copy: NDArray[np.intp], each: int) -> NDArray[np.intp]:
+    """(n, each) for numbers of which every photo (light, patch) has its own: copy: (n,) whose each
+    pixel feels, −1 none."""
+    return np.where(copy[:, None] >= 0, copy[:, None] * each + np.arange(each), -1)
+
+
 class Effect(ABC):
     """One cause of the vocabulary, made for the pixels that it is to explain."""
 
@@ -113,9 +119,19 @@ class Effect(ABC):
     def numbers(self) -> Numbers:
         """The unknowns."""
 
+    @property
+    def feels(self) -> NDArray[np.intp] | None:
+        """(n, s) places of the numbers that each pixel feels, −1 none, such that none feels two of
+        one slot; None: all pixels feel all numbers."""
+        return None
+
     def before(self, now: Situation, x: NDArray[np.float64]) -> Situation:
         """Surface and light with the effect."""
         return now
+
+    def lamps(self, now: Situation, x: NDArray[np.float64]) -> list[Situation]:
+        """Equal parts of a lamp that has a size."""
+        return [now]
 
     def added(self, now: Situation, brdfs: BRDFs, x: NDArray[np.float64]) -> Array | None:
         """(n, 3) radiance beside the lamp's."""

@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .solve import Equations, Fitted, Slopes, robust, slopes_of
+from .equations import Equations
+from .fitted import Fitted, robust
+from .slopes import Slopes, slopes_of
 
 Array = NDArray[np.floating]
 
@@ -64,7 +66,7 @@ def _change(
 ) -> Array:
     """(r, 3) what the prediction changes by, in units of the deviation."""
     material = fitted.model.pixels.material[rows]
-    out = slopes.x[rows] @ x
+    out = np.stack([slopes.matrix(rows, c) @ x for c in range(3)], axis=1)
     for index in range(len(change)):
         mine = np.flatnonzero(material == index)
         out[mine] += slopes.rho[rows[mine]] * (slopes.q[rows[mine]] @ change[index].T)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,28 +19,57 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Model:
-    """effects act in this order; x: the numbers of each."""
+    """effects act in this order; x: the numbers of each. plain: rows of the basis at the directions
+    that the capture says, kept: most effects leave them as they are."""
 
     pixels: Pixels
     brdfs: BRDFs
     effects: tuple[Effect, ...] = ()
     x: tuple[Vector, ...] = ()
+    plain: dict[int, tuple[Array, Array]] = field(default_factory=dict)
 
     @property
     def usual(self) -> Vector:
         """(p,) deviations of the numbers of all effects, before a photo is seen."""
         return np.concatenate([e.numbers.deviation for e in self.effects] + [np.zeros(0)])
 
+    def feels(self, place: int) -> NDArray[np.intp]:
+        """(n, s) which of an effect's numbers each pixel feels, −1 none: one a slot."""
+        felt = self.effects[place].feels
+        everything = np.arange(len(self.effects[place].numbers))
+        return (
+            np.broadcast_to(everything, (len(self.pixels), len(everything)))
+            if felt is None
+            else felt
+        )
+
     def situation(self, x: Sequence[Vector] | None = None) -> Situation:
-        """Surface and light with all effects."""
+        """Surface and light with all effects, of a lamp that is a point."""
         now = Situation.of(self.pixels)
         for effect, numbers in zip(self.effects, self.x if x is None else x, strict=True):
             now = effect.before(now, numbers)
         return now
 
-    def reflected(self, now: Situation) -> Array:
+    def lamps(self, x: Sequence[Vector] | None = None) -> list[Situation]:
+        """The same for each of the equal parts of the lamp, where an effect gives it a size."""
+        parts = [self.situation(x)]
+        for effect, numbers in zip(self.effects, self.x if x is None else x, strict=True):
+            parts = [lamp for part in parts for lamp in effect.lamps(part, numbers)]
+        return parts
+
+    def rows(self, now: Situation) -> tuple[Array, Array]:
+        """(Q̂ (n, k), cosMap (n,)): ∂ρ/∂c = (ρ + ε / cosMap) Q̂."""
+        if now.moved:
+            return self.brdfs.rows(now.angles)
+        if 0 not in self.plain:
+            self.plain[0] = self.brdfs.rows(now.angles)
+        return self.plain[0]
+
+    def reflected(self, lamps: Sequence[Situation]) -> Array:
         """(n, 3) radiance of the lamp's light."""
-        return self.brdfs.evaluate(now.angles, self.pixels.material) * now.received
+        material = self.pixels.material
+        parts = (self.brdfs.evaluate(now.angles, material) * now.received for now in lamps)
+        return np.asarray(sum(parts) / len(lamps))
 
     def entering(
         self, reflected: Array, now: Situation, x: Sequence[Vector] | None = None
@@ -62,4 +91,5 @@ class Model:
     def predicted(self, x: Sequence[Vector] | None = None) -> Array:
         """(n, 3) what the photos show."""
         now = self.situation(x)
-        return self.recorded(self.entering(self.reflected(now), now, x), now, x)
+        reflected = self.reflected(self.lamps(x))
+        return self.recorded(self.entering(reflected, now, x), now, x)

@@ -17,9 +17,12 @@ from numpy.typing import NDArray
 
 from .deviation import NORMAL, as_found
 from .effect import Effect
+from .equations import scores
+from .fitted import Fitted
 from .held_out import Unseen, predict_unseen
 from .model import Model
-from .solve import Fitted, fit, scores, slopes_of
+from .slopes import slopes_of
+from .solve import fit
 
 Array = NDArray[np.floating]
 Vector = NDArray[np.float64]

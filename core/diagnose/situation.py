@@ -33,6 +33,12 @@ class Situation:
         return cls(pixels, pixels.normal, pixels.light, pixels.irradiance, pixels.visible)
 
     @property
+    def moved(self) -> bool:
+        """Whether any direction is another one than the capture says."""
+        told = self.normal is self.pixels.normal and self.light is self.pixels.light
+        return not told or self.stretch is not None
+
+    @property
     def cos_i(self) -> Array:
         """(n,) never below 0."""
         return np.maximum(dot(self.normal, self.light), 0)

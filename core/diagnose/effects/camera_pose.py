@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effect import Array, Effect, Numbers, Setting
+from ..effect import Array, Effect, Numbers, Setting, felt_by
 from ..situation import Situation
 
 USUAL = 1.0  # pixels
@@ -36,6 +36,10 @@ class CameraPose(Effect):
     def numbers(self) -> Numbers:
         names = [f"photo {p + 1}, {way}" for p in self.photos for way in ("right", "down", "turn")]
         return Numbers.alike(names, "px", USUAL, -8.0, 8.0, step=0.01)
+
+    @property
+    def feels(self) -> NDArray[np.intp]:
+        return felt_by(self.photo, 3)
 
     def after(self, radiance: Array, now: Situation, x: np.ndarray) -> Array:
         right, down, turn = (x[k::3][self.photo] for k in range(3))

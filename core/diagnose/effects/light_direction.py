@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...angles.vectors import tangents
-from ..effect import Array, Effect, Numbers, Setting
+from ..effect import Array, Effect, Numbers, Setting, felt_by
 from ..situation import Situation
 
 USUAL = np.radians(3.0)
@@ -23,7 +24,7 @@ class LightDirection(Effect):
     names: tuple[str, ...]
     aside: Array
     other: Array
-    light: Array
+    light: NDArray[np.intp]
     cause = "light_direction"
 
     @classmethod
@@ -45,6 +46,10 @@ class LightDirection(Effect):
     def numbers(self) -> Numbers:
         names = [f"{name}, {way}" for name in self.names for way in ("first", "second")]
         return Numbers.alike(names, "rad", USUAL, -FARTHEST, FARTHEST)
+
+    @property
+    def feels(self) -> NDArray[np.intp]:
+        return felt_by(self.light, 2)
 
     def before(self, now: Situation, x: np.ndarray) -> Situation:
         moved = x[0::2, None] * self.aside + x[1::2, None] * self.other

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effect import Effect, Numbers, Setting
+from ..effect import Effect, Numbers, Setting, felt_by
 from ..situation import Situation
 
 USUAL = 0.1  # of the logarithm
@@ -32,8 +32,12 @@ class LightIntensity(Effect):
         names = [f"photo {p + 1}" for p in self.photos]
         return Numbers.alike(names, "ln", USUAL, -1.5, 1.5)
 
+    @property
+    def feels(self) -> NDArray[np.intp]:
+        return felt_by(self.photo, 1)
+
     def before(self, now: Situation, x: np.ndarray) -> Situation:
-        gain = np.exp(x - x.mean())[self.photo].astype(np.float32)
+        gain = np.exp(x)[self.photo].astype(np.float32)
         return replace(now, irradiance=now.irradiance * gain[:, None])
 
     def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:

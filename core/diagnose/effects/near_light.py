@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effect import Array, Effect, Numbers, Setting
+from ..effect import Array, Effect, Numbers, Setting, felt_by
 from ..situation import Situation
 from .light_direction import LightDirection
 
@@ -53,6 +53,10 @@ class NearLight(Effect):
             np.full(EACH * count, 1e-3),
             np.tile([START, 0.0, 0.0, 0.0], count),
         )  # fmt: skip
+
+    @property
+    def feels(self) -> NDArray[np.intp]:
+        return felt_by(self.from_afar.light, EACH)
 
     def nearness(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(lights,) sizes of the object over the distance."""

@@ -1,0 +1,58 @@
+"""A model with its residuals, and what they cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .model import Model
+
+Array = NDArray[np.floating]
+Vector = NDArray[np.float64]
+
+DEGREES = 4.0  # of freedom of the Student t
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """model at its optimum. deviation: (n, 3) of every pixel, fixed; shown: (n, 3) the prediction;
+    residual: (n, 3) what photos show more, in units of the deviation. cost: of the pixels, in nats,
+    the prior not counted."""
+
+    model: Model
+    deviation: Array
+    shown: Array
+    residual: Array
+    cost: float
+
+    @classmethod
+    def of(cls, model: Model, deviation: Array) -> Fitted:
+        """A model as it is."""
+        shown = model.predicted()
+        residual = (model.pixels.observed - shown) / deviation
+        return cls(model, deviation, shown, residual, float(robust(residual).sum()))
+
+    @property
+    def numbers(self) -> Vector:
+        """All numbers of all effects, one after the other."""
+        return np.concatenate([*self.model.x, np.zeros(0)])
+
+    @property
+    def whole(self) -> float:
+        """The cost with the prior's."""
+        brdfs = self.model.brdfs
+        usual = self.model.usual
+        prior = np.sum(brdfs.coefficients**2 / brdfs.variance) + np.sum((self.numbers / usual) ** 2)
+        return self.cost + 0.5 * float(prior)
+
+
+def robust(residual: Array) -> Array:
+    """Cost of residuals in units of their deviation, nats (Student t)."""
+    return (DEGREES + 1) / 2 * np.log1p(np.square(residual) / DEGREES)
+
+
+def weights(residual: Array) -> Array:
+    """Of the residuals' squares in Gauss–Newton."""
+    return (DEGREES + 1) / (DEGREES + np.square(residual))

@@ -1,0 +1,101 @@
+"""How a prediction changes with every unknown: coefficients, and the numbers of effects.
+
+A number may be felt by a part of the pixels only (those of a photo, of a patch of the surface).
+Numbers that no pixel feels together share a slot: they are moved at once for the difference
+quotient, and a row of the matrix holds a slot's entry once, in the column of its pixel's number.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from ..basis import mapping
+from .fitted import Fitted
+from .model import Model
+
+Array = NDArray[np.floating]
+
+RISE = 1e-3  # relative, for the slope of what the camera does
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Of n pixels, in units of their deviation. rho: (n, 3) ∂ prediction/∂ ln(ρ·cosMap + ε), by
+    which q, (n, k), is multiplied; x: (n, 3, s) ∂ prediction/∂ number, of the number in column
+    (n, s) of all count."""
+
+    rho: Array
+    q: Array
+    x: Array
+    column: NDArray[np.int32]
+    count: int
+
+    def matrix(self, rows: NDArray[np.intp], channel: int) -> csr_array:
+        """(r, count) by the numbers, of some pixels."""
+        slots = self.column.shape[1]
+        starts = np.arange(len(rows) + 1) * slots
+        values = self.x[rows, channel].ravel()
+        return csr_array((values, self.column[rows].ravel(), starts), shape=(len(rows), self.count))
+
+
+def slopes_of(fitted: Fitted) -> Slopes:
+    """At the model's present numbers."""
+    model, deviation = fitted.model, fitted.deviation
+    now = model.situation()
+    reflected, per_log, q = _reflected(model)
+    entering = model.entering(reflected, now)
+    recorded = model.recorded(entering, now)
+    grown = (1 + RISE) * entering
+    camera = (model.recorded(grown, now) - recorded) / np.where(entering > 0, RISE * entering, 1)
+    camera = np.where(entering > 0, camera, 1.0)
+    per_log = (per_log * camera / deviation).astype(np.float32)
+    x, column, first = [], [], 0
+    for place, effect in enumerate(model.effects):
+        feels = model.feels(place)
+        for slot in feels.T:
+            step = effect.numbers.step[slot[slot >= 0][0]] if (slot >= 0).any() else 1.0
+            moved = _moved(model, place, np.unique(slot[slot >= 0]), step)
+            slope = (moved - recorded) / (step * deviation)
+            x.append(np.where(slot[:, None] >= 0, slope, 0).astype(np.float32))
+            column.append(first + np.maximum(slot, 0))
+        first += len(effect.numbers)
+    n = len(model.pixels)
+    return Slopes(
+        per_log,
+        q,
+        np.stack(x, axis=2) if x else np.zeros((n, 3, 0), np.float32),
+        np.stack(column, axis=1).astype(np.int32) if x else np.zeros((n, 0), np.int32),
+        first,
+    )
+
+
+def _reflected(model: Model) -> tuple[Array, Array, Array]:
+    """((n, 3) the lamp's light reflected, (n, 3) its ∂/∂ ln(ρ·cosMap + ε), Q̂ (n, k)): means over
+    the lamp's parts where it has a size, of Q̂ as much as each part shows."""
+    brdfs, material = model.brdfs, model.pixels.material
+    parts = model.lamps()
+    reflected = per_log = shares = np.zeros(())
+    q = np.zeros((), np.float32)
+    for part in parts:
+        rows, weight = model.rows(part)
+        rho, received = brdfs.evaluate(part.angles, material), part.received
+        slope = (rho + mapping.EPSILON / weight[:, None]) * received / len(parts)
+        reflected = reflected + rho * received / len(parts)
+        if len(parts) == 1:
+            return reflected, slope, rows
+        per_log = per_log + slope
+        share = slope.mean(axis=1, dtype=np.float32)[:, None] + np.float32(1e-12)
+        shares, q = shares + share, q + share * rows
+    return reflected, per_log, q / shares
+
+
+def _moved(model: Model, place: int, numbers: NDArray[np.intp], step: float) -> Array:
+    """The prediction with some numbers of an effect a step on."""
+    x = list(model.x)
+    x[place] = x[place].copy()
+    x[place][numbers] += step
+    return model.predicted(x)
