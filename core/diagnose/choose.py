@@ -26,6 +26,7 @@ from ..light import Light
 from ..samples.reservoir import sample_hash
 from ..samples.take import light_surface
 from ..scan import Scan
+from .image_cells import cell_numbers
 from .pixels import Pixels
 
 Array = NDArray[np.float32]
@@ -172,7 +173,7 @@ def _with_photo(pixels: Pixels, photo: LitPhoto) -> Pixels:
         noise=np.maximum(variance, np.float32(1e-20)),
         slope=_slopes(flat, pixels.pixel, height, width),
         veil=_veil(photo.radiance, pixels),
-        block=_blocks(pixels),
+        block=cell_numbers(pixels.photo, pixels.x, pixels.y, BLOCKS),
     )
 
 
@@ -214,12 +215,3 @@ def _shrunk(channel: Array, step: int) -> Array:
         return channel
     cut = channel[:height, :width]
     return np.asarray(cut.reshape(height // step, step, width // step, step).mean(axis=(1, 3)))
-
-
-def _blocks(pixels: Pixels) -> NDArray[np.int32]:
-    """(n,) numbers: photo, then the square of it that a pixel is in."""
-    low_x, low_y = float(pixels.x.min()), float(pixels.y.min())
-    size = max(float(np.ptp(pixels.x)), float(np.ptp(pixels.y)), 1e-6) / BLOCKS
-    column = np.minimum(((pixels.x - low_x) / size).astype(np.int32), BLOCKS - 1)
-    row = np.minimum(((pixels.y - low_y) / size).astype(np.int32), BLOCKS - 1)
-    return np.asarray((pixels.photo.astype(np.int32) * BLOCKS + row) * BLOCKS + column, np.int32)

@@ -108,6 +108,8 @@ class Effect(ABC):
     """One cause of the vocabulary, made for the pixels that it is to explain."""
 
     cause: str
+    fine = False  # judged on small squares of the photos: only what is beside a place tells of it
+    credit = 1.0  # of its gain, where effects are compared
 
     @classmethod
     @abstractmethod
@@ -120,10 +122,27 @@ class Effect(ABC):
         """The unknowns."""
 
     @property
+    def patch(self) -> NDArray[np.intp] | None:
+        """(n,) of an effect whose numbers are many, each felt by a patch of pixels only: which
+        patch each is in, −1 none. Its numbers follow patch by patch."""
+        return None
+
+    @property
+    def freedom(self) -> int:
+        """How many things it can be."""
+        return len(self.numbers)
+
+    def loosened(self, brdfs: BRDFs) -> BRDFs:
+        """The BRDFs as free as the effect lets them be."""
+        return brdfs
+
+    @property
     def feels(self) -> NDArray[np.intp] | None:
         """(n, s) places of the numbers that each pixel feels, −1 none, such that none feels two of
         one slot; None: all pixels feel all numbers."""
-        return None
+        if self.patch is None:
+            return None
+        return felt_by(self.patch, len(self.numbers) // (int(self.patch.max()) + 1))
 
     def before(self, now: Situation, x: NDArray[np.float64]) -> Situation:
         """Surface and light with the effect."""

@@ -1,13 +1,15 @@
-"""The normal equations of coefficients and numbers, and what groups of pixels pull at numbers.
+"""The normal equations of coefficients and numbers.
 
-Coefficients of different channels and materials touch one another only through the numbers: the
-matrix is an arrow, and the coefficients are eliminated block by block (Schur complement). So the
-BRDF cannot swallow an effect, nor an effect the BRDF, without the other being offered the same.
+Coefficients of different channels and materials touch one another only through the numbers, and the
+numbers of different patches only through the rest: the matrix is an arrow with two wings, which are
+eliminated block by block (Schur complements). So the BRDF cannot swallow an effect, nor an effect
+the BRDF, without the other being offered the same.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,119 +21,190 @@ from .slopes import Slopes
 Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
 
+CHUNK = 4096  # rows at a time
 DENSE = 48  # numbers, up to which a full matrix is faster
 
 
 @dataclass(frozen=True)
+class Change:
+    """A step: of the coefficients (m, 3, k), of the numbers (p,), of the patches' (P · e,); and the
+    variances of the numbers."""
+
+    coefficients: Array
+    x: Vector
+    local: Vector
+    variance: Vector
+    local_variance: Vector
+
+
+@dataclass(frozen=True)
 class Equations:
-    """Sums over pixels. blocks: (m, 3, k, k) of each material's and channel's coefficients;
-    coupling: (m, 3, k, p); own: (p, p); pull: (m, 3, k); own_pull: (p,). Without the prior."""
+    """Sums over pixels, c for all coefficients, M = m · 3 · k. blocks: (m, 3, k, k) of each
+    material's and channel's coefficients; coupling: (M, p) of these with the numbers; own: (p, p).
+    pull: (M,); own_pull: (p,). Of the patches' numbers: local (P, e, e), local_coupling (M, P · e),
+    local_own (p, P · e), local_pull (P, e). Without the prior."""
 
     blocks: Array
     coupling: Array
     own: Array
     pull: Array
-    own_pull: Vector
+    own_pull: Array
+    local: Array
+    local_coupling: Array
+    local_own: Array
+    local_pull: Array
 
     @classmethod
     def of(cls, fitted: Fitted, slopes: Slopes, rows: NDArray[np.intp]) -> Equations:
         """Of some pixels."""
-        coefficients = fitted.model.brdfs.coefficients
-        m, _, k = coefficients.shape
-        p = slopes.count
-        blocks, coupling = np.zeros((m, 3, k, k)), np.zeros((m, 3, k, p))
-        own, pull, own_pull = np.zeros((p, p)), np.zeros((m, 3, k)), np.zeros(p)
+        m, _, k = fitted.model.brdfs.coefficients.shape
+        p, count, e = slopes.count, slopes.patches, slopes.local.shape[2]
+        many = count * e
+        blocks, pull = np.zeros((m, 3, k, k)), np.zeros((m, 3, k))
+        coupling, local_coupling = np.zeros((m, 3, k, p)), np.zeros((m, 3, k, many))
+        own, own_pull, local_own = np.zeros((p, p)), np.zeros(p), np.zeros((p, many))
+        local, local_pull = np.zeros((count, e, e)), np.zeros(many)
         material = fitted.model.pixels.material[rows]
         for index in range(m):
-            mine = rows[material == index]
-            if not len(mine):
-                continue
-            q = slopes.q[mine]
-            for c in range(3):
-                r = fitted.residual[mine, c].astype(np.float32)
-                root = np.sqrt(weights(r))
-                a = q * (slopes.rho[mine, c] * root)[:, None]
-                r = r * root
-                blocks[index, c] = a.T @ a
-                pull[index, c] = a.T @ r
-                if p:
-                    x = _scaled(slopes.matrix(mine, c), root)
-                    own += _square(x)
-                    coupling[index, c] = (x.T @ a).T
-                    own_pull += x.T @ r
-        return cls(blocks, coupling, own, pull, own_pull)
+            for mine in _chunks(rows[material == index]):
+                q = slopes.q[mine]
+                for c in range(3):
+                    r = fitted.residual[mine, c].astype(np.float32)
+                    root = np.sqrt(weights(r))
+                    a = q * (slopes.rho[mine, c] * root)[:, None]
+                    r = r * root
+                    blocks[index, c] += a.T @ a
+                    pull[index, c] += a.T @ r
+                    x = scaled(slopes.matrix(mine, c), root) if p else None
+                    if x is not None:
+                        own += _square(x)
+                        coupling[index, c] += (x.T @ a).T
+                        own_pull += x.T @ r
+                    if many:
+                        y = scaled(slopes.local_matrix(mine, c), root)
+                        local_coupling[index, c] += (y.T @ a).T
+                        local_pull += y.T @ r
+                        local += _by_patch(slopes, mine, c, root)
+                        if x is not None:
+                            local_own += (x.T @ y).toarray()
+        size = m * 3 * k
+        return cls(
+            blocks, coupling.reshape(size, p), own, pull.reshape(size), own_pull, local,
+            local_coupling.reshape(size, many), local_own, local_pull.reshape(count, e),
+        )  # fmt: skip
 
     def plus(self, other: Equations, times: float = 1.0) -> Equations:
         """With those of other pixels; times −1: without them."""
-        return Equations(
-            self.blocks + times * other.blocks,
-            self.coupling + times * other.coupling,
-            self.own + times * other.own,
-            self.pull + times * other.pull,
-            self.own_pull + times * other.own_pull,
-        )
+        names = [f.name for f in fields(self)]
+        return Equations(**{n: getattr(self, n) + times * getattr(other, n) for n in names})
 
-    def solved(self, fitted: Fitted) -> tuple[Array, Vector, Array]:
-        """(change of the coefficients (m, 3, k), of the numbers (p,), covariance (p, p) of these),
-        the prior included."""
+    def solved(self, fitted: Fitted) -> Change:
+        """The prior included; numbers that a bound holds stay."""
+        if len(self.local):
+            return self._solved_with_patches(fitted)
         model = fitted.model
         variance = model.brdfs.variance
         m, _, k = model.brdfs.coefficients.shape
-        own = self.own + np.diag(1 / model.usual**2)
-        right = self.own_pull - fitted.numbers / model.usual**2
-        pull = self.pull - model.brdfs.coefficients / variance
-        eliminated = {}
-        for index in range(m):
-            for c in range(3):
-                both = np.column_stack([self.coupling[index, c], pull[index, c]])
-                found = np.linalg.solve(self.blocks[index, c] + np.diag(1 / variance), both)
-                eliminated[index, c] = found
-                own = own - self.coupling[index, c].T @ found[:, :-1]
-                right = right - self.coupling[index, c].T @ found[:, -1]
-        free = _free(fitted, right)
+        usual = fitted.joined(lambda n: n.deviation)
+        own = self.own + np.diag(1 / usual**2)
+        right = self.own_pull - fitted.numbers / usual**2
+        pull = self.pull - (model.brdfs.coefficients / variance).ravel()
+        eliminated = []
+        for index, block in enumerate(self.blocks.reshape(-1, k, k)):
+            rows = slice(k * index, k * index + k)
+            both = np.column_stack([self.coupling[rows], pull[rows]])
+            found = np.linalg.solve(block + np.diag(1 / variance), both)
+            eliminated.append(found)
+            own = own - self.coupling[rows].T @ found[:, :-1]
+            right = right - self.coupling[rows].T @ found[:, -1]
+        free = np.flatnonzero(~_held(fitted, right))
         covariance = np.zeros_like(own)
         covariance[np.ix_(free, free)] = np.linalg.inv(own[np.ix_(free, free)])
         x = covariance @ right
-        change = np.zeros((m, 3, k))
-        for (index, c), found in eliminated.items():
-            change[index, c] = found[:, -1] - found[:, :-1] @ x
-        return change, x, covariance
+        change = np.stack([found[:, -1] - found[:, :-1] @ x for found in eliminated])
+        none = np.zeros(0)
+        return Change(change.reshape(m, 3, k), x, none, np.diag(covariance), none)
+
+    def _solved_with_patches(self, fitted: Fitted) -> Change:
+        """Patches eliminated first: what is left is full, but small."""
+        model = fitted.model
+        assert model.patchy is not None
+        numbers, y = model.effects[model.patchy].numbers, model.x[model.patchy]
+        m, _, k = model.brdfs.coefficients.shape
+        size, p = len(self.pull), len(self.own)
+        usual = fitted.joined(lambda n: n.deviation)
+        full = np.zeros((size + p, size + p))
+        for index, block in enumerate(self.blocks.reshape(-1, k, k)):
+            rows = slice(k * index, k * index + k)
+            full[rows, rows] = block + np.diag(1 / model.brdfs.variance)
+        full[:size, size:], full[size:, :size] = self.coupling, self.coupling.T
+        full[size:, size:] = self.own + np.diag(1 / usual**2)
+        coefficients = (model.brdfs.coefficients / model.brdfs.variance).ravel()
+        right = np.concatenate(
+            [self.pull - coefficients, self.own_pull - fitted.numbers / usual**2]
+        )
+        side = np.concatenate([self.local_coupling, self.local_own])  # (M + p, P · e)
+        pull = self.local_pull.ravel() - y / numbers.deviation**2
+        held = ((y <= numbers.low) & (pull <= 0)) | ((y >= numbers.high) & (pull >= 0))
+        side, pull = np.where(held, 0, side), np.where(held, 0, pull)
+        inverse = np.linalg.inv(self._local(numbers.deviation, held))
+        shape = (-1, *self.local.shape[:2])
+        lean = np.einsum("spe,pef->spf", side.reshape(shape), inverse).reshape(len(side), -1)
+        full -= lean @ side.T
+        right = right - lean @ pull
+        stuck = np.concatenate([np.zeros(size, bool), _held(fitted, right[size:])])
+        free = np.flatnonzero(~stuck)
+        covariance = np.zeros_like(full)
+        covariance[np.ix_(free, free)] = np.linalg.inv(full[np.ix_(free, free)])
+        z = covariance @ right
+        local = _blockwise(inverse, pull) - lean.T @ z
+        alone = np.einsum("pee->pe", inverse).ravel()
+        both = np.einsum("sy,st,ty->y", lean, covariance, lean, optimize=True)
+        spread = np.where(held, 0, alone + both)
+        return Change(
+            z[:size].reshape(m, 3, k), z[size:], np.where(held, 0, local),
+            np.diag(covariance)[size:], spread,
+        )  # fmt: skip
+
+    def _local(self, deviation: Vector, held: NDArray[np.bool_]) -> Array:
+        """(P, e, e) with the prior; what is held touches nothing."""
+        count, e, _ = self.local.shape
+        out = self.local.copy()
+        out[:, range(e), range(e)] += (1 / deviation**2).reshape(count, e)
+        stuck = held.reshape(count, e)
+        out = np.where(stuck[:, :, None] | stuck[:, None, :], 0, out)
+        out[:, range(e), range(e)] += stuck
+        return out
 
 
-def scores(fitted: Fitted, slopes: Slopes, of: NDArray[np.intp], last: int) -> tuple[Array, Array]:
-    """((b, last) what each group ``of`` pixels (n,) pulls at the last numbers, the part that all
-    other unknowns could follow taken out; (last, last) inverse of these numbers' information)."""
-    model, n = fitted.model, len(of)
-    whole = Equations.of(fitted, slopes, np.arange(n))
-    variance = model.brdfs.variance
-    groups = int(of.max()) + 1
-    own = whole.own + np.diag(1 / model.usual**2)
-    pull = np.zeros((groups, slopes.count))
-    for index in range(len(model.brdfs.coefficients)):
-        mine = np.flatnonzero(model.pixels.material == index)
-        one = (np.ones(len(mine), np.float32), of[mine], np.arange(len(mine) + 1))
-        member = csr_array(one, shape=(len(mine), groups)).T
-        for c in range(3):
-            block = whole.blocks[index, c] + np.diag(1 / variance)
-            projector = np.linalg.solve(block, whole.coupling[index, c])  # (k, p)
-            own = own - whole.coupling[index, c].T @ projector
-            r = fitted.residual[mine, c]
-            wr = (weights(r) * r).astype(np.float32)
-            x = slopes.matrix(mine, c)
-            pull += (member @ _scaled(x, wr)).toarray()
-            pull -= (member @ (slopes.q[mine] * (wr * slopes.rho[mine, c])[:, None])) @ projector
-    first = slopes.count - last
-    if first:
-        others = np.linalg.solve(own[:first, :first], own[:first, first:])
-        pull = pull[:, first:] - pull[:, :first] @ others
-        own = own[first:, first:] - own[first:, :first] @ others
-    return pull, np.linalg.inv(own)
-
-
-def _scaled(x: csr_array, by: Array) -> csr_array:
+def scaled(x: csr_array, by: Array) -> csr_array:
     """Rows of x (r, p) times by (r,)."""
     each = np.repeat(by, np.diff(x.indptr))
     return csr_array((x.data * each, x.indices, x.indptr), shape=x.shape)
+
+
+def _chunks(rows: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
+    """So many rows at a time as stay in a processor's cache."""
+    for start in range(0, len(rows), CHUNK):
+        yield rows[start : start + CHUNK]
+
+
+def _by_patch(slopes: Slopes, rows: NDArray[np.intp], channel: int, root: Array) -> Array:
+    """(P, e, e) sums of squares of the patches' own numbers."""
+    x = slopes.local[rows, channel] * root[:, None]
+    patch = np.maximum(slopes.patch[rows], 0)
+    e = x.shape[1]
+    out = np.empty((slopes.patches, e, e))
+    for i in range(e):
+        for j in range(e):
+            out[:, i, j] = np.bincount(patch, x[:, i] * x[:, j], slopes.patches)
+    return out
+
+
+def _blockwise(inverse: Array, pull: Vector) -> Vector:
+    """(P · e,) blocks (P, e, e) times a vector (P · e,)."""
+    count, e, _ = inverse.shape
+    return np.asarray(np.einsum("pef,pf->pe", inverse, pull.reshape(count, e)).ravel())
 
 
 def _square(x: csr_array) -> Array:
@@ -142,10 +215,8 @@ def _square(x: csr_array) -> Array:
     return np.asarray((x.T @ x).toarray())
 
 
-def _free(fitted: Fitted, pull: Vector) -> NDArray[np.intp]:
-    """Places of the numbers that are not held by a bound."""
-    bounds = [(e.numbers.low, e.numbers.high) for e in fitted.model.effects]
-    low = np.concatenate([b[0] for b in bounds] + [np.zeros(0)])
-    high = np.concatenate([b[1] for b in bounds] + [np.zeros(0)])
+def _held(fitted: Fitted, pull: Vector) -> NDArray[np.bool_]:
+    """(p,) whether a bound holds a number."""
+    low, high = fitted.joined(lambda n: n.low), fitted.joined(lambda n: n.high)
     x = fitted.numbers
-    return np.flatnonzero(~(((x <= low) & (pull <= 0)) | ((x >= high) & (pull >= 0))))
+    return np.asarray(((x <= low) & (pull <= 0)) | ((x >= high) & (pull >= 0)))

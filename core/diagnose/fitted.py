@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .effect import Numbers
 from .model import Model
 
 Array = NDArray[np.floating]
@@ -34,18 +36,25 @@ class Fitted:
         residual = (model.pixels.observed - shown) / deviation
         return cls(model, deviation, shown, residual, float(robust(residual).sum()))
 
+    def joined(self, what: Callable[[Numbers], Vector]) -> Vector:
+        """(p,) of the numbers of all effects with few of them, one after the other."""
+        effects = self.model.effects
+        each = [what(effects[k].numbers) for k in self.model.everywhere]
+        return np.concatenate([*each, np.zeros(0)])
+
     @property
     def numbers(self) -> Vector:
-        """All numbers of all effects, one after the other."""
-        return np.concatenate([*self.model.x, np.zeros(0)])
+        """(p,) the same effects' numbers."""
+        return np.concatenate([*(self.model.x[k] for k in self.model.everywhere), np.zeros(0)])
 
     @property
     def whole(self) -> float:
         """The cost with the prior's."""
         brdfs = self.model.brdfs
-        usual = self.model.usual
-        prior = np.sum(brdfs.coefficients**2 / brdfs.variance) + np.sum((self.numbers / usual) ** 2)
-        return self.cost + 0.5 * float(prior)
+        prior = float(np.sum(brdfs.coefficients**2 / brdfs.variance))
+        for effect, x in zip(self.model.effects, self.model.x, strict=True):
+            prior += float(np.sum((x / effect.numbers.deviation) ** 2))
+        return self.cost + 0.5 * prior
 
 
 def robust(residual: Array) -> Array:

@@ -13,23 +13,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .equations import Equations
+from .equations import Change, Equations
 from .fitted import Fitted, robust
+from .image_cells import cell_numbers
 from .slopes import Slopes, slopes_of
 
 Array = NDArray[np.floating]
 
 FOLDS = 5
+FINE = 18  # small squares along a photo's longer side
 
 
 @dataclass(frozen=True)
 class Unseen:
     """residual: (n, 3) of every pixel, predicted without its square's fold, in units of its
-    deviation. cost: (n,) nats. covariance: (p, p) of the effects' numbers."""
+    deviation. cost: (n,) nats. variance: of the numbers of each effect."""
 
     residual: Array
     cost: Array
-    covariance: Array
+    variance: tuple[Array, ...]
 
     @property
     def mean(self) -> float:
@@ -37,17 +39,20 @@ class Unseen:
         return float(self.cost.mean()) / self.residual.shape[1]
 
 
-def folds(fitted: Fitted) -> NDArray[np.int32]:
-    """(n,) fold of every pixel: squares in turn, so that every photo is in every fold."""
-    _, place = np.unique(fitted.model.pixels.block, return_inverse=True)
+def folds(fitted: Fitted, fine: bool = False) -> NDArray[np.int32]:
+    """(n,) fold of every pixel: squares at random, or fine ones, so that every photo is in every
+    fold."""
+    pixels = fitted.model.pixels
+    square = cell_numbers(pixels.photo, pixels.x, pixels.y, FINE) if fine else pixels.block
+    _, place = np.unique(square, return_inverse=True)
     shuffled = np.random.default_rng(0).permutation(int(place.max()) + 1 if len(place) else 0)
     return (shuffled[place.ravel()] % FOLDS).astype(np.int32)
 
 
-def predict_unseen(fitted: Fitted) -> Unseen:
-    """At an optimum."""
+def predict_unseen(fitted: Fitted, fine: bool = False) -> Unseen:
+    """At an optimum; fine: small squares are left out, whose neighbours stay."""
     slopes = slopes_of(fitted)
-    of = folds(fitted)
+    of = folds(fitted, fine)
     rows = [np.flatnonzero(of == f) for f in range(FOLDS)]
     parts = [Equations.of(fitted, slopes, r) for r in rows]
     whole = parts[0]
@@ -55,19 +60,25 @@ def predict_unseen(fitted: Fitted) -> Unseen:
         whole = whole.plus(part)
     residual = np.array(fitted.residual, np.float64)
     for part, mine in zip(parts, rows, strict=True):
-        change, x, _ = whole.plus(part, -1.0).solved(fitted)
-        residual[mine] -= _change(fitted, slopes, mine, change, x)
-    covariance = whole.solved(fitted)[2]
-    return Unseen(residual, robust(residual).sum(axis=1), covariance)
+        change = whole.plus(part, -1.0).solved(fitted)
+        residual[mine] -= _moved(fitted, slopes, mine, change)
+    last, model, variance, at = whole.solved(fitted), fitted.model, [], 0
+    for place, effect in enumerate(model.effects):
+        own = place == model.patchy
+        count = len(effect.numbers)
+        variance.append(last.local_variance if own else last.variance[at : at + count])
+        at += 0 if own else count
+    return Unseen(residual, robust(residual).sum(axis=1), tuple(variance))
 
 
-def _change(
-    fitted: Fitted, slopes: Slopes, rows: NDArray[np.intp], change: Array, x: Array
-) -> Array:
+def _moved(fitted: Fitted, slopes: Slopes, rows: NDArray[np.intp], change: Change) -> Array:
     """(r, 3) what the prediction changes by, in units of the deviation."""
     material = fitted.model.pixels.material[rows]
-    out = np.stack([slopes.matrix(rows, c) @ x for c in range(3)], axis=1)
-    for index in range(len(change)):
+    out = np.stack([slopes.matrix(rows, c) @ change.x for c in range(3)], axis=1)
+    if slopes.patches:
+        local = [slopes.local_matrix(rows, c) @ change.local for c in range(3)]
+        out += np.stack(local, axis=1)
+    for index, coefficients in enumerate(change.coefficients):
         mine = np.flatnonzero(material == index)
-        out[mine] += slopes.rho[rows[mine]] * (slopes.q[rows[mine]] @ change[index].T)
+        out[mine] += slopes.rho[rows[mine]] * (slopes.q[rows[mine]] @ coefficients.T)
     return np.asarray(out)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .brdfs import BRDFs
 from .effect import Effect
+from .fixed import Fixed
 from .pixels import Pixels
 from .situation import Situation
 
@@ -28,10 +29,30 @@ class Model:
     x: tuple[Vector, ...] = ()
     plain: dict[int, tuple[Array, Array]] = field(default_factory=dict)
 
+    def with_effect(self, effect: Effect) -> Model:
+        """One more effect, after the others. Of effects with numbers for each of many patches one
+        at a time is searched for: an earlier one stays as it was found."""
+        effects, x = list(self.effects), list(self.x)
+        if effect.patch is not None:
+            for k, other in enumerate(effects):
+                if other.patch is not None:
+                    effects[k], x[k] = Fixed(other, x[k]), np.zeros(0)
+        return replace(
+            self,
+            brdfs=effect.loosened(self.brdfs),
+            effects=(*effects, effect),
+            x=(*x, effect.numbers.begin),
+        )
+
     @property
-    def usual(self) -> Vector:
-        """(p,) deviations of the numbers of all effects, before a photo is seen."""
-        return np.concatenate([e.numbers.deviation for e in self.effects] + [np.zeros(0)])
+    def everywhere(self) -> list[int]:
+        """Places of the effects with few numbers."""
+        return [k for k, e in enumerate(self.effects) if e.patch is None]
+
+    @property
+    def patchy(self) -> int | None:
+        """Place of the effect with numbers for many patches, if there is one."""
+        return next((k for k, e in enumerate(self.effects) if e.patch is not None), None)
 
     def feels(self, place: int) -> NDArray[np.intp]:
         """(n, s) which of an effect's numbers each pixel feels, −1 none: one a slot."""

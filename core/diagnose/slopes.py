@@ -26,13 +26,17 @@ RISE = 1e-3  # relative, for the slope of what the camera does
 class Slopes:
     """Of n pixels, in units of their deviation. rho: (n, 3) ∂ prediction/∂ ln(ρ·cosMap + ε), by
     which q, (n, k), is multiplied; x: (n, 3, s) ∂ prediction/∂ number, of the number in column
-    (n, s) of all count."""
+    (n, s) of all count. local: (n, 3, e) ∂ prediction/∂ the numbers of a pixel's patch, (n,) −1
+    none, of so many patches."""
 
     rho: Array
     q: Array
     x: Array
     column: NDArray[np.int32]
     count: int
+    local: Array
+    patch: NDArray[np.intp]
+    patches: int
 
     def matrix(self, rows: NDArray[np.intp], channel: int) -> csr_array:
         """(r, count) by the numbers, of some pixels."""
@@ -40,6 +44,15 @@ class Slopes:
         starts = np.arange(len(rows) + 1) * slots
         values = self.x[rows, channel].ravel()
         return csr_array((values, self.column[rows].ravel(), starts), shape=(len(rows), self.count))
+
+    def local_matrix(self, rows: NDArray[np.intp], channel: int) -> csr_array:
+        """(r, patches · e) by the numbers of patches, of some pixels."""
+        e = self.local.shape[2]
+        column = np.maximum(self.patch[rows, None], 0) * e + np.arange(e)
+        return csr_array(
+            (self.local[rows, channel].ravel(), column.ravel(), np.arange(len(rows) + 1) * e),
+            shape=(len(rows), self.patches * e),
+        )
 
 
 def slopes_of(fitted: Fitted) -> Slopes:
@@ -53,24 +66,31 @@ def slopes_of(fitted: Fitted) -> Slopes:
     camera = (model.recorded(grown, now) - recorded) / np.where(entering > 0, RISE * entering, 1)
     camera = np.where(entering > 0, camera, 1.0)
     per_log = (per_log * camera / deviation).astype(np.float32)
-    x, column, first = [], [], 0
-    for place, effect in enumerate(model.effects):
-        feels = model.feels(place)
-        for slot in feels.T:
+
+    def by_slot(place: int) -> list[Array]:
+        effect = model.effects[place]
+        found = []
+        for slot in model.feels(place).T:
             step = effect.numbers.step[slot[slot >= 0][0]] if (slot >= 0).any() else 1.0
             moved = _moved(model, place, np.unique(slot[slot >= 0]), step)
             slope = (moved - recorded) / (step * deviation)
-            x.append(np.where(slot[:, None] >= 0, slope, 0).astype(np.float32))
-            column.append(first + np.maximum(slot, 0))
-        first += len(effect.numbers)
-    n = len(model.pixels)
-    return Slopes(
-        per_log,
-        q,
-        np.stack(x, axis=2) if x else np.zeros((n, 3, 0), np.float32),
-        np.stack(column, axis=1).astype(np.int32) if x else np.zeros((n, 0), np.int32),
-        first,
-    )
+            found.append(np.where(slot[:, None] >= 0, slope, 0).astype(np.float32))
+        return found
+
+    n, first = len(model.pixels), 0
+    x, column = [np.zeros((n, 3, 0), np.float32)], [np.zeros((n, 0), np.int32)]
+    for place in model.everywhere:
+        x += [slope[..., None] for slope in by_slot(place)]
+        column.append(first + np.maximum(model.feels(place), 0).astype(np.int32))
+        first += len(model.effects[place].numbers)
+    local, patch, patches = np.zeros((n, 3, 0), np.float32), np.full(n, -1), 0
+    if model.patchy is not None:
+        local = np.stack(by_slot(model.patchy), axis=2)
+        found = model.effects[model.patchy].patch
+        assert found is not None
+        patch, patches = found, int(found.max()) + 1
+    joined, columns = np.concatenate(x, axis=2), np.concatenate(column, axis=1)
+    return Slopes(per_log, q, joined, columns, first, local, patch, patches)
 
 
 def _reflected(model: Model) -> tuple[Array, Array, Array]:

@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .equations import Equations
+from .equations import Change, Equations
 from .fitted import Fitted
 from .model import Model
 from .slopes import slopes_of
 
 Array = NDArray[np.floating]
-Vector = NDArray[np.float64]
 
 STEPS, HALVINGS = 25, 5
 SETTLED = 1e-4  # of the cost
@@ -34,23 +33,24 @@ def fit(model: Model, deviation: Array, steps: int = STEPS) -> Fitted:
 def _stepped(now: Fitted) -> Fitted:
     """A Gauss–Newton step, shortened until it helps; numbers stay within their bounds."""
     everything = np.arange(len(now.residual))
-    change, x, _ = Equations.of(now, slopes_of(now), everything).solved(now)
+    change = Equations.of(now, slopes_of(now), everything).solved(now)
     share = 1.0
     best = now
     for _ in range(HALVINGS):
-        best = Fitted.of(_with(now.model, share * change, share * x), now.deviation)
+        best = Fitted.of(_with(now.model, change, share), now.deviation)
         if best.whole < now.whole:
             break
         share /= 2
     return best
 
 
-def _with(model: Model, change: Array, x: Vector) -> Model:
-    brdfs = replace(model.brdfs, coefficients=model.brdfs.coefficients + change)
+def _with(model: Model, change: Change, share: float) -> Model:
+    coefficients = model.brdfs.coefficients + share * change.coefficients
+    brdfs = replace(model.brdfs, coefficients=coefficients)
     parts, at = [], 0
-    for effect, old in zip(model.effects, model.x, strict=True):
+    for place, (effect, old) in enumerate(zip(model.effects, model.x, strict=True)):
         numbers = effect.numbers
-        step = x[at : at + len(numbers)]
-        parts.append(np.clip(old + step, numbers.low, numbers.high))
-        at += len(numbers)
+        step = change.local if place == model.patchy else change.x[at : at + len(numbers)]
+        parts.append(np.clip(old + share * step, numbers.low, numbers.high))
+        at += 0 if place == model.patchy else len(numbers)
     return replace(model, brdfs=brdfs, x=tuple(parts))

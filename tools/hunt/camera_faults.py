@@ -39,6 +39,28 @@ def veiled(photos: list[Array], part: float) -> list[Array]:
     return out
 
 
+def smudged(photos: list[Array], where: Array, wide: float, depth: float) -> list[Array]:
+    """A soft dark spot at the same place of every photo; where: (2,), wide: parts of the width."""
+    height, width = photos[0].shape[:2]
+    y, x = np.mgrid[:height, :width] / width
+    r2 = (x - where[0]) ** 2 + (y - where[1] * height / width) ** 2
+    gain = 1 - min(depth, 0.95) * np.exp(-0.5 * r2 / wide**2)
+    return [p * gain[..., None] for p in photos]
+
+
+def striped(photos: list[Array], turn: float, period: float, depth: float) -> list[Array]:
+    """Stripes of a period in pixels."""
+    height, width = photos[0].shape[:2]
+    y, x = np.mgrid[:height, :width]
+    wave = np.cos(2 * np.pi * (x * np.cos(turn) + y * np.sin(turn)) / period)
+    return [p * (1 + min(depth, 0.95) * wave)[..., None] for p in photos]
+
+
+def balanced(photos: list[Array], which: int, gains: Array) -> list[Array]:
+    """One photo's channels times e to these gains (3,)."""
+    return [p * np.exp(gains) if k == which else p for k, p in enumerate(photos)]
+
+
 def with_noise(photos: list[Array], rng: np.random.Generator, well: float = 20_000) -> list[Array]:
     """Shot and read noise of a camera; the brightest percent is exposed to white."""
     white = max(float(np.percentile(p, 99)) for p in photos)

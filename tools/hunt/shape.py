@@ -9,6 +9,7 @@ import trimesh
 from ..demo_shape import Surface, vertex_normals
 
 LUMPS = 7
+BUMPS = 12
 
 
 def lumpy(seed: int, subdivisions: int = 6) -> Surface:
@@ -36,3 +37,15 @@ def lumpy(seed: int, subdivisions: int = 6) -> Surface:
 def _direction(rng: np.random.Generator) -> np.ndarray:
     v = rng.normal(size=3)
     return v / np.linalg.norm(v)
+
+
+def bumpy(surface: Surface, height: float, wave: float, seed: int) -> Surface:
+    """The same with bumps along its normals; wave: 1/length, of the coarsest."""
+    rng = np.random.default_rng(seed)
+    p = surface.points
+    rise = np.zeros(len(p))
+    for _ in range(BUMPS):
+        turns = 2 * np.pi * rng.uniform(0.5, 1.0) * wave
+        rise += np.sin(turns * (p @ _direction(rng)) + rng.uniform(0, 2 * np.pi))
+    points = p + height / np.sqrt(BUMPS / 2) * rise[:, None] * surface.normals
+    return Surface(points, surface.triangles, vertex_normals(points, surface.triangles))

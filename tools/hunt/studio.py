@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from patina.core.appearance.principled_fit import fit_principled
 from patina.core.basis import PrincipalBRDF
@@ -24,6 +25,7 @@ class HuntStudio(Studio):
         super().__init__(samples)
         self.scene.cycles.shading_system = True
         self.point: bpy.types.Object | None = None
+        self.disc: bpy.types.Object | None = None
 
     def shape(self, surface: Surface) -> None:
         """Put the object there."""
@@ -47,6 +49,69 @@ class HuntStudio(Studio):
         self.point.data.energy = 4 * np.pi**2 * irradiance / np.pi * distance**2
         self.point.location = position
         self.lamp.hide_render = True
+
+    def dress_part(self, material: bpy.types.Material, where: Array) -> None:
+        """Another material where points (v,) are true; the first stays elsewhere."""
+        mesh = self.body.data
+        mesh.materials.append(material)
+        corner = np.empty(len(mesh.loops), np.int32)
+        mesh.loops.foreach_get("vertex_index", corner)
+        index = np.all(where[corner.reshape(-1, 3)], axis=1).astype(np.int32)
+        mesh.polygons.foreach_set("material_index", index)
+
+    def matte(self, colour: Array) -> bpy.types.Material:
+        """A Lambertian one."""
+        return self._shader("ShaderNodeBsdfDiffuse", {"Color": (*colour, 1.0)})
+
+    def translucent(self, colour: Array, reach: float) -> bpy.types.Material:
+        """Light goes under the surface, scan units."""
+        material = self._shader(
+            "ShaderNodeSubsurfaceScattering",
+            {"Color": (*colour, 1.0), "Scale": reach, "Radius": (1.0, 0.6, 0.4)},
+        )
+        material.node_tree.nodes["Subsurface Scattering"].falloff = "BURLEY"
+        return material
+
+    def brushed(self, roughness: float, anisotropy: float) -> bpy.types.Material:
+        """A brushed metal, turned about the z axis."""
+        material = self._shader(
+            "ShaderNodeBsdfAnisotropic",
+            {"Color": (0.7, 0.65, 0.6, 1.0), "Roughness": roughness, "Anisotropy": anisotropy},
+        )
+        tree = material.node_tree
+        tangent = tree.nodes.new("ShaderNodeTangent")
+        tangent.direction_type, tangent.axis = "RADIAL", "Z"
+        shader = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeBsdfAnisotropic")
+        shader.distribution = "GGX"
+        tree.links.new(tangent.outputs[0], shader.inputs["Tangent"])
+        return material
+
+    def _shader(self, kind: str, values: dict) -> bpy.types.Material:
+        material = bpy.data.materials.new(kind)
+        material.use_nodes = True
+        tree = material.node_tree
+        tree.nodes.clear()
+        node = tree.nodes.new(kind)
+        for key, value in values.items():
+            if key in node.inputs:
+                node.inputs[key].default_value = value
+        output = tree.nodes.new("ShaderNodeOutputMaterial")
+        tree.links.new(node.outputs[0], output.inputs["Surface"])
+        return material
+
+    def occluder(self, at: Array, towards: Array, wide: float, high: float) -> None:
+        """A disc that casts a shadow and is not in the photos."""
+        if self.disc is None:
+            mesh = bpy.data.meshes.new("occluder")
+            turn = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+            points = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+            mesh.from_pydata(points.tolist(), [], [list(range(len(turn)))])
+            self.disc = bpy.data.objects.new("occluder", mesh)
+            self.scene.collection.objects.link(self.disc)
+            self.disc.visible_camera = False
+        self.disc.rotation_mode = "QUATERNION"
+        self.disc.rotation_quaternion = Vector(towards).to_track_quat("Z", "Y")
+        self.disc.location, self.disc.scale = at, (wide, high, 1.0)
 
     def room(self, radiance: float) -> None:
         """Even light from all around."""

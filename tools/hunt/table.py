@@ -18,14 +18,15 @@ SEEDS = 5
 def main() -> int:
     """Make and diagnose captures; prints a row each, then how many were right."""
     load_patina()
-    from .make import MAKERS
+    from .make import MAKERS, OUTSIDERS
 
     parser = argparse.ArgumentParser(prog="run.py hunt", description=__doc__)
     parser.add_argument("causes", nargs="*", help=f"of none, {', '.join(MAKERS)}; default: all")
     parser.add_argument("--strengths", type=float, nargs="+", default=STRENGTHS, metavar="RMS")
     parser.add_argument("--seeds", type=int, nargs="+", default=list(range(1, SEEDS + 1)))
     told = parser.parse_args()
-    unknown = [c for c in told.causes if c != "none" and c not in MAKERS]
+    known = {"none", *MAKERS, *OUTSIDERS}
+    unknown = [c for c in told.causes if not known.issuperset(c.split("+"))]
     if unknown:
         parser.error(f"nothing hides {unknown[0]!r}; there are none, {', '.join(MAKERS)}")
     print("| hidden | RMS change | seed | named | gain, standard errors | made | diagnosed |")

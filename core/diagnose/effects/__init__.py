@@ -5,14 +5,20 @@ from __future__ import annotations
 from ..effect import Effect, Setting
 from .ambient_light import AmbientLight
 from .anisotropy import Anisotropy
+from .area_light import AreaLight
 from .camera_pose import CameraPose
 from .camera_response import CameraResponse
+from .cast_shadow import CastShadow
 from .clipping import Clipping
 from .environment_reflection import EnvironmentReflection
 from .interreflection import Interreflection
 from .light_direction import LightDirection
 from .light_intensity import LightIntensity
 from .near_light import NearLight
+from .normal_error import NormalError
+from .outside_basis import OutsideBasis
+from .second_material import SecondMaterial
+from .subsurface import Subsurface
 from .veiling_glare import VeilingGlare
 from .vignetting import Vignetting
 
@@ -20,6 +26,7 @@ EFFECTS: tuple[type[Effect], ...] = (
     LightDirection,
     LightIntensity,
     NearLight,
+    AreaLight,
     AmbientLight,
     CameraResponse,
     Clipping,
@@ -29,6 +36,11 @@ EFFECTS: tuple[type[Effect], ...] = (
     Interreflection,
     EnvironmentReflection,
     Anisotropy,
+    NormalError,
+    SecondMaterial,
+    Subsurface,
+    CastShadow,
+    OutsideBasis,
 )
 
 

@@ -1,0 +1,85 @@
+"""The lamp has a size: highlights are wider, shadows end softly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...angles.vectors import tangents
+from ...geometry.view import cast_shadow
+from ..effect import Array, Effect, Numbers, Setting
+from ..situation import Situation
+
+RADII = np.radians([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 13.0])  # about the lamp's middle, of shadow rays
+AROUND = 8
+PARTS = 12  # of the lamp
+GOLDEN = np.pi * (3 - np.sqrt(5))
+USUAL, START = np.radians(6.0), np.radians(3.0)
+
+
+@dataclass(frozen=True)
+class AreaLight(Effect):
+    """numbers: the lamp's angular diameter. first, other: (n, 3) unit, across the light; free:
+    (n, r) part of a disc of RADII about its middle that the mesh does not hide; distant: (n,)."""
+
+    first: Array
+    other: Array
+    free: Array
+    distant: NDArray[np.bool_]
+    cause = "area_light"
+
+    @classmethod
+    def of(cls, setting: Setting) -> AreaLight | None:
+        pixels = setting.pixels
+        distant = setting.distant[setting.light[pixels.photo]]
+        if not distant.any():
+            return None
+        first, other = (v.astype(np.float32) for v in tangents(pixels.light))
+        ring = np.empty((len(pixels), len(RADII)))
+        ring[:, 0] = pixels.visible
+        for k, radius in enumerate(RADII[1:], start=1):
+            hidden = np.zeros(len(pixels))
+            for turn in 2 * np.pi * np.arange(AROUND) / AROUND:
+                aside = np.tan(radius) * (np.cos(turn) * first + np.sin(turn) * other)
+                towards = (pixels.light + aside) * np.float32(np.cos(radius))
+                hidden += cast_shadow(setting.rays, pixels.point, pixels.normal, towards, None)
+            ring[:, k] = 1 - hidden / AROUND
+        # of a disc: the integral of rings, linear between them
+        middle = 0.5 * (ring[:, 1:] + ring[:, :-1]) * np.diff(RADII**2)
+        free = ring.copy()
+        free[:, 1:] = np.cumsum(middle, axis=1) / RADII[1:] ** 2
+        return cls(first, other, free.astype(np.float32), distant)
+
+    @property
+    def numbers(self) -> Numbers:
+        return Numbers.alike(
+            ["angular diameter"], "rad", USUAL, 0.0, 2 * RADII[-1], step=2e-3, start=START
+        )
+
+    def lamps(self, now: Situation, x: np.ndarray) -> list[Situation]:
+        radius = np.clip(x[0] / 2, 0, RADII[-1])
+        if radius < 1e-5:
+            return [now]
+        k = min(int(np.searchsorted(RADII, radius, side="right")), len(RADII) - 1)
+        share = (radius - RADII[k - 1]) / (RADII[k] - RADII[k - 1])
+        free = (1 - share) * self.free[:, k - 1] + share * self.free[:, k]
+        visible = np.clip(now.visible + free - now.pixels.visible, 0, 1)
+        visible = np.where(self.distant, visible, now.visible)
+        parts = []
+        for part in range(PARTS):
+            out = np.tan(radius) * np.sqrt((part + 0.5) / PARTS)
+            turn = GOLDEN * part
+            aside = out * (np.cos(turn) * self.first + np.sin(turn) * self.other)
+            towards = now.light + np.where(self.distant[:, None], aside, 0).astype(np.float32)
+            towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+            parts.append(replace(now, light=towards, visible=visible))
+        return parts
+
+    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+        return (
+            f"the lamp is not a point: it is {np.degrees(x[0]):.1f}° wide as the object sees it, "
+            "so that highlights are wider and the edges of shadows softer than the material makes "
+            "them"
+        )

@@ -1,0 +1,62 @@
+"""Something that is not in the mesh cast a shadow: a tripod, a wall, what was not scanned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effect import Array, Effect, Numbers, Setting
+from ..image_cells import cell_numbers
+from ..situation import Situation
+
+ACROSS = 14  # squares along a photo's longer side in which the shadow is described
+USUAL = 0.4
+DARK = 0.3  # of the light, lost, from which a square counts as shadowed
+
+
+@dataclass(frozen=True)
+class CastShadow(Effect):
+    """numbers: for each small square of each photo the part of the light that is lost there,
+    negative. square: (n,) of each pixel; photo: (n,)."""
+
+    square: NDArray[np.intp]
+    photo: NDArray[np.int16]
+    cause = "cast_shadow"
+    fine = True
+    credit = 0.8
+
+    @classmethod
+    def of(cls, setting: Setting) -> CastShadow:
+        pixels = setting.pixels
+        number = cell_numbers(pixels.photo, pixels.x, pixels.y, ACROSS)
+        square = np.unique(number, return_inverse=True)[1].ravel()
+        return cls(square.astype(np.intp), pixels.photo)
+
+    @property
+    def patch(self) -> NDArray[np.intp]:
+        return self.square
+
+    @property
+    def numbers(self) -> Numbers:
+        names = [f"square {k + 1}" for k in range(int(self.square.max()) + 1)]
+        return Numbers.alike(names, "of the light", USUAL, -1.0, 0.0, step=-1e-2)
+
+    def lost(self, x: np.ndarray) -> Array:
+        """(n,) part of the light that does not arrive."""
+        return -x[self.square]
+
+    def before(self, now: Situation, x: np.ndarray) -> Situation:
+        return replace(now, visible=now.visible * (1 - self.lost(x)).astype(np.float32))
+
+    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+        dark = self.lost(x) > DARK
+        count = np.bincount(self.photo, minlength=1)
+        part = np.bincount(self.photo, dark, len(count)) / np.maximum(count, 1)
+        worst = int(np.argmax(part))
+        return (
+            "something that the mesh does not hold cast a shadow on the object: "
+            f"{100 * part[worst]:.0f} % of what photo {worst + 1} shows, in "
+            f"{int(np.sum(part > 0.01))} of {int(np.sum(count > 0))} photos"
+        )

@@ -1,0 +1,65 @@
+"""The mesh is smoother or rougher than the surface: its normals are off, patch by patch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...angles.vectors import tangents
+from ..effect import Array, Effect, Numbers, Setting
+from ..patches import surface_patches
+from ..situation import Situation
+
+USUAL = np.radians(2.0)
+FARTHEST = np.radians(25.0)
+
+
+@dataclass(frozen=True)
+class NormalError(Effect):
+    """numbers: for each patch of the surface the tangents of two angles that its normal is tilted
+    by, along ``first`` and ``other``, (n, 3) unit. parts: (n,) patch of each pixel, −1 none."""
+
+    parts: NDArray[np.intp]
+    first: Array
+    other: Array
+    cause = "normal_error"
+
+    @classmethod
+    def of(cls, setting: Setting) -> NormalError | None:
+        patch = surface_patches(setting)
+        known = np.flatnonzero(patch >= 0)
+        if not len(known):
+            return None
+        normal = setting.pixels.normal.astype(np.float64)
+        sums = [np.bincount(patch[known], normal[known, k]) for k in range(3)]
+        mean = np.stack(sums, axis=1).astype(np.float64)
+        mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9)
+        first, other = tangents(mean)
+        return cls(patch, first[patch].astype(np.float32), other[patch].astype(np.float32))
+
+    @property
+    def patch(self) -> NDArray[np.intp]:
+        return self.parts
+
+    @property
+    def numbers(self) -> Numbers:
+        count = int(self.parts.max()) + 1
+        names = [f"patch {k + 1}, {way}" for k in range(count) for way in ("first", "second")]
+        return Numbers.alike(names, "rad", USUAL, -FARTHEST, FARTHEST)
+
+    def before(self, now: Situation, x: np.ndarray) -> Situation:
+        tilt = np.where(self.parts[:, None] >= 0, x.reshape(-1, 2)[self.parts], 0.0)
+        tilt = tilt.astype(np.float32)
+        normal = now.normal + tilt[:, :1] * self.first + tilt[:, 1:] * self.other
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        return replace(now, normal=normal)
+
+    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+        angle = np.degrees(np.hypot(x[0::2], x[1::2]))
+        return (
+            "the mesh does not follow the surface: its normals are off by "
+            f"{np.median(angle):.1f}° in the median and {np.percentile(angle, 95):.1f}° in the "
+            "worst twentieth (too smooth a mesh, or a noisy one)"
+        )

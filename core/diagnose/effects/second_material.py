@@ -1,0 +1,54 @@
+"""Some parts of the surface are of another material: brighter, darker or of another colour."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effect import Effect, Numbers, Setting
+from ..patches import surface_patches
+from ..situation import Situation
+
+USUAL = 0.15
+OTHER = 0.08  # ln from the rest, from which a patch counts as another material
+
+
+@dataclass(frozen=True)
+class SecondMaterial(Effect):
+    """numbers: for each patch of the surface ln of how much more it reflects, red, green, blue.
+    parts: (n,) patch of each pixel, −1 none."""
+
+    parts: NDArray[np.intp]
+    cause = "second_material"
+
+    @classmethod
+    def of(cls, setting: Setting) -> SecondMaterial | None:
+        patch = surface_patches(setting)
+        return cls(patch) if (patch >= 0).any() else None
+
+    @property
+    def patch(self) -> NDArray[np.intp]:
+        return self.parts
+
+    @property
+    def numbers(self) -> Numbers:
+        count = int(self.parts.max()) + 1
+        names = [f"patch {k + 1}, {c}" for k in range(count) for c in ("red", "green", "blue")]
+        return Numbers.alike(names, "ln", USUAL, -3.0, 3.0)
+
+    def before(self, now: Situation, x: np.ndarray) -> Situation:
+        more = np.where(self.parts[:, None] >= 0, x.reshape(-1, 3)[self.parts], 0.0)
+        return replace(now, irradiance=now.irradiance * np.exp(more).astype(np.float32))
+
+    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+        more = x.reshape(-1, 3).mean(axis=1)
+        more = more - np.median(more)
+        other = np.abs(more) > OTHER
+        share = 100 * float(other.mean())
+        size = 100 * (np.exp(float(np.mean(np.abs(more[other])))) - 1) if other.any() else 0.0
+        return (
+            f"there is more than one material: {share:.0f} % of the surface reflects about "
+            f"{size:.0f} % more or less than the rest (paint a mask of it)"
+        )

@@ -1,0 +1,75 @@
+"""Structure that is left: what pixels miss is alike among neighbours, and no cause explains it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from .fitted import Fitted, robust
+from .image_cells import cell_numbers, cell_places
+
+Array = NDArray[np.floating]
+
+FINE, REACH = 18, 1.5  # cells along a photo's longer side; cells about a pixel that are looked at
+NEIGHBOURS = 48
+SURE = 3.0  # standard errors over squares
+LEAST = 0.012  # RMS of the photos that the structure amounts to
+SHRINK = 4.0  # neighbours' worth of doubt
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """gain: nats that a pixel's neighbours predict it better; error: over squares. change: RMS of
+    the structure, relative to the photos. structure: (n, 3) radiance that photos show more."""
+
+    gain: float
+    error: float
+    change: float
+    structure: Array
+    photo: NDArray[np.int16]
+
+    @property
+    def convincing(self) -> bool:
+        """Whether it is there."""
+        return self.gain > SURE * self.error and self.change > LEAST
+
+    def sentence(self) -> str:
+        """For an artist."""
+        strength = np.bincount(self.photo, np.sum(self.structure**2, axis=1))
+        part = strength / max(float(strength.sum()), 1e-30)
+        worst = int(np.argmax(part))
+        return (
+            f"something else is there, {100 * self.change:.1f} % of the photos' light, that no "
+            f"cause explains; photo {worst + 1} holds {100 * part[worst]:.0f} % of it"
+        )
+
+
+def leftover(fitted: Fitted) -> Leftover:
+    """What neighbours in a photo, of other small squares than a pixel's own, say about it."""
+    pixels = fitted.model.pixels
+    n = len(pixels)
+    column, row = cell_places(pixels.photo, pixels.x, pixels.y, FINE)
+    cell = cell_numbers(pixels.photo, pixels.x, pixels.y, FINE)
+    place = np.stack([column, row, 1e3 * pixels.photo], axis=1)
+    counted = np.flatnonzero(np.isfinite(fitted.deviation).all(axis=1))
+    near, which = cKDTree(place[counted]).query(
+        place, min(NEIGHBOURS, len(counted)), distance_upper_bound=REACH
+    )
+    there = np.isfinite(near)
+    which = counted[np.where(there, which, 0)]
+    weight = np.where(there & (cell[which] != cell[:, None]), np.exp(-near), 0.0)
+    # a pixel that is far off says little: the robust score, whose sum is what a shift gains
+    missed = np.clip(fitted.residual, -3, 3)
+    total = weight.sum(axis=1)
+    mean = np.stack([np.sum(weight * missed[which, c], axis=1) for c in range(3)], axis=1)
+    mean /= (total + SHRINK)[:, None]
+    gains = (robust(fitted.residual) - robust(fitted.residual - mean)).sum(axis=1)
+    by_block = np.bincount(pixels.block, gains)[np.bincount(pixels.block) > 0]
+    structure = np.where(np.isfinite(fitted.deviation), mean * fitted.deviation, 0.0)
+    size = np.sqrt(np.sum(structure[counted] ** 2) / max(np.sum(fitted.shown[counted] ** 2), 1e-30))
+    spread = np.sqrt(np.sum((by_block - by_block.mean()) ** 2))
+    assert len(structure) == n
+    return Leftover(float(by_block.sum()), float(spread), float(size), structure, pixels.photo)

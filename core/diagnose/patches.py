@@ -1,0 +1,27 @@
+"""Small parts of the surface, each seen by several photos."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .effect import Setting
+
+ACROSS = 24  # patches over the object's size
+FEWEST = 12  # pixels that say something of a patch
+
+
+def surface_patches(setting: Setting, across: int = ACROSS) -> NDArray[np.intp]:
+    """(n,) number of each pixel's patch: cubes of space, the two sides of a thin wall apart; −1 of
+    patches that too few pixels show."""
+    pixels = setting.pixels
+    place = np.floor((pixels.point - setting.centre) / (setting.size / across)).astype(np.int64)
+    axis = np.abs(pixels.normal).argmax(axis=1)
+    side = np.take_along_axis(pixels.normal, axis[:, None], axis=1)[:, 0] > 0
+    place -= place.min(axis=0)
+    wide = place.max(axis=0) + 1
+    key = ((place[:, 0] * wide[1] + place[:, 1]) * wide[2] + place[:, 2]) * 2 + side
+    _, of, count = np.unique(key, return_inverse=True, return_counts=True)
+    of = of.ravel()
+    number = np.where(count >= FEWEST, np.cumsum(count >= FEWEST) - 1, -1)
+    return np.asarray(number[of], np.intp)

@@ -1,0 +1,142 @@
+"""Effects of light and poses: a lamp that drifts, is near or large; a room, a bounce, a shadow."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .scene import IRRADIANCE, Hidden, Scene, Shot, moved, rms, sought
+from .studio import BOUNCES
+
+Array = np.ndarray
+
+WIDEST = np.radians(24.0)  # of a lamp
+NEAREST = 1.2  # 1 / distance
+
+
+def intensity(scene: Scene) -> Hidden:
+    """The lamp drifts from photo to photo."""
+    count = len(scene.shots)
+    drift = np.linspace(-1, 1, count) + 0.4 * scene.rng.standard_normal(count)
+    drift -= drift.mean()
+
+    def lit(size: float) -> list[Array]:
+        return [p * np.exp(size * d) for p, d in zip(scene.plain, drift, strict=True)]
+
+    size = sought(lambda s: rms(lit(s), scene.plain), 0.05, scene.strength)
+    numbers = {f"photo {k + 1}": size * d for k, d in enumerate(drift)}
+    return Hidden(lit(size), numbers, rms(lit(size), scene.plain))
+
+
+def _told(scene: Scene, told, start: float, name: str) -> Hidden:  # type: ignore[no-untyped-def]
+    """The capture says something else than what was photographed; told(size): its shots."""
+
+    def change(size: float) -> float:
+        return rms(scene.photographed(told(size)), scene.plain)
+
+    size = sought(change, start, scene.strength)
+    return Hidden(scene.plain, {name: size}, change(size), told=told(size))
+
+
+def direction(scene: Scene) -> Hidden:
+    """The capture file is told other directions than those of the photos."""
+    turns = [scene.rng.normal(size=3) for _ in range(len(scene.shots) // 2)]
+
+    def told(size: float) -> list[Shot]:
+        out = []
+        for place, shot in enumerate(scene.shots):
+            turn = np.cross(turns[place // 2], shot.light)
+            out.append(moved(shot, shot.light + np.tan(size) * turn / np.linalg.norm(turn)))
+        return out
+
+    return _told(scene, told, np.radians(1.0), "angle")
+
+
+def pose(scene: Scene) -> Hidden:
+    """The capture's cameras are turned a little, so that their photos lie beside the object."""
+    turns = [scene.rng.normal(size=2) for _ in scene.shots]
+
+    def told(size: float) -> list[Shot]:
+        out = []
+        for shot, turn in zip(scene.shots, turns, strict=True):
+            a, b = size * turn / shot.camera.focal
+            tilt = np.array([[1, 0, -a], [0, 1, -b], [a, b, 1.0]])
+            rotation = np.linalg.qr(tilt @ shot.camera.rotation)[0]
+            rotation *= np.sign(np.sum(rotation * shot.camera.rotation, axis=0))
+            eye = shot.camera.position
+            camera = replace(shot.camera, rotation=rotation, translation=-rotation @ eye)
+            out.append(replace(shot, camera=camera))
+        return out
+
+    return _told(scene, told, 0.3, "pixels")
+
+
+def near(scene: Scene) -> Hidden:
+    """A lamp without size that stands near, as bright at the object's centre."""
+
+    def lit(nearness: float) -> list[Array]:
+        out = []
+        for shot in scene.shots:
+            scene.studio.near(shot.light / max(nearness, 1e-3), IRRADIANCE, np.zeros(3))
+            out.append(scene.studio.photo(shot.camera))
+        return out
+
+    size = sought(lambda s: rms(lit(s), scene.plain), 0.1, scene.strength, most=NEAREST)
+    photos = lit(size)
+    return Hidden(photos, {"1 / distance": size}, rms(photos, scene.plain))
+
+
+def area(scene: Scene) -> Hidden:
+    """The lamp is a disc."""
+    scene.studio.noise_free(100)
+
+    def lit(size: float) -> list[Array]:
+        scene.studio.lamp.data.angle = size
+        return scene.photographed()
+
+    size = sought(lambda s: rms(lit(s), scene.plain), np.radians(4.0), scene.strength, 1.5, WIDEST)
+    photos = lit(size)
+    return Hidden(photos, {"angular diameter": size}, rms(photos, scene.plain))
+
+
+def room(scene: Scene) -> Hidden:
+    """Even light from all around."""
+    scene.studio.room(1.0)
+    scene.studio.noise_free(100)
+    return scene.in_part(scene.photographed(), "radiance", np.inf)
+
+
+def window(scene: Scene) -> Hidden:
+    """One bright spot of the room."""
+    at = scene.rng.normal(size=3)
+    at[2] = abs(at[2])
+    at /= np.linalg.norm(at)
+    scene.studio.window(at, 1.0, np.radians(scene.rng.uniform(15, 40)))
+    scene.studio.noise_free(128)
+    return scene.in_part(scene.photographed(), "radiance", np.inf)
+
+
+def bounced(scene: Scene) -> Hidden:
+    """Light goes from one part of the object to another."""
+    scene.studio.bounce(BOUNCES)
+    scene.studio.noise_free(100)
+    return scene.in_part(scene.photographed(), "part", 1.0)
+
+
+def shadow(scene: Scene) -> Hidden:
+    """Something stands between one light and the object, out of the photos."""
+    pair = int(scene.rng.integers(len(scene.shots) // 2)) * 2
+    light = scene.shots[pair].light
+    lit = scene.surface.points[scene.surface.normals @ light > 0.5]
+    at = lit[scene.rng.integers(len(lit))] + 1.5 * light
+    stretch = scene.rng.uniform(0.5, 2.0)
+
+    def photos(size: float) -> list[Array]:
+        scene.studio.occluder(at, light, size, size * stretch)
+        again = scene.photographed(scene.shots[pair : pair + 2])
+        return [*scene.plain[:pair], *again, *scene.plain[pair + 2 :]]
+
+    size = sought(lambda s: rms(photos(s), scene.plain), 0.1, scene.strength, most=1.0)
+    found = photos(size)
+    return Hidden(found, {"radius": size}, rms(found, scene.plain))

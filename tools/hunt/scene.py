@@ -1,0 +1,109 @@
+"""What is photographed, and how much an effect changes the photos."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.ndimage import maximum_filter, minimum_filter
+
+from patina.core.basis import PrincipalBRDF
+
+from ..demo_render import Camera
+from ..demo_shape import Surface
+from .studio import HuntStudio
+
+Array = np.ndarray
+
+IRRADIANCE = float(np.pi)
+TOLERANCE = 0.08  # of the wanted strength
+TRIES = 6
+WHITE = 99.5  # percentile of a photo, black about the object included
+
+
+@dataclass(frozen=True)
+class Shot:
+    """camera; light: (3,) surface → light."""
+
+    camera: Camera
+    light: Array
+
+
+@dataclass(frozen=True)
+class Scene:
+    """plain: the photos without an effect; strength: the wanted RMS change of them."""
+
+    studio: HuntStudio
+    surface: Surface
+    brdf: PrincipalBRDF
+    shots: list[Shot]
+    plain: list[Array]
+    strength: float
+    rng: np.random.Generator
+
+    def photographed(self, shots: list[Shot] | None = None) -> list[Array]:
+        """Photos of the studio as it is."""
+        out = []
+        for shot in self.shots if shots is None else shots:
+            self.studio.light(shot.light, IRRADIANCE)
+            out.append(self.studio.photo(shot.camera))
+        return out
+
+    def in_part(self, whole: list[Array], name: str, most: float, base=None) -> Hidden:  # type: ignore[no-untyped-def]
+        """Of light that adds up, as much as changes the photos by the wanted RMS. base: photos
+        without it, the plain ones."""
+        base = self.plain if base is None else base
+        size = min(most, self.strength / max(rms(whole, base), 1e-9))
+        photos = [p + size * (w - p) for p, w in zip(base, whole, strict=True)]
+        return Hidden(photos, {name: size}, rms(photos, base))
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """photos with an effect in them; numbers: of the effect; strength: RMS change as it came out.
+    told, surface: what the capture says of shots and mesh, None: the truth."""
+
+    photos: list[Array]
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    strength: float = 0.0
+    told: list[Shot] | None = None
+    surface: Surface | None = None
+
+
+def rms(photos: list[Array], plain: list[Array]) -> float:
+    """Of all photos at once, relative; up to what a camera would expose to white, and away from
+    outlines, where two renders of one thing differ by their sampling."""
+    white = max(float(np.percentile(b, WHITE)) for b in plain)
+    missed = size = 0.0
+    for photo, other in zip(photos, plain, strict=True):
+        a, b = np.minimum(photo, white), np.minimum(other, white)
+        level = b.max(axis=2)
+        high, low = maximum_filter(level, 3), minimum_filter(level, 3)
+        calm = ~maximum_filter((high - low > 0.3 * high) & (high > 0.02 * white), 5)
+        missed += float(np.sum((a - b)[calm] ** 2))
+        size += float(np.sum(b[calm] ** 2))
+    return (missed / size) ** 0.5
+
+
+def sought(
+    rms_of: Callable[[float], float],
+    start: float,
+    wanted: float,
+    power: float = 1.0,
+    most: float = np.inf,
+) -> float:
+    """The size at which the photos change by ``wanted``; rms grows about with a power of it."""
+    size = start
+    for _ in range(TRIES):
+        found = rms_of(size)
+        if abs(found / wanted - 1) < TOLERANCE or (size >= most and found < wanted):
+            break
+        size *= float(np.clip((wanted / max(found, 1e-9)) ** (1 / power), 0.1, 10))
+        size = min(size, most)
+    return size
+
+
+def moved(shot: Shot, light: Array) -> Shot:
+    """With another direction of light."""
+    return replace(shot, light=light / np.linalg.norm(light))

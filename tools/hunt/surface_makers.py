@@ -1,0 +1,132 @@
+"""Effects of the surface: bumps the mesh lacks, another material, light under it, a grain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from patina.core.basis import Basis, PrincipalBRDF
+
+from .drawn import any_brdf
+from .scene import Hidden, Scene, rms, sought
+from .shape import bumpy
+
+Array = np.ndarray
+
+LARGEST_BUMP = 0.03
+
+
+def normals(scene: Scene) -> Hidden:
+    """The surface has bumps that the mesh lacks, or the mesh has some that the surface lacks."""
+    seed, wave = int(scene.rng.integers(1 << 30)), scene.rng.uniform(9, 16)
+    rough = bool(scene.rng.random() < 0.5)
+
+    def photos(size: float) -> list[Array]:
+        scene.studio.shape(bumpy(scene.surface, size, wave, seed))
+        scene.studio.dress(scene.studio.measured(scene.brdf))
+        return scene.photographed()
+
+    size = sought(lambda s: rms(photos(s), scene.plain), 0.002, scene.strength, most=LARGEST_BUMP)
+    found = photos(size)
+    strength = rms(found, scene.plain)
+    if rough:
+        told = bumpy(scene.surface, size, wave, seed)
+        return Hidden(scene.plain, {"bumps": size}, strength, surface=told)
+    return Hidden(found, {"bumps": size}, strength)
+
+
+def second(scene: Scene) -> Hidden:
+    """Some of the surface is of a mixture with another measured material."""
+    _, other = any_brdf(scene.brdf.basis, scene.rng)
+    at = scene.rng.normal(size=3)
+    at /= np.linalg.norm(at)
+    part = scene.rng.uniform(0.15, 0.35)
+    reach = scene.surface.points @ at
+    border = np.quantile(reach, 1 - part)
+    scene.studio.dress_part(scene.studio.measured(other), reach > border)
+    return scene.in_part(scene.photographed(), "part", 1.0)
+
+
+def subsurface(scene: Scene) -> Hidden:
+    """Part of the light goes under the surface; without the effect it leaves where it falls."""
+    colour = scene.rng.uniform(0.4, 0.9, 3)
+    scene.studio.noise_free(256)
+    scene.studio.bounce(0)
+    scene.studio.dress(scene.studio.matte(colour))
+    matte = scene.photographed()
+    scene.studio.dress(scene.studio.translucent(colour, scene.rng.uniform(0.05, 0.15)))
+    deep = scene.photographed()
+    level = np.mean([p.mean() for p in scene.plain]) / np.mean([p.mean() for p in matte])
+    share = float(np.clip(_share(scene, matte, deep, level), 0, 1))
+
+    def mixed(what: list[Array]) -> list[Array]:
+        both = zip(scene.plain, what, strict=True)
+        return [(1 - share) * p + share * level * w for p, w in both]
+
+    found = mixed(deep)
+    return Hidden(found, {"part": share}, rms(found, mixed(matte)))
+
+
+def _share(scene: Scene, matte: list[Array], deep: list[Array], level: float) -> float:
+    def change(share: float) -> float:
+        share = min(share, 1.0)
+        base = [
+            (1 - share) * p + share * level * m for p, m in zip(scene.plain, matte, strict=True)
+        ]
+        more = [b + share * level * (d - m) for b, d, m in zip(base, deep, matte, strict=True)]
+        return rms(more, base)
+
+    return sought(change, 0.2, scene.strength, most=1.0)
+
+
+def brushed(scene: Scene) -> Hidden:
+    """Part of what is reflected is a brushed metal's."""
+    rough, stretch = scene.rng.uniform(0.25, 0.4), scene.rng.uniform(0.5, 0.8)
+    scene.studio.noise_free(100)
+    found = []
+    for anisotropy in (0.0, stretch):
+        scene.studio.dress(scene.studio.brushed(rough, anisotropy))
+        found.append(scene.photographed())
+    even, long = found
+    level = np.mean([p.mean() for p in scene.plain]) / np.mean([p.mean() for p in even])
+
+    def mixed(what: list[Array], share: float) -> list[Array]:
+        both = zip(scene.plain, what, strict=True)
+        return [(1 - share) * p + share * level * w for p, w in both]
+
+    size = sought(lambda s: rms(mixed(long, s), mixed(even, s)), 0.2, scene.strength, most=1.0)
+    photos = mixed(long, size)
+    return Hidden(photos, {"part": size, "stretch": stretch}, rms(photos, mixed(even, size)))
+
+
+def outside(scene: Scene) -> Hidden:
+    """The BRDF has a ring about its highlight, or sends light back where it came from."""
+    ring = bool(scene.rng.random() < 0.5)
+    middle = np.radians(scene.rng.uniform(12, 25) if ring else 0.0)
+
+    def photos(size: float) -> list[Array]:
+        scene.studio.dress(scene.studio.measured(_with_lobe(scene.brdf, ring, middle, size)))
+        return scene.photographed()
+
+    size = sought(lambda s: rms(photos(s), scene.plain), 0.2, scene.strength, most=2.5)
+    found = photos(size)
+    return Hidden(found, {"ring" if ring else "back": size}, rms(found, scene.plain))
+
+
+def _with_lobe(brdf: PrincipalBRDF, ring: bool, middle: float, size: float) -> PrincipalBRDF:
+    """ln ρ grows by ``size`` over a bump of θh, or of θd about 0."""
+    basis = brdf.basis
+    nodes = basis.grid.nodes()
+    at = nodes.theta_h if ring else nodes.theta_d
+    wide = np.radians(4.0 if ring else 7.0)
+    bump = np.exp(-0.5 * np.square((at - middle) / wide)).astype(np.float32)
+    bump = np.broadcast_to(bump, basis.grid.shape)
+    wider = _wider(basis, bump)
+    extra = np.full((3, 1), size)
+    return PrincipalBRDF(wider, np.concatenate([brdf.coefficients, extra], axis=1))
+
+
+def _wider(basis: Basis, component: Array) -> Basis:
+    components = np.concatenate([basis.components, component[None]])
+    return replace(basis, components=components, training=None)
