@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ from ..angles import Angles
 from ..basis import Basis, PrincipalBRDF, mapping
 from ..basis.log_table import LogTable
 from . import slack
+from .situation import Situation
 
 Array = NDArray[np.floating]
 
@@ -36,6 +37,14 @@ class BRDFs:
         variance = slack.variances(basis, slack.LITTLE)
         return cls(slack.with_slack(basis), coefficients, variance)
 
+    def tight(self) -> BRDFs:
+        """The same with nearly no slack; what it held is left out."""
+        variance = self.variance.copy()
+        variance[-slack.COUNT :] = slack.TINY**2
+        coefficients = self.coefficients.copy()
+        coefficients[..., -slack.COUNT :] = 0
+        return replace(self, coefficients=coefficients, variance=variance)
+
     @cached_property
     def tables(self) -> tuple[LogTable, ...]:
         """One a material."""
@@ -49,6 +58,15 @@ class BRDFs:
             if len(rows):
                 out[rows] = table.evaluate(Angles(*(a.take(rows) for a in angles)))
         return out
+
+    def reflected(self, now: Situation) -> Array:
+        """(n, 3) radiance of the lamp's light."""
+        return self.evaluate(now.angles, now.pixels.material) * now.received
+
+    def slope(self, now: Situation) -> Array:
+        """(n, 3) ∂ radiance/∂ ln(ρ·cosMap + ε)."""
+        rho = self.evaluate(now.angles, now.pixels.material)
+        return (rho + mapping.EPSILON / mapping.cos_map(now.angles)[:, None]) * now.received
 
     def rows(self, angles: Angles) -> tuple[Array, Array]:
         """(Q̂ (n, k), cosMap (n,)): ∂ρ/∂c = (ρ + ε / cosMap) Q̂."""

@@ -43,13 +43,18 @@ def asked(now: Fitted, effects: Sequence[Effect]) -> list[Asked]:
     signs = np.random.default_rng(1).choice([-1.0, 1.0], (DRAWS, int(of.max()) + 1))
     found, drawn = [], []
     for effect in effects:
-        if not len(effect.numbers) or effect.fine:  # nothing that signs of squares could tell
+        if not len(effect.numbers):
             found.append(Asked(effect, np.inf, 0.0))
             continue
         pulls, metric = _scores(now, effect, of)
+        if effect.fine:  # signs of squares tell nothing of what lies within one
+            value = float(_length(pulls.sum(axis=0)[None], metric)[0])
+            found.append(Asked(effect, (value - len(effect.numbers)) / 2, 0.0))
+            continue
         drawn.append(_length(signs @ pulls, metric))
         value = float(_length(pulls.sum(axis=0)[None], metric)[0])
-        found.append(Asked(effect, value / 2, float(_tail(drawn[-1], np.array([value]))[0])))
+        promised = (value - float(drawn[-1].mean())) / 2  # beyond what chance gives
+        found.append(Asked(effect, promised, float(_tail(drawn[-1], np.array([value]))[0])))
     if drawn:
         # each effect's own distribution makes effects of different freedom comparable
         luckiest = np.sort(np.min([_tail(d, d) for d in drawn], axis=0))
@@ -79,5 +84,5 @@ def _tail(draws: Vector, values: Vector) -> Vector:
 def _scores(now: Fitted, effect: Effect, of: NDArray[np.intp]) -> tuple[Array, Array]:
     """((b, p) each square's pull on the effect's numbers beyond what the rest of the model takes,
     (p, p) inverse of their information), at the model without the effect."""
-    wider = replace(now, model=now.model.with_effect(effect))
+    wider = replace(now, model=now.model.settled().with_effect(effect))
     return scores(wider, slopes_of(wider), of, len(effect.numbers))

@@ -18,7 +18,7 @@ from ..angles import half_difference
 from ..angles.vectors import dot
 from ..capture import Capture
 from ..errors import FitError
-from ..geometry import PixelRays, RayScene, Window, bands, edges, view_window
+from ..geometry import PixelRays, RayScene, SurfaceView, Window, bands, edges, view_window
 from ..job import inputs
 from ..job.lights import Lights
 from ..job.photos import LitPhoto, LitPhotos
@@ -31,7 +31,7 @@ from .pixels import Pixels
 
 Array = NDArray[np.float32]
 
-COUNT = 32_000  # pixels of all photos
+COUNT = 24_000  # pixels of all photos
 REACH = 8  # pixels from the edge of a shadow that are told apart
 HIGHLIGHT = np.radians(15.0)  # θh
 BLOCKS = 6  # parts of a photo along the longer side of what it shows of the object
@@ -140,6 +140,7 @@ def _of_band(
         noise=none,
         slope=np.zeros((n, 2, 3), np.float32),
         veil=none,
+        turn=_turns(view)[rows],
         usable=photo.usable.ravel().take(pixel),
         block=np.zeros(n, np.int32),
     )
@@ -175,6 +176,15 @@ def _with_photo(pixels: Pixels, photo: LitPhoto) -> Pixels:
         veil=_veil(photo.radiance, pixels),
         block=cell_numbers(pixels.photo, pixels.x, pixels.y, BLOCKS),
     )
+
+
+def _turns(view: SurfaceView) -> Array:
+    """(n, 2, 3) what the normal is more a pixel to the right and down; 0 at outlines."""
+    image = view.image(np.asarray(view.normal, np.float32))
+    out = np.zeros((*image.shape[:2], 2, 3), np.float32)
+    out[:, 1:-1, 0] = 0.5 * (image[:, 2:] - image[:, :-2])
+    out[1:-1, :, 1] = 0.5 * (image[2:] - image[:-2])
+    return np.nan_to_num(view.at(out.reshape(*out.shape[:2], 6))).reshape(-1, 2, 3)
 
 
 def _slopes(flat: Array, pixel: NDArray[np.int32], height: int, width: int) -> Array:

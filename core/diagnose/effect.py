@@ -121,11 +121,19 @@ class Effect(ABC):
     def numbers(self) -> Numbers:
         """The unknowns."""
 
+    def expecting(self, usual: NDArray[np.float64]) -> Effect:
+        """The same, where numbers of a patch (e,) usually have this deviation."""
+        return self
+
     @property
     def patch(self) -> NDArray[np.intp] | None:
         """(n,) of an effect whose numbers are many, each felt by a patch of pixels only: which
         patch each is in, −1 none. Its numbers follow patch by patch."""
         return None
+
+    def worth(self, x: NDArray[np.float64]) -> bool:
+        """Whether so much of it is worth a word."""
+        return True
 
     @property
     def freedom(self) -> int:

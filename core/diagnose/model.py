@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .brdfs import BRDFs
 from .effect import Effect
 from .fixed import Fixed
+from .footprint import CORNERS, Footprint, turned
 from .pixels import Pixels
 from .situation import Situation
 
@@ -20,29 +21,37 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Model:
-    """effects act in this order; x: the numbers of each. plain: rows of the basis at the directions
-    that the capture says, kept: most effects leave them as they are."""
+    """effects act in this order; x: the numbers of each. footprint: of the same pixels, given on
+    from model to model."""
 
     pixels: Pixels
     brdfs: BRDFs
     effects: tuple[Effect, ...] = ()
     x: tuple[Vector, ...] = ()
-    plain: dict[int, tuple[Array, Array]] = field(default_factory=dict)
+    footprint: Footprint | None = None
+
+    def __post_init__(self) -> None:
+        if self.footprint is None:
+            object.__setattr__(self, "footprint", Footprint(self.pixels))
 
     def with_effect(self, effect: Effect) -> Model:
         """One more effect, after the others. Of effects with numbers for each of many patches one
         at a time is searched for: an earlier one stays as it was found."""
-        effects, x = list(self.effects), list(self.x)
-        if effect.patch is not None:
-            for k, other in enumerate(effects):
-                if other.patch is not None:
-                    effects[k], x[k] = Fixed(other, x[k]), np.zeros(0)
+        before = self.settled() if effect.patch is not None else self
         return replace(
-            self,
+            before,
             brdfs=effect.loosened(self.brdfs),
-            effects=(*effects, effect),
-            x=(*x, effect.numbers.begin),
+            effects=(*before.effects, effect),
+            x=(*before.x, effect.numbers.begin),
         )
+
+    def settled(self) -> Model:
+        """With the numbers of patches as they are: no longer searched for."""
+        effects, x = list(self.effects), list(self.x)
+        if self.patchy is not None:
+            effects[self.patchy] = Fixed(effects[self.patchy], x[self.patchy])
+            x[self.patchy] = np.zeros(0)
+        return replace(self, effects=tuple(effects), x=tuple(x))
 
     @property
     def everywhere(self) -> list[int]:
@@ -72,25 +81,34 @@ class Model:
         return now
 
     def lamps(self, x: Sequence[Vector] | None = None) -> list[Situation]:
-        """The same for each of the equal parts of the lamp, where an effect gives it a size."""
+        """The same for each of the equal parts of the lamp, where an effect gives it a size; each
+        part then falls on another corner of the pixel."""
         parts = [self.situation(x)]
         for effect, numbers in zip(self.effects, self.x if x is None else x, strict=True):
             parts = [lamp for part in parts for lamp in effect.lamps(part, numbers)]
-        return parts
+        if len(parts) == 1:
+            return parts
+        return [turned(part, k % len(CORNERS)) for k, part in enumerate(parts)]
 
     def rows(self, now: Situation) -> tuple[Array, Array]:
         """(Q̂ (n, k), cosMap (n,)): ∂ρ/∂c = (ρ + ε / cosMap) Q̂."""
         if now.moved:
             return self.brdfs.rows(now.angles)
-        if 0 not in self.plain:
-            self.plain[0] = self.brdfs.rows(now.angles)
-        return self.plain[0]
+        assert self.footprint is not None
+        return self.footprint.plain_rows(self.brdfs, now)
+
+    def mean(self, lamps: Sequence[Situation], of: Callable[[Situation], Array]) -> Array:
+        """(n, 3) means over the lamp's parts and the pixel's."""
+        if len(lamps) > 1:
+            return np.asarray(sum(of(now) for now in lamps) / len(lamps))
+        assert self.footprint is not None
+        out = of(lamps[0])
+        out[self.footprint.wide] = self.footprint.mean(lamps[0], of)
+        return out
 
     def reflected(self, lamps: Sequence[Situation]) -> Array:
         """(n, 3) radiance of the lamp's light."""
-        material = self.pixels.material
-        parts = (self.brdfs.evaluate(now.angles, material) * now.received for now in lamps)
-        return np.asarray(sum(parts) / len(lamps))
+        return self.mean(lamps, self.brdfs.reflected)
 
     def entering(
         self, reflected: Array, now: Situation, x: Sequence[Vector] | None = None

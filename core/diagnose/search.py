@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from .chance import Asked, asked
 from .deviation import NORMAL, as_found
 from .effect import Effect
+from .effects.outside_basis import OutsideBasis
 from .fitted import Fitted
 from .fixed import Fixed
 from .held_out import Unseen, predict_unseen
@@ -27,11 +28,13 @@ Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
 
 CHANCE = 0.02  # of a false alarm, over all effects that are tried
-LEAST_CHANGE = 0.003  # RMS of the photos: less is not worth a word
+LEAST_CHANGE = 0.005  # RMS of the photos: less is not worth a word
+OUTSIDE = 0.008  # RMS of the photos that the slack beside the basis has to explain to be named
 MOST_EFFECTS = 4
 SURE = 3.0  # standard errors over squares that a gain is above 0
 NEARLY = 0.93  # of the best gain
-TRIED, PROMISING = 6, 0.25  # so many are fitted at least; and all that promise this of the best
+TRIED, PROMISING = 4, 0.25  # so many are fitted at least; and all that promise this of the best
+EXPECTATIONS = 1  # rounds in which patches say what is usual among them
 ALIKE = 2.0  # standard errors by which gains differ that the photos cannot tell apart
 
 
@@ -64,7 +67,7 @@ class Trial:
     def convincing(self) -> bool:
         """Whether it may be named."""
         sure = self.gain > SURE * self.error and self.chance < CHANCE
-        return sure and self.change > LEAST_CHANGE
+        return sure and self.change > LEAST_CHANGE and self.effect.worth(self.x)
 
     @property
     def place(self) -> int:
@@ -82,7 +85,8 @@ class Trial:
     @property
     def deviation(self) -> Vector:
         """Of the numbers, as the curvature says."""
-        return np.sqrt(self.unseen.variance[self.place])
+        variance = self.unseen.variance
+        return np.sqrt(variance[self.place]) if self.place < len(variance) else np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -142,8 +146,9 @@ def search(
             break
         accepted.append(best)
         now = best.fitted
-        left = [e for e in left if e is not best.effect]
+        left = [e for e in left if e.cause != best.effect.cause]
     now, kept = _missed(before, now, accepted)
+    kept = (*kept, *_outside(now))
     return Found(
         kept, tuple(rounds), before, now, predict_unseen(before), predict_unseen(now),
         _not_noise(before, expected), _not_noise(now, expected), leftover(now),
@@ -152,10 +157,10 @@ def search(
 
 def _promising(found: Sequence[Asked]) -> list[Asked]:
     """Worth a fit: those that promise most."""
-    finite = [a.gain for a in found if np.isfinite(a.gain)]
-    most = max(finite, default=0.0)
-    enough = sorted(finite)[-TRIED:][0] if finite else 0.0
-    return [a for a in found if a.gain >= min(enough, PROMISING * most)]
+    few = [a for a in found if a.effect.patch is None and np.isfinite(a.gain)]
+    most = max((a.gain for a in found if np.isfinite(a.gain)), default=0.0)
+    surely = [a.effect for a in few[:TRIED]]
+    return [a for a in found if a.gain >= PROMISING * most or a.effect in surely]
 
 
 def _not_noise(fitted: Fitted, expected: Array) -> float:
@@ -186,14 +191,49 @@ def _simplest(trials: Sequence[Trial]) -> Trial | None:
 def _try(now: Fitted, one: Asked) -> Trial:
     block = now.model.pixels.block
     fine = one.effect.fine
-    fitted = fit(now.model.with_effect(one.effect), now.deviation)
+    effect = one.effect
+    fitted = fit(now.model.with_effect(effect), now.deviation)
+    for _ in range(EXPECTATIONS if effect.patch is not None else 0):
+        effect = effect.expecting(_usual(fitted))
+        model = now.model.with_effect(effect)
+        fitted = fit(replace(model, brdfs=fitted.model.brdfs, x=fitted.model.x), now.deviation)
     predicted = predict_unseen(fitted, fine)
     gains = predict_unseen(now, fine).cost - predicted.cost
     counted = np.isfinite(now.deviation).all(axis=1)
     shown = fitted.shown[counted]
     change = np.sqrt(np.sum((shown - now.shown[counted]) ** 2) / max(np.sum(shown**2), 1e-30))
     by_block = np.bincount(block, gains).astype(np.float64)[np.bincount(block) > 0]
-    return Trial(one.effect, fitted, predicted, by_block, float(change), one.chance)
+    return Trial(effect, fitted, predicted, by_block, float(change), one.chance)
+
+
+def _outside(now: Fitted) -> list[Trial]:
+    """What the slack beside the basis gains: much of it means that no mixture of the measured
+    materials reflects so."""
+    model = now.model
+    if any(isinstance(e, OutsideBasis) for e in model.effects):
+        return []
+    tight = fit(replace(model, brdfs=model.brdfs.tight()), now.deviation)
+    unseen = predict_unseen(now)
+    gains = predict_unseen(tight).cost - unseen.cost
+    change = np.sqrt(np.sum((now.shown - tight.shown) ** 2) / np.sum(now.shown**2))
+    block = model.pixels.block
+    by_block = np.bincount(block, gains).astype(np.float64)[np.bincount(block) > 0]
+    said = replace(now, model=replace(model, effects=(*model.effects, OutsideBasis()),
+                                      x=(*model.x, np.zeros(0))))  # fmt: skip
+    trial = Trial(said.model.effects[-1], said, unseen, by_block, float(change), 0.0)
+    return [trial] if trial.convincing and change > OUTSIDE else []
+
+
+def _usual(fitted: Fitted) -> Vector:
+    """(e,) deviation of the numbers of patches as they are found: squares of what was found and of
+    what is not known of it (a step of expectation and maximisation)."""
+    model = fitted.model
+    assert model.patchy is not None
+    variance = predict_unseen(fitted).variance[model.patchy]
+    patch = model.effects[model.patchy].patch
+    assert patch is not None
+    each = (np.square(model.x[model.patchy]) + variance).reshape(int(patch.max()) + 1, -1)
+    return np.asarray(np.maximum(np.sqrt(each.mean(axis=0)), 1e-3))
 
 
 def _spread(by_block: Vector) -> float:

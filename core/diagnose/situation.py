@@ -32,6 +32,13 @@ class Situation:
         """As the capture says."""
         return cls(pixels, pixels.normal, pixels.light, pixels.irradiance, pixels.visible)
 
+    def select(self, rows: NDArray[np.intp], pixels: Pixels) -> Situation:
+        """At some of the pixels, which are given too."""
+        return Situation(
+            pixels, self.normal[rows], self.light[rows], self.irradiance[rows], self.visible[rows],
+            None if self.stretch is None else self.stretch[rows],
+        )  # fmt: skip
+
     @property
     def moved(self) -> bool:
         """Whether any direction is another one than the capture says."""

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from ..basis import mapping
 from .fitted import Fitted
 from .model import Model
 
 Array = NDArray[np.floating]
 
+FEW = 3  # parts of a lamp whose rows stand for all
 RISE = 1e-3  # relative, for the slope of what the camera does
 
 
@@ -95,21 +95,15 @@ def slopes_of(fitted: Fitted) -> Slopes:
 
 def _reflected(model: Model) -> tuple[Array, Array, Array]:
     """((n, 3) the lamp's light reflected, (n, 3) its ∂/∂ ln(ρ·cosMap + ε), Q̂ (n, k)): means over
-    the lamp's parts where it has a size, of Q̂ as much as each part shows."""
-    brdfs, material = model.brdfs, model.pixels.material
-    parts = model.lamps()
-    reflected = per_log = shares = np.zeros(())
-    q = np.zeros((), np.float32)
-    for part in parts:
-        rows, weight = model.rows(part)
-        rho, received = brdfs.evaluate(part.angles, material), part.received
-        slope = (rho + mapping.EPSILON / weight[:, None]) * received / len(parts)
-        reflected = reflected + rho * received / len(parts)
-        if len(parts) == 1:
-            return reflected, slope, rows
-        per_log = per_log + slope
-        share = slope.mean(axis=1, dtype=np.float32)[:, None] + np.float32(1e-12)
-        shares, q = shares + share, q + share * rows
+    the parts of lamp and pixel, of Q̂ over a few of them, as much as each shows."""
+    parts, brdfs = model.lamps(), model.brdfs
+    reflected, per_log = model.reflected(parts), model.mean(parts, brdfs.slope)
+    if len(parts) == 1:
+        return reflected, per_log, model.rows(parts[0])[0]
+    q = shares = np.zeros((), np.float32)
+    for part in parts[:: max(1, len(parts) // FEW)]:
+        share = brdfs.slope(part).mean(axis=1, dtype=np.float32)[:, None] + np.float32(1e-12)
+        shares, q = shares + share, q + share * model.rows(part)[0]
     return reflected, per_log, q / shares
 
 

@@ -89,13 +89,13 @@ def near(scene: Scene) -> Hidden:
 
 def area(scene: Scene) -> Hidden:
     """The lamp is a disc."""
-    scene.studio.noise_free(100)
 
     def lit(size: float) -> list[Array]:
         scene.studio.lamp.data.angle = size
         return scene.photographed()
 
-    size = sought(lambda s: rms(lit(s), scene.plain), np.radians(4.0), scene.strength, 1.5, WIDEST)
+    size = sought(lambda s: rms(lit(s), scene.plain), np.radians(8.0), scene.strength, 1.5, WIDEST)
+    scene.studio.noise_free(100)
     photos = lit(size)
     return Hidden(photos, {"angular diameter": size}, rms(photos, scene.plain))
 

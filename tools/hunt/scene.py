@@ -93,13 +93,18 @@ def sought(
     power: float = 1.0,
     most: float = np.inf,
 ) -> float:
-    """The size at which the photos change by ``wanted``; rms grows about with a power of it."""
-    size = start
+    """The size at which the photos change by ``wanted``; rms grows about with a power of it, which
+    is learnt on the way."""
+    size, last = start, None
     for _ in range(TRIES):
-        found = rms_of(size)
+        found = max(rms_of(size), 1e-9)
         if abs(found / wanted - 1) < TOLERANCE or (size >= most and found < wanted):
             break
-        size *= float(np.clip((wanted / max(found, 1e-9)) ** (1 / power), 0.1, 10))
+        if last is not None and abs(np.log(size / last[0])) > 0.02:
+            learnt = np.log(found / last[1]) / np.log(size / last[0])
+            power = float(np.clip(learnt, 0.4, 3.0))
+        last = (size, found)
+        size *= float(np.clip((wanted / found) ** (1 / power), 0.1, 10))
         size = min(size, most)
     return size
 

@@ -81,29 +81,26 @@ def _share(scene: Scene, matte: list[Array], deep: list[Array], level: float) ->
 
 
 def brushed(scene: Scene) -> Hidden:
-    """Part of what is reflected is a brushed metal's."""
-    rough, stretch = scene.rng.uniform(0.25, 0.4), scene.rng.uniform(0.5, 0.8)
-    scene.studio.noise_free(100)
-    found = []
-    for anisotropy in (0.0, stretch):
+    """A brushed metal under a matte coat of paint; without the effect it is not brushed."""
+    rough, shine = scene.rng.uniform(0.25, 0.45), scene.rng.uniform(0.1, 0.4)
+    scene.studio.dress(scene.studio.matte(scene.rng.uniform(0.1, 0.6, 3)))
+    matte = scene.photographed()
+
+    def photos(anisotropy: float) -> list[Array]:
         scene.studio.dress(scene.studio.brushed(rough, anisotropy))
-        found.append(scene.photographed())
-    even, long = found
-    level = np.mean([p.mean() for p in scene.plain]) / np.mean([p.mean() for p in even])
+        metal = scene.photographed()
+        return [(1 - shine) * p + shine * w for p, w in zip(matte, metal, strict=True)]
 
-    def mixed(what: list[Array], share: float) -> list[Array]:
-        both = zip(scene.plain, what, strict=True)
-        return [(1 - share) * p + share * level * w for p, w in both]
-
-    size = sought(lambda s: rms(mixed(long, s), mixed(even, s)), 0.2, scene.strength, most=1.0)
-    photos = mixed(long, size)
-    return Hidden(photos, {"part": size, "stretch": stretch}, rms(photos, mixed(even, size)))
+    plain = photos(0.0)
+    size = sought(lambda s: rms(photos(s), plain), 0.1, scene.strength, most=0.9)
+    found = photos(size)
+    return Hidden(found, {"anisotropy": size}, rms(found, plain))
 
 
 def outside(scene: Scene) -> Hidden:
-    """The BRDF has a ring about its highlight, or sends light back where it came from."""
+    """The BRDF has a ring about its highlight, or more at some angles between light and view."""
     ring = bool(scene.rng.random() < 0.5)
-    middle = np.radians(scene.rng.uniform(12, 25) if ring else 0.0)
+    middle = np.radians(scene.rng.uniform(12, 25))
 
     def photos(size: float) -> list[Array]:
         scene.studio.dress(scene.studio.measured(_with_lobe(scene.brdf, ring, middle, size)))
@@ -111,7 +108,7 @@ def outside(scene: Scene) -> Hidden:
 
     size = sought(lambda s: rms(photos(s), scene.plain), 0.2, scene.strength, most=2.5)
     found = photos(size)
-    return Hidden(found, {"ring" if ring else "back": size}, rms(found, scene.plain))
+    return Hidden(found, {"ring" if ring else "angle": size}, rms(found, scene.plain))
 
 
 def _with_lobe(brdf: PrincipalBRDF, ring: bool, middle: float, size: float) -> PrincipalBRDF:
@@ -119,7 +116,7 @@ def _with_lobe(brdf: PrincipalBRDF, ring: bool, middle: float, size: float) -> P
     basis = brdf.basis
     nodes = basis.grid.nodes()
     at = nodes.theta_h if ring else nodes.theta_d
-    wide = np.radians(4.0 if ring else 7.0)
+    wide = np.radians(4.0 if ring else 6.0)
     bump = np.exp(-0.5 * np.square((at - middle) / wide)).astype(np.float32)
     bump = np.broadcast_to(bump, basis.grid.shape)
     wider = _wider(basis, bump)

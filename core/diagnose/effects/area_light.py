@@ -16,6 +16,7 @@ RADII = np.radians([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 13.0])  # about the lamp's mid
 AROUND = 8
 PARTS = 12  # of the lamp
 GOLDEN = np.pi * (3 - np.sqrt(5))
+LEAST = np.radians(1.0)  # the sun itself is half a degree wide
 USUAL, START = np.radians(6.0), np.radians(3.0)
 
 
@@ -57,6 +58,9 @@ class AreaLight(Effect):
         return Numbers.alike(
             ["angular diameter"], "rad", USUAL, 0.0, 2 * RADII[-1], step=2e-3, start=START
         )
+
+    def worth(self, x: np.ndarray) -> bool:
+        return bool(x[0] > LEAST)
 
     def lamps(self, now: Situation, x: np.ndarray) -> list[Situation]:
         radius = np.clip(x[0] / 2, 0, RADII[-1])

@@ -13,6 +13,7 @@ from ..situation import Situation
 
 ACROSS = 14  # squares along a photo's longer side in which the shadow is described
 USUAL = 0.4
+LEAST = 0.004  # of all squares that are shadowed
 DARK = 0.3  # of the light, lost, from which a square counts as shadowed
 
 
@@ -23,6 +24,7 @@ class CastShadow(Effect):
 
     square: NDArray[np.intp]
     photo: NDArray[np.int16]
+    usual: tuple[float, ...] = (USUAL,)
     cause = "cast_shadow"
     fine = True
     credit = 0.8
@@ -41,7 +43,15 @@ class CastShadow(Effect):
     @property
     def numbers(self) -> Numbers:
         names = [f"square {k + 1}" for k in range(int(self.square.max()) + 1)]
-        return Numbers.alike(names, "of the light", USUAL, -1.0, 0.0, step=-1e-2)
+        alike = Numbers.alike(names, "of the light", 1.0, -1.0, 0.0, step=-1e-2)
+        deviation = np.tile(self.usual, len(names) // len(self.usual))
+        return replace(alike, deviation=deviation)
+
+    def expecting(self, usual: np.ndarray) -> Effect:
+        return replace(self, usual=tuple(usual.tolist()))
+
+    def worth(self, x: np.ndarray) -> bool:
+        return bool(np.mean(-x > DARK) > LEAST)
 
     def lost(self, x: np.ndarray) -> Array:
         """(n,) part of the light that does not arrive."""

@@ -24,6 +24,7 @@ class NormalError(Effect):
     parts: NDArray[np.intp]
     first: Array
     other: Array
+    usual: tuple[float, ...] = (USUAL,) * 2
     cause = "normal_error"
 
     @classmethod
@@ -47,7 +48,12 @@ class NormalError(Effect):
     def numbers(self) -> Numbers:
         count = int(self.parts.max()) + 1
         names = [f"patch {k + 1}, {way}" for k in range(count) for way in ("first", "second")]
-        return Numbers.alike(names, "rad", USUAL, -FARTHEST, FARTHEST)
+        alike = Numbers.alike(names, "rad", 1.0, -FARTHEST, FARTHEST)
+        deviation = np.tile(self.usual, len(names) // len(self.usual))
+        return replace(alike, deviation=deviation)
+
+    def expecting(self, usual: np.ndarray) -> Effect:
+        return replace(self, usual=tuple(usual.tolist()))
 
     def before(self, now: Situation, x: np.ndarray) -> Situation:
         tilt = np.where(self.parts[:, None] >= 0, x.reshape(-1, 2)[self.parts], 0.0)

@@ -12,7 +12,7 @@ from ..patches import surface_patches
 from ..situation import Situation
 
 USUAL = 0.15
-OTHER = 0.08  # ln from the rest, from which a patch counts as another material
+OTHER = 0.03  # ln from the rest, from which a patch counts as another material
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,7 @@ class SecondMaterial(Effect):
     parts: (n,) patch of each pixel, −1 none."""
 
     parts: NDArray[np.intp]
+    usual: tuple[float, ...] = (USUAL,) * 3
     cause = "second_material"
 
     @classmethod
@@ -36,7 +37,12 @@ class SecondMaterial(Effect):
     def numbers(self) -> Numbers:
         count = int(self.parts.max()) + 1
         names = [f"patch {k + 1}, {c}" for k in range(count) for c in ("red", "green", "blue")]
-        return Numbers.alike(names, "ln", USUAL, -3.0, 3.0)
+        alike = Numbers.alike(names, "ln", 1.0, -3.0, 3.0)
+        deviation = np.tile(self.usual, len(names) // len(self.usual))
+        return replace(alike, deviation=deviation)
+
+    def expecting(self, usual: np.ndarray) -> Effect:
+        return replace(self, usual=tuple(usual.tolist()))
 
     def before(self, now: Situation, x: np.ndarray) -> Situation:
         more = np.where(self.parts[:, None] >= 0, x.reshape(-1, 3)[self.parts], 0.0)
