@@ -126,10 +126,11 @@ def bounced(scene: Scene) -> Hidden:
 
 def shadow(scene: Scene) -> Hidden:
     """Something stands between one light and the object, out of the photos."""
-    pair = int(scene.rng.integers(len(scene.shots) // 2)) * 2
+    pair = int(scene.rng.integers(2)) * 2  # a light whose lit side the photos see
     light = scene.shots[pair].light
-    lit = scene.surface.points[scene.surface.normals @ light > 0.5]
-    at = lit[scene.rng.integers(len(lit))] + 1.5 * light
+    reach = scene.surface.points @ light
+    foremost = scene.surface.points[reach > np.quantile(reach, 0.9)]
+    at = foremost[scene.rng.integers(len(foremost))] + 1.5 * light
     stretch = scene.rng.uniform(0.5, 2.0)
 
     def photos(size: float) -> list[Array]:

@@ -13,7 +13,7 @@ from ..situation import Situation
 
 ACROSS = 14  # squares along a photo's longer side in which the shadow is described
 USUAL = 0.4
-LEAST = 0.004  # of all squares that are shadowed
+LEAST = 0.0012  # of all squares that are shadowed
 DARK = 0.3  # of the light, lost, from which a square counts as shadowed
 
 
