@@ -16,6 +16,7 @@ MODULES: tuple[str, ...] = (
     "operators.solve",
     "operators.masks",
     "operators.fit",
+    "operators.check",
     "operators.look_through",
     "operators.save_lights",
     "panels.sidebar",

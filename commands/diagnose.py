@@ -8,7 +8,6 @@ from ..core.capture import read_capture
 from ..core.job import FitJob, finished
 from ..core.job.diagnose_job import DiagnoseJob
 from ..core.report import diagnosis
-from ..core.report.page import page
 from . import capture_arguments
 from .progress import Progress
 from .solve import check_threads
@@ -28,14 +27,13 @@ def run(arguments: argparse.Namespace) -> None:
     job.drain(Progress(share=0.97))
     found, setting = finished(job.found), finished(job.setting)
     with staged_folder(out) as folder:
-        report = folder / "report"
-        report.mkdir()
-        html = page(arguments.capture.name, diagnosis.section(found, setting))
-        (report / "index.html").write_text(html, "utf-8")
+        diagnosis.write_pages(folder / "report", arguments.capture.name, found, setting)
         diagnosis.write(folder / "diagnosis.json", found)
     for trial in found.accepted:
-        print(f"{trial.effect.cause}: {trial.effect.sentence(trial.x, trial.deviation)}")
-    if not found.accepted:
+        print(f"{trial.effect.cause}: {trial.sentence()}")
+    if found.unexplained:
+        print(f"unknown: {found.left.sentence()}")
+    if not found.causes:
         print("none: nothing that can be named is wrong beyond noise and the scan's own errors")
     print(
         f"not noise: {100 * found.not_noise_before:.0f} % of what the prediction misses, "

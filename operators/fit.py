@@ -17,6 +17,19 @@ from ..scene.shadow_images import with_shadow_images
 from .stepped import Stepped
 
 
+def fit_job(operator: bpy.types.Operator, scene: bpy.types.Scene) -> FitJob:
+    """Of a scene's capture, with what the artist dragged and painted. Raises InputError where the
+    capture file is gone."""
+    path = Path(bpy.path.abspath(scene.patina.capture))
+    if not path.is_file():
+        raise InputError("is gone; import the capture again from where it is now", file=path)
+    capture, dragged = with_dragged_lamps(read_capture(path), scene)
+    if dragged:
+        operator.report({"INFO"}, f"lights as their lamps stand now: {', '.join(dragged)}")
+    capture, prepare = with_painted_slots(with_shadow_images(capture), scene)
+    return FitJob(capture, prepare=prepare)
+
+
 class PATINA_OT_fit(Stepped, bpy.types.Operator):
     """Measure the materials: sample every lit photo and fit a BRDF to each material"""
 
@@ -32,14 +45,7 @@ class PATINA_OT_fit(Stepped, bpy.types.Operator):
         return cls.idle(context)
 
     def _start(self, context: bpy.types.Context) -> None:
-        path = Path(bpy.path.abspath(context.scene.patina.capture))
-        if not path.is_file():
-            raise InputError("is gone; import the capture again from where it is now", file=path)
-        capture, dragged = with_dragged_lamps(read_capture(path), context.scene)
-        if dragged:
-            self.report({"INFO"}, f"lights as their lamps stand now: {', '.join(dragged)}")
-        capture, prepare = with_painted_slots(with_shadow_images(capture), context.scene)
-        self._job = FitJob(capture, prepare=prepare)
+        self._job = fit_job(self, context.scene)
         self._scene = context.scene.name  # by name: a reference does not survive undo
 
     def _finish(self, context: bpy.types.Context) -> None:

@@ -1,8 +1,6 @@
-"""The sidebar tab: Scan, Photos, Fit, Material, in the order of the work."""
+"""The sidebar tab: Scan, Photos, Fit, Check, Material, in the order of the work."""
 
 from __future__ import annotations
-
-import textwrap
 
 import bpy
 
@@ -11,10 +9,12 @@ from ..operators.look_through import lit_cameras
 from ..scene.apply import measured_materials
 from ..scene.fallback import osl_hindrance
 from ..scene.materials import REASON_PROPERTY
-from ..scene.properties import capture_path, stored_result
+from ..scene.properties import DIAGNOSIS, capture_path, stored_result
 from ..scene.running import running
+from .check_box import draw_check
 from .lamp_box import draw_lamp
 from .mask_box import draw_materials, draw_shadow
+from .wrapped import wrapped
 
 
 class _Stage:
@@ -85,7 +85,23 @@ class PATINA_PT_fit(_Stage, bpy.types.Panel):
                 box.label(text=f"BRDF: {known} in half of directions")
             box.label(text=f"{material['samples']['used']:,} samples")
             for warning in material["warnings"]:
-                _wrapped(box, warning, "ERROR")
+                wrapped(box, warning, "ERROR")
+
+
+class PATINA_PT_check(_Stage, bpy.types.Panel):
+    bl_idname = "PATINA_PT_check"
+    bl_label = "Check"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        if running(context.scene) is not None:
+            layout.label(text="Something is running", icon="SORTTIME")
+            return
+        layout.operator("patina.check", icon="VIEWZOOM")
+        diagnosis = stored_result(capture_path(context.scene), DIAGNOSIS)
+        if diagnosis is not None:
+            draw_check(layout, diagnosis)
 
 
 class PATINA_PT_material(_Stage, bpy.types.Panel):
@@ -105,18 +121,10 @@ class PATINA_PT_material(_Stage, bpy.types.Panel):
             portable = REASON_PROPERTY in material or hindrance is not None
             row.label(text="Portable" if portable else "Measured")
         for reason in sorted({*reasons} if reasons else {hindrance} - {None}):
-            _wrapped(layout, f"Not the measurement itself: {reason}", "INFO")
+            wrapped(layout, f"Not the measurement itself: {reason}", "INFO")
 
 
-def _wrapped(layout: bpy.types.UILayout, text: str, icon: str) -> None:
-    """A sentence over as many lines as the sidebar's usual width needs."""
-    column = layout.column(align=True)
-    column.scale_y = 0.8
-    for i, line in enumerate(textwrap.wrap(text, 36)):
-        column.label(text=line, icon=icon if i == 0 else "BLANK1")
-
-
-CLASSES = (PATINA_PT_scan, PATINA_PT_photos, PATINA_PT_fit, PATINA_PT_material)
+CLASSES = (PATINA_PT_scan, PATINA_PT_photos, PATINA_PT_fit, PATINA_PT_check, PATINA_PT_material)
 
 
 def register() -> None:

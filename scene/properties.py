@@ -8,7 +8,7 @@ from typing import Any
 
 import bpy
 
-TEXT_NAME = "Patina result"
+RESULT, DIAGNOSIS = "Patina result", "Patina diagnosis"  # names of texts
 CAPTURE = "patina_capture"  # on whatever was made from a capture: the file, absolute
 
 
@@ -33,18 +33,19 @@ class PatinaScene(bpy.types.PropertyGroup):
     )
 
 
-def store_result(capture: str, description: dict[str, Any]) -> None:
-    """Keep a fit's description (result.json) in the .blend, one text data-block a capture."""
-    text = _text(capture) or bpy.data.texts.new(TEXT_NAME)
+def store_result(capture: str, description: dict[str, Any], kind: str = RESULT) -> None:
+    """Keep what a fit (or a check) found in the .blend, as result.json (diagnosis.json) has it: one
+    text data-block a capture and kind."""
+    text = _text(capture, kind) or bpy.data.texts.new(kind)
     text[CAPTURE] = capture
     text.clear()
     text.write(json.dumps(description, indent=1))
     text.use_fake_user = True
 
 
-def stored_result(capture: str) -> dict[str, Any] | None:
-    """The description of the last fit of that capture in this .blend, or None."""
-    text = _text(capture)
+def stored_result(capture: str, kind: str = RESULT) -> dict[str, Any] | None:
+    """What the last fit (or check) of that capture in this .blend found, or None."""
+    text = _text(capture, kind)
     if text is None:
         return None
     try:
@@ -60,8 +61,9 @@ def capture_path(scene: bpy.types.Scene) -> str:
     return str(Path(bpy.path.abspath(told)).resolve()) if told else ""
 
 
-def _text(capture: str) -> bpy.types.Text | None:
-    return next((t for t in bpy.data.texts if t.get(CAPTURE) == capture), None)
+def _text(capture: str, kind: str) -> bpy.types.Text | None:
+    mine = (t for t in bpy.data.texts if t.get(CAPTURE) == capture)
+    return next((t for t in mine if t.name.startswith(kind)), None)
 
 
 def register() -> None:

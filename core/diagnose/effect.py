@@ -108,6 +108,7 @@ class Effect(ABC):
     """One cause of the vocabulary, made for the pixels that it is to explain."""
 
     cause: str
+    proof: str  # the photo that would tell it from others
     fine = False  # judged on small squares of the photos: only what is beside a place tells of it
     credit = 1.0  # of its gain, where effects are compared
 

@@ -18,6 +18,7 @@ class Fixed(Effect):
 
     inner: Effect
     x: NDArray[np.float64]
+    cause = proof = ""
 
     @classmethod
     def of(cls, setting: Setting) -> Effect | None:

@@ -42,11 +42,15 @@ class Unseen:
 def folds(fitted: Fitted, fine: bool = False) -> NDArray[np.int32]:
     """(n,) fold of every pixel: squares at random, or fine ones, so that every photo is in every
     fold."""
-    pixels = fitted.model.pixels
-    square = cell_numbers(pixels.photo, pixels.x, pixels.y, FINE) if fine else pixels.block
-    _, place = np.unique(square, return_inverse=True)
+    _, place = np.unique(squares(fitted, fine), return_inverse=True)
     shuffled = np.random.default_rng(0).permutation(int(place.max()) + 1 if len(place) else 0)
     return (shuffled[place.ravel()] % FOLDS).astype(np.int32)
+
+
+def squares(fitted: Fitted, fine: bool = False) -> NDArray[np.int32]:
+    """(n,) square of every pixel."""
+    pixels = fitted.model.pixels
+    return cell_numbers(pixels.photo, pixels.x, pixels.y, FINE) if fine else pixels.block
 
 
 def predict_unseen(fitted: Fitted, fine: bool = False) -> Unseen:

@@ -67,7 +67,7 @@ def leftover(fitted: Fitted) -> Leftover:
     mean = np.stack([np.sum(weight * missed[which, c], axis=1) for c in range(3)], axis=1)
     mean /= (total + SHRINK)[:, None]
     gains = (robust(fitted.residual) - robust(fitted.residual - mean)).sum(axis=1)
-    by_block = np.bincount(pixels.block, gains)[np.bincount(pixels.block) > 0]
+    by_block = np.bincount(cell, gains)[np.bincount(cell) > 0]
     structure = np.where(np.isfinite(fitted.deviation), mean * fitted.deviation, 0.0)
     size = np.sqrt(np.sum(structure[counted] ** 2) / max(np.sum(fitted.shown[counted] ** 2), 1e-30))
     spread = np.sqrt(np.sum((by_block - by_block.mean()) ** 2))

@@ -19,7 +19,7 @@ from .effect import Effect
 from .effects.outside_basis import OutsideBasis
 from .fitted import Fitted
 from .fixed import Fixed
-from .held_out import Unseen, predict_unseen
+from .held_out import Unseen, predict_unseen, squares
 from .leftover import Leftover, leftover
 from .model import Model
 from .solve import fit
@@ -34,6 +34,8 @@ MOST_EFFECTS = 4
 SURE = 3.0  # standard errors over squares that a gain is above 0
 NEARLY = 0.93  # of the best gain
 TRIED, PROMISING = 4, 0.25  # so many are fitted at least; and all that promise this of the best
+WORTH, UNLIKELY = 50.0, 0.05  # nats and chance of effects of patches that are fitted
+MINOR = 0.05  # of what accepted effects gained: less is more likely what their model lacks
 EXPECTATIONS = 1  # rounds in which patches say what is usual among them
 ALIKE = 2.0  # standard errors by which gains differ that the photos cannot tell apart
 
@@ -43,7 +45,7 @@ class Trial:
     """One effect added to a model. fitted: with it; unseen: its prediction of left-out squares.
     gain: nats that it predicts them better, by_block (b,) of each square; change: RMS of what it
     changes in the prediction, relative. chance: that all of it is chance, over all effects tried at
-    once. ties: causes that explain the photos as well."""
+    once. ties: effects that explain the photos as well."""
 
     effect: Effect
     fitted: Fitted
@@ -51,7 +53,7 @@ class Trial:
     by_block: Vector
     change: float
     chance: float
-    ties: tuple[str, ...] = ()
+    ties: tuple[Effect, ...] = ()
 
     @property
     def gain(self) -> float:
@@ -66,8 +68,23 @@ class Trial:
     @property
     def convincing(self) -> bool:
         """Whether it may be named."""
+        return self.sure and self.effect.worth(self.x)
+
+    @property
+    def sure(self) -> bool:
+        """Whether it is no chance, and may be named or stand for what has no name."""
         sure = self.gain > SURE * self.error and self.chance < CHANCE
-        return sure and self.change > LEAST_CHANGE and self.effect.worth(self.x)
+        told = self.effect.fine or self.effect.worth(self.x)
+        return sure and self.change > LEAST_CHANGE and told
+
+    def sentence(self) -> str:
+        """What it means, and what photo would tell it from what explains the photos as well."""
+        said = self.effect.sentence(self.x, self.deviation)
+        if not self.ties:
+            return said
+        others = " or ".join(e.cause for e in self.ties)
+        proofs = "; or ".join(dict.fromkeys(e.proof for e in (self.effect, *self.ties)))
+        return f"{said}. The photos cannot tell it from {others}; this would: {proofs}"
 
     @property
     def place(self) -> int:
@@ -118,7 +135,14 @@ class Found:
         """By the words of the vocabulary, in the order of acceptance; ``unknown`` for what is left
         of structure."""
         named = tuple(trial.effect.cause for trial in self.accepted)
-        return (*named, "unknown") if self.left.convincing else named
+        return (*named, "unknown") if self.unexplained else named
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether structure is left that no cause explains, and that is not merely what the model
+        of an accepted one lacks."""
+        gained = sum(trial.gain for trial in self.accepted)
+        return self.left.convincing and self.left.gain > MINOR * gained
 
 
 def search(
@@ -141,8 +165,9 @@ def search(
             yield (turn + (place + 1) / (len(promising) + 1)) / MOST_EFFECTS
         trials.sort(key=lambda t: -t.gain)
         rounds.append(tuple(trials))
-        best = _simplest([t for t in trials if t.convincing])
-        if best is None:
+        best = _simplest([t for t in trials if t.sure])
+        gained = sum(t.gain for t in accepted)
+        if best is None or not best.convincing or best.gain < MINOR * gained:
             break
         accepted.append(best)
         now = best.fitted
@@ -158,9 +183,15 @@ def search(
 def _promising(found: Sequence[Asked]) -> list[Asked]:
     """Worth a fit: those that promise most."""
     few = [a for a in found if a.effect.patch is None and np.isfinite(a.gain)]
-    most = max((a.gain for a in found if np.isfinite(a.gain)), default=0.0)
-    surely = [a.effect for a in few[:TRIED]]
-    return [a for a in found if a.gain >= PROMISING * most or a.effect in surely]
+    most = max((a.gain for a in few), default=0.0)
+    chosen = []
+    for one in found:
+        if one.effect.patch is not None:
+            worth = one.gain > WORTH and one.chance < UNLIKELY
+        else:
+            worth = one.gain >= PROMISING * most or any(one is f for f in few[:TRIED])
+        chosen += [one] if worth else []
+    return chosen
 
 
 def _not_noise(fitted: Fitted, expected: Array) -> float:
@@ -179,7 +210,7 @@ def _simplest(trials: Sequence[Trial]) -> Trial | None:
     enough = [t for t, w in zip(trials, worth, strict=True) if w > NEARLY * max(worth)]
     best = min(enough, key=lambda t: t.effect.freedom)
     same = [
-        t.effect.cause
+        t.effect
         for t in trials
         if t is not best
         and t.effect.freedom <= best.effect.freedom
@@ -189,8 +220,8 @@ def _simplest(trials: Sequence[Trial]) -> Trial | None:
 
 
 def _try(now: Fitted, one: Asked) -> Trial:
-    block = now.model.pixels.block
     fine = one.effect.fine
+    block = squares(now, fine)  # what is confined to a few large ones could never be sure
     effect = one.effect
     fitted = fit(now.model.with_effect(effect), now.deviation)
     for _ in range(EXPECTATIONS if effect.patch is not None else 0):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..basis import Basis
 
-THETA_H = np.radians([0.0, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 50.0, 90.0])
+THETA_H = np.radians([0.0, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0, 13.0, 17.0, 22.0, 30.0, 50.0, 90.0])
 THETA_D = np.radians([0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0])
 COUNT = len(THETA_H) * len(THETA_D)
 TINY, LITTLE, MUCH = 0.003, 0.05, 0.5  # of ln(ρ·cosMap + ε), at each node

@@ -8,9 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from ..diagnose import slack
 from ..diagnose.coordinates import coordinates, trend
 from ..diagnose.effect import Setting
+from ..diagnose.fitted import Fitted
 from ..diagnose.search import Found, Trial
+from ..photo import write_png
+from .page import page
+from .residual_picture import residual_picture
 from .result_json import program_version, write_json
 from .trend_chart import trend_chart
 
@@ -29,8 +34,25 @@ def describe(found: Found) -> dict[str, Any]:
         "baseline": {"held_out": found.unseen_before.mean, "not_noise": found.not_noise_before},
         "extended": {"held_out": found.unseen_after.mean, "not_noise": found.not_noise_after},
         "causes": [_cause(t, t in found.accepted) for t in found.ranked],
+        "left": {
+            "named": found.unexplained,
+            "gain": found.left.gain,
+            "standard_error": found.left.error,
+            "rms": found.left.change,
+            "sentence": found.left.sentence(),
+        },
+        "coefficients": {
+            "before": _coefficients(found.before),
+            "after": _coefficients(found.after),
+        },
         "tried": sorted(tried),
     }
+
+
+def _coefficients(fitted: Fitted) -> list[Any]:
+    """Of each material and channel, in the basis; the slack beside it is left out."""
+    brdfs = fitted.model.brdfs
+    return [c.round(6).tolist() for c in brdfs.coefficients[..., : -slack.COUNT]]
 
 
 def write(path: Path, found: Found) -> None:
@@ -43,7 +65,8 @@ def _cause(trial: Trial, accepted: bool) -> dict[str, Any]:
     return {
         "cause": trial.effect.cause,
         "accepted": accepted,
-        "sentence": trial.effect.sentence(trial.x, trial.deviation),
+        "sentence": trial.sentence(),
+        "ties": [effect.cause for effect in trial.ties],
         "held_out_gain": trial.gain,
         "standard_error": trial.error,
         "p_value": trial.chance,
@@ -57,12 +80,44 @@ def _cause(trial: Trial, accepted: bool) -> dict[str, Any]:
     }
 
 
+def write_pages(folder: Path, name: str, found: Found, setting: Setting) -> Path:
+    """index.html and pictures; name: the capture file's."""
+    folder.mkdir(parents=True, exist_ok=True)
+    html = page(name, section(found, setting) + _pictures(folder, found, setting))
+    (folder / "index.html").write_text(html, "utf-8")
+    return folder / "index.html"
+
+
+def _pictures(folder: Path, found: Found, setting: Setting) -> str:
+    """HTML: what each photo shows more than the prediction, before and after."""
+    pixels, rows = setting.pixels, []
+    fits = {"before": found.before, "after": found.after}
+    if not found.accepted:
+        fits = {"before": found.before}
+    for photo in np.unique(pixels.photo):
+        pictures = ""
+        for kind, fitted in fits.items():
+            file = f"residual_{photo:02d}_{kind}.png"
+            # both in the deviations of before: a picture may become paler, not its measure
+            residual = fitted.residual * (fitted.deviation / found.before.deviation)
+            write_png(folder / file, residual_picture(pixels, residual, int(photo)))
+            pictures += f"<img src='{file}' alt='{kind}'>"
+        rows.append(f"<figure>{pictures}<figcaption>photo {photo + 1}</figcaption></figure>")
+    what = "before and after" if found.accepted else "as it is"
+    return (
+        f"<h2>Where it is wrong, {what}</h2><p class='sub'><span class='key'></span> prediction "
+        "too dark … too bright, full colour at three times what such a pixel usually misses.</p>"
+        f"<div class='residuals'>{''.join(rows)}</div>"
+    )
+
+
 def section(found: Found, setting: Setting) -> str:
     """HTML: the ranking, then the residual along what betrays causes."""
+    left = f"<p>{escape(found.left.sentence())}</p>" if found.unexplained else ""
     rows = "".join(_row(t, t in found.accepted, found) for t in found.ranked)
     named = ", ".join(found.causes) or "nothing that can be named"
     return (
-        f"<h2>What is wrong</h2><p><b>{escape(named)}</b></p>"
+        f"<h2>What is wrong</h2><p><b>{escape(named)}</b></p>{left}"
         f"<p class='sub'>{100 * found.not_noise_before:.0f} % of what the prediction misses is "
         f"neither noise nor the scan's known errors; with what is named in the model "
         f"{100 * found.not_noise_after:.0f} %. A gain is what the model with a cause predicts "
@@ -77,7 +132,7 @@ def section(found: Found, setting: Setting) -> str:
 def _row(trial: Trial, accepted: bool, found: Found) -> str:
     sure = trial.gain / max(trial.error, 1e-9)
     width = int(np.clip(12 * sure, 0, 160))
-    said = trial.effect.sentence(trial.x, trial.deviation) if accepted else ""
+    said = trial.sentence() if accepted else ""
     style = "background:#2f6fb0" if accepted else "background:#bbb"
     return (
         f"<tr><th>{escape(trial.effect.cause)}</th><td>{sure:.1f}</td><td><div style='height:10px;"

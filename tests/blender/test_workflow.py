@@ -177,6 +177,25 @@ def test_the_fit_operator_gives_the_numbers_of_the_api() -> None:
     assert counts()["materials"] == before["materials"]
 
 
+def test_a_check_is_kept_and_shown_on_the_mesh() -> None:
+    path = made().make_capture(folder() / "ball", photos=4)
+    bpy.ops.patina.import_capture(filepath=str(path))
+    assert bpy.ops.patina.check() == {"FINISHED"}
+    said = json.loads(bpy.data.texts["Patina diagnosis"].as_string())
+    assert said["format"] == 1 and said["named"] and said["causes"]
+    stored = extension("scene.properties").stored_result
+    kind = extension("scene.properties").DIAGNOSIS
+    assert stored(str(path.resolve()), kind) == said
+    assert stored(str(path.resolve())) is None  # a check is no fit
+    mesh = bpy.context.scene.patina.mesh
+    layer = mesh.data.color_attributes["Patina: missed"]
+    assert len(layer.data) == len(mesh.data.vertices)
+    assert bpy.ops.patina.show_evidence(cause="missed") == {"FINISHED"}
+    assert mesh.data.color_attributes.active_color.name == "Patina: missed"
+    bpy.ops.patina.check()  # again: replaces, does not pile up
+    assert len([t for t in bpy.data.texts if t.name.startswith("Patina diagnosis")]) == 1
+
+
 def test_results_survive_saving_and_loading() -> None:
     path = made().make_capture(folder() / "ball", photos=3)
     bpy.ops.patina.import_capture(filepath=str(path))

@@ -116,7 +116,7 @@ def _with_lobe(brdf: PrincipalBRDF, ring: bool, middle: float, size: float) -> P
     basis = brdf.basis
     nodes = basis.grid.nodes()
     at = nodes.theta_h if ring else nodes.theta_d
-    wide = np.radians(4.0 if ring else 6.0)
+    wide = np.radians(2.0 if ring else 4.0)
     bump = np.exp(-0.5 * np.square((at - middle) / wide)).astype(np.float32)
     bump = np.broadcast_to(bump, basis.grid.shape)
     wider = _wider(basis, bump)

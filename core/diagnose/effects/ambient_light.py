@@ -18,6 +18,7 @@ class AmbientLight(Effect):
 
     reflected: Array
     cause = "ambient_light"
+    proof = "one photo with the lamp off"
 
     @classmethod
     def of(cls, setting: Setting) -> AmbientLight:

@@ -17,6 +17,7 @@ class Anisotropy(Effect):
 
     axes: Array
     cause = "anisotropy"
+    proof = "the object turned by 90° under the same light"
 
     @classmethod
     def of(cls, setting: Setting) -> Anisotropy:

@@ -30,6 +30,7 @@ class AreaLight(Effect):
     free: Array
     distant: NDArray[np.bool_]
     cause = "area_light"
+    proof = "a photo of the lamp from where the object stands"
 
     @classmethod
     def of(cls, setting: Setting) -> AreaLight | None:

@@ -25,6 +25,7 @@ class CameraPose(Effect):
     x: Array
     y: Array
     cause = "camera_pose"
+    proof = "the same photos aligned again, with more landmarks"
 
     @classmethod
     def of(cls, setting: Setting) -> CameraPose:

@@ -20,6 +20,7 @@ class CameraResponse(Effect):
 
     grey: float
     cause = "camera_response"
+    proof = "two photos of one view, one of them at half the exposure"
 
     @classmethod
     def of(cls, setting: Setting) -> CameraResponse:

@@ -26,6 +26,7 @@ class CastShadow(Effect):
     photo: NDArray[np.int16]
     usual: tuple[float, ...] = (USUAL,)
     cause = "cast_shadow"
+    proof = "a photo of everything that stands about the object, from the lamp"
     fine = True
     credit = 0.8
 

@@ -19,6 +19,7 @@ class Clipping(Effect):
 
     top: Array
     cause = "clipping"
+    proof = "one photo of each view at a quarter of the exposure"
 
     @classmethod
     def of(cls, setting: Setting) -> Clipping:

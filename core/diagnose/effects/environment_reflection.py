@@ -22,6 +22,7 @@ class EnvironmentReflection(Effect):
     directions: Array
     reflected: Array
     cause = "environment_reflection"
+    proof = "one photo with the lamp off"
 
     @classmethod
     def of(cls, setting: Setting) -> EnvironmentReflection:

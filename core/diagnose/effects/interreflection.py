@@ -18,6 +18,7 @@ class Interreflection(Effect):
 
     reflected: Array
     cause = "interreflection"
+    proof = "one photo with a black cloth over the parts that face the bright ones"
 
     @classmethod
     def of(cls, setting: Setting) -> Interreflection | None:

@@ -26,6 +26,7 @@ class LightDirection(Effect):
     other: Array
     light: NDArray[np.intp]
     cause = "light_direction"
+    proof = "a mirror ball beside the object in one photo under each light"
 
     @classmethod
     def of(cls, setting: Setting) -> LightDirection | None:

@@ -21,6 +21,7 @@ class LightIntensity(Effect):
     photos: tuple[int, ...]
     photo: NDArray[np.intp]
     cause = "light_intensity"
+    proof = "a grey card beside the object in every photo"
 
     @classmethod
     def of(cls, setting: Setting) -> LightIntensity | None:

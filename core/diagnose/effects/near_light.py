@@ -29,6 +29,7 @@ class NearLight(Effect):
     offset: Array
     size: float
     cause = "near_light"
+    proof = "the same photos with the lamp twice as far away"
 
     @classmethod
     def of(cls, setting: Setting) -> NearLight | None:

@@ -26,6 +26,7 @@ class NormalError(Effect):
     other: Array
     usual: tuple[float, ...] = (USUAL,) * 2
     cause = "normal_error"
+    proof = "a closer scan of a part of the surface"
 
     @classmethod
     def of(cls, setting: Setting) -> NormalError | None:

@@ -16,6 +16,7 @@ class OutsideBasis(Effect):
     """No numbers of its own: the slack beside the basis may be large."""
 
     cause = "outside_basis"
+    proof = "photos with light and camera at more angles to each other"
 
     @classmethod
     def of(cls, setting: Setting) -> OutsideBasis:

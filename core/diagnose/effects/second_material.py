@@ -23,6 +23,7 @@ class SecondMaterial(Effect):
     parts: NDArray[np.intp]
     usual: tuple[float, ...] = (USUAL,) * 3
     cause = "second_material"
+    proof = "a mask of the part that looks different, painted in one photo"
 
     @classmethod
     def of(cls, setting: Setting) -> SecondMaterial | None:

@@ -17,6 +17,7 @@ class VeilingGlare(Effect):
 
     veil: Array
     cause = "veiling_glare"
+    proof = "one photo with a hood on the lens and black behind the object"
 
     @classmethod
     def of(cls, setting: Setting) -> VeilingGlare:
