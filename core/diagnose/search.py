@@ -214,6 +214,7 @@ def _simplest(trials: Sequence[Trial]) -> Trial | None:
         for t in trials
         if t is not best
         and t.effect.freedom <= best.effect.freedom
+        and t.effect.fine == best.effect.fine
         and abs(t.gain - best.gain) < ALIKE * _spread(t.by_block - best.by_block)
     ]
     return replace(best, ties=tuple(same))
