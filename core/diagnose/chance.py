@@ -74,6 +74,8 @@ def _within(luckiest: Vector, own: float) -> float:
 
 def _tail(draws: Vector, values: Vector) -> Vector:
     """Part of the draws that is at least as large; beyond the largest, a gamma distribution's."""
+    if not draws.any():  # nothing pulls at all
+        return np.ones(len(values))
     ordered = np.sort(draws)
     part = 1.0 - np.searchsorted(ordered, values, side="left") / len(draws)
     mean, variance = float(draws.mean()), float(draws.var()) + 1e-30

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from patina.core.basis import Basis, PrincipalBRDF
+from patina.core.diagnose import chance
 from patina.core.diagnose import search as searching
 from patina.core.diagnose.brdfs import BRDFs
 from patina.core.diagnose.deviation import as_found, pixel_deviation
@@ -217,3 +218,8 @@ def test_patches_eliminated_first_are_the_same_optimum():
     assert len(found[0][2]) > 100
     for ours, theirs in zip(*found, strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=1e-3, atol=1e-5)
+
+
+def test_an_effect_that_nothing_asks_for_is_chance():
+    """A convex body lights nothing of itself: no pull, no draw, no division by it."""
+    assert chance._tail(np.zeros(10), np.zeros(2)).tolist() == [1, 1]
