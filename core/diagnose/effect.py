@@ -122,6 +122,12 @@ class Effect(ABC):
     def numbers(self) -> Numbers:
         """The unknowns."""
 
+    def guess(self, ratio: Array) -> NDArray[np.float64]:
+        """Where the search begins; ratio: (n, 3) of what the photos show over the model without
+        the effect, 1 where that is dark. What is far off counts as an outlier to a robust fit, and
+        would never be reached from afar."""
+        return self.numbers.begin
+
     def expecting(self, usual: NDArray[np.float64]) -> Effect:
         """The same, where numbers of a patch (e,) usually have this deviation."""
         return self

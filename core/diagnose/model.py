@@ -34,15 +34,16 @@ class Model:
         if self.footprint is None:
             object.__setattr__(self, "footprint", Footprint(self.pixels))
 
-    def with_effect(self, effect: Effect) -> Model:
-        """One more effect, after the others. Of effects with numbers for each of many patches one
-        at a time is searched for: an earlier one stays as it was found."""
+    def with_effect(self, effect: Effect, x: Vector | None = None) -> Model:
+        """One more effect, after the others; x: its numbers, None: where the search begins. Of
+        effects with numbers for each of many patches one at a time is searched for: an earlier one
+        stays as it was found."""
         before = self.settled() if effect.patch is not None else self
         return replace(
             before,
             brdfs=effect.loosened(self.brdfs),
             effects=(*before.effects, effect),
-            x=(*before.x, effect.numbers.begin),
+            x=(*before.x, effect.numbers.begin if x is None else x),
         )
 
     def settled(self) -> Model:

@@ -25,3 +25,12 @@ def surface_patches(setting: Setting, across: int = ACROSS) -> NDArray[np.intp]:
     of = of.ravel()
     number = np.where(count >= FEWEST, np.cumsum(count >= FEWEST) - 1, -1)
     return np.asarray(number[of], np.intp)
+
+
+def median_of(patch: NDArray[np.intp], values: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(p,) of each patch's pixels; patch: (n,) of each pixel, −1 none; values: (n,)."""
+    known = np.flatnonzero(patch >= 0)
+    order = known[np.lexsort((values[known], patch[known]))]
+    count = np.bincount(patch[known])
+    middle = np.cumsum(count) - count + count // 2
+    return np.asarray(values[order[np.minimum(middle, len(order) - 1)]], np.float64)

@@ -34,7 +34,8 @@ MOST_EFFECTS = 4
 SURE = 3.0  # standard errors over squares that a gain is above 0
 NEARLY = 0.93  # of the best gain
 TRIED, PROMISING = 4, 0.25  # so many are fitted at least; and all that promise this of the best
-WORTH, UNLIKELY = 50.0, 0.05  # nats and chance of effects of patches that are fitted
+WORTH, UNLIKELY = 50.0, 0.05  # nats (of shadows), chance of effects of patches that are fitted
+DIM = 0.02  # of the photos' bright pixels: darker ones give no ratio
 MINOR = 0.05  # of what accepted effects gained: less is more likely what their model lacks
 EXPECTATIONS = 1  # rounds in which patches say what is usual among them
 ALIKE = 2.0  # standard errors by which gains differ that the photos cannot tell apart
@@ -187,7 +188,8 @@ def _promising(found: Sequence[Asked]) -> list[Asked]:
     chosen = []
     for one in found:
         if one.effect.patch is not None:
-            worth = one.gain > WORTH and one.chance < UNLIKELY
+            # outliers promise little, however surely they are there
+            worth = one.chance < UNLIKELY and (one.gain > WORTH or not one.effect.fine)
         else:
             worth = one.gain >= PROMISING * most or any(one is f for f in few[:TRIED])
         chosen += [one] if worth else []
@@ -224,7 +226,7 @@ def _try(now: Fitted, one: Asked) -> Trial:
     fine = one.effect.fine
     block = squares(now, fine)  # what is confined to a few large ones could never be sure
     effect = one.effect
-    fitted = fit(now.model.with_effect(effect), now.deviation)
+    fitted = fit(now.model.with_effect(effect, effect.guess(_ratio(now))), now.deviation)
     for _ in range(EXPECTATIONS if effect.patch is not None else 0):
         effect = effect.expecting(_usual(fitted))
         model = now.model.with_effect(effect)
@@ -254,6 +256,13 @@ def _outside(now: Fitted) -> list[Trial]:
                                       x=(*model.x, np.zeros(0))))  # fmt: skip
     trial = Trial(said.model.effects[-1], said, unseen, by_block, float(change), 0.0)
     return [trial] if trial.convincing and change > OUTSIDE else []
+
+
+def _ratio(now: Fitted) -> Array:
+    """(n, 3) what the photos show over the prediction, 1 where that is dark or clipped."""
+    bright = now.shown > DIM * np.percentile(now.shown, 90)
+    seen = bright & np.isfinite(now.deviation)
+    return np.where(seen, now.model.pixels.observed / np.where(seen, now.shown, 1), 1.0)
 
 
 def _usual(fitted: Fitted) -> Vector:

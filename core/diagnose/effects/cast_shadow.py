@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..effect import Array, Effect, Numbers, Setting
 from ..image_cells import cell_numbers
+from ..patches import median_of
 from ..situation import Situation
 
 ACROSS = 14  # squares along a photo's longer side in which the shadow is described
@@ -50,6 +51,10 @@ class CastShadow(Effect):
 
     def expecting(self, usual: np.ndarray) -> Effect:
         return replace(self, usual=tuple(usual.tolist()))
+
+    def guess(self, ratio: Array) -> np.ndarray:
+        less = np.minimum(median_of(self.square, ratio.mean(axis=1)) - 1, 0)
+        return np.where(less < -DARK, np.maximum(less, -1), 0.0)
 
     def worth(self, x: np.ndarray) -> bool:
         return bool(np.mean(-x > DARK) > LEAST)
