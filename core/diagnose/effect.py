@@ -122,10 +122,10 @@ class Effect(ABC):
     def numbers(self) -> Numbers:
         """The unknowns."""
 
-    def guess(self, ratio: Array) -> NDArray[np.float64]:
-        """Where the search begins; ratio: (n, 3) of what the photos show over the model without
-        the effect, 1 where that is dark. What is far off counts as an outlier to a robust fit, and
-        would never be reached from afar."""
+    def guess(self, missed: Array, shown: Array) -> NDArray[np.float64]:
+        """Where the search begins; missed: (n, 3) what the photos show more than the model without
+        the effect, which predicts shown, (n, 3); 0 where that is dark. What is far off counts as an
+        outlier to a robust fit, and would never be reached from afar."""
         return self.numbers.begin
 
     def expecting(self, usual: NDArray[np.float64]) -> Effect:

@@ -226,7 +226,10 @@ def _try(now: Fitted, one: Asked) -> Trial:
     fine = one.effect.fine
     block = squares(now, fine)  # what is confined to a few large ones could never be sure
     effect = one.effect
-    fitted = fit(now.model.with_effect(effect, effect.guess(_ratio(now))), now.deviation)
+    fitted = fit(
+        now.model.with_effect(effect, effect.guess(_missed_where_bright(now), now.shown)),
+        now.deviation,
+    )
     for _ in range(EXPECTATIONS if effect.patch is not None else 0):
         effect = effect.expecting(_usual(fitted))
         model = now.model.with_effect(effect)
@@ -258,11 +261,11 @@ def _outside(now: Fitted) -> list[Trial]:
     return [trial] if trial.convincing and change > OUTSIDE else []
 
 
-def _ratio(now: Fitted) -> Array:
-    """(n, 3) what the photos show over the prediction, 1 where that is dark or clipped."""
+def _missed_where_bright(now: Fitted) -> Array:
+    """(n, 3) what the photos show more than the prediction, 0 where that is dark or clipped."""
     bright = now.shown > DIM * np.percentile(now.shown, 90)
     seen = bright & np.isfinite(now.deviation)
-    return np.where(seen, now.model.pixels.observed / np.where(seen, now.shown, 1), 1.0)
+    return np.where(seen, now.model.pixels.observed - now.shown, 0.0)
 
 
 def _usual(fitted: Fitted) -> Vector:

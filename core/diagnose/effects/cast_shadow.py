@@ -29,7 +29,7 @@ class CastShadow(Effect):
     cause = "cast_shadow"
     proof = "a photo of everything that stands about the object, from the lamp"
     fine = True
-    credit = 0.8
+    credit = 0.6
 
     @classmethod
     def of(cls, setting: Setting) -> CastShadow:
@@ -52,8 +52,13 @@ class CastShadow(Effect):
     def expecting(self, usual: np.ndarray) -> Effect:
         return replace(self, usual=tuple(usual.tolist()))
 
-    def guess(self, ratio: Array) -> np.ndarray:
-        less = np.minimum(median_of(self.square, ratio.mean(axis=1)) - 1, 0)
+    @property
+    def freedom(self) -> int:
+        return 10 * len(self.numbers)  # each photo has its own: nothing is as free
+
+    def guess(self, missed: Array, shown: Array) -> np.ndarray:
+        part = missed.sum(axis=1) / np.maximum(shown.sum(axis=1), 1e-30)
+        less = np.minimum(median_of(self.square, part), 0)
         return np.where(less < -DARK, np.maximum(less, -1), 0.0)
 
     def worth(self, x: np.ndarray) -> bool:

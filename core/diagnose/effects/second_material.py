@@ -7,30 +7,34 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..brdfs import BRDFs
 from ..effect import Array, Effect, Numbers, Setting
 from ..patches import median_of, surface_patches
 from ..situation import Situation
 
-USUAL = 0.15
-LEAST, MOST = -0.95, 9.0
-OTHER = 0.03  # more or less than the rest, from which a patch counts as another material
+USUAL = (0.1, 0.05, 0.05, 0.05)
+LIT = 0.2  # of the lamp's light, from which a pixel says what a patch reflects
+OTHER = 0.03  # more, or albedo more, than the rest: a patch of another material
+EACH = 4
 
 
 @dataclass(frozen=True)
 class SecondMaterial(Effect):
-    """numbers: for each patch of the surface how much more it reflects, red, green, blue, as a part
-    of what the material would (so that a patch that is left out, and falls back to 0, is predicted
-    by a Newton step as well as by the model itself). parts: (n,) patch of each pixel, −1 none."""
+    """numbers: for each patch of the surface how much more it reflects of what the material does,
+    as a part, and how much more it scatters evenly, albedo, red, green, blue. (Linear, so that a
+    patch that is left out, and falls back to 0, is predicted by a Newton step as well as by the
+    model itself.) parts: (n,) patch of each pixel, −1 none; received: (n, 3) irradiance there."""
 
     parts: NDArray[np.intp]
-    usual: tuple[float, ...] = (USUAL,) * 3
+    received: Array
+    usual: tuple[float, ...] = USUAL
     cause = "second_material"
     proof = "a mask of the part that looks different, painted in one photo"
 
     @classmethod
     def of(cls, setting: Setting) -> SecondMaterial | None:
-        patch = surface_patches(setting)
-        return cls(patch) if (patch >= 0).any() else None
+        parts = surface_patches(setting)
+        return cls(parts, Situation.of(setting.pixels).received) if (parts >= 0).any() else None
 
     @property
     def patch(self) -> NDArray[np.intp]:
@@ -39,29 +43,43 @@ class SecondMaterial(Effect):
     @property
     def numbers(self) -> Numbers:
         count = int(self.parts.max()) + 1
-        names = [f"patch {k + 1}, {c}" for k in range(count) for c in ("red", "green", "blue")]
-        alike = Numbers.alike(names, "", 1.0, LEAST, MOST)
-        deviation = np.tile(self.usual, len(names) // len(self.usual))
-        return replace(alike, deviation=deviation)
+        kinds = ("more", "red", "green", "blue")
+        names = [f"patch {k + 1}, {kind}" for k in range(count) for kind in kinds]
+        low, high = np.tile([-0.95, -1, -1, -1], count), np.tile([9.0, 1, 1, 1], count)
+        deviation = np.tile(self.usual, count)
+        return replace(Numbers.alike(names, "", 1.0), low=low, high=high, deviation=deviation)
 
     def expecting(self, usual: np.ndarray) -> Effect:
         return replace(self, usual=tuple(usual.tolist()))
 
-    def guess(self, ratio: Array) -> np.ndarray:
-        more = np.clip(ratio, 1 + LEAST, 1 + MOST) - 1
-        return np.stack([median_of(self.parts, more[:, c]) for c in range(3)], axis=1).ravel()
+    def guess(self, missed: Array, shown: Array) -> np.ndarray:
+        level = self.received.mean(axis=1)
+        lit = level > LIT * np.percentile(level, 90)
+        albedo = np.where(lit[:, None], np.pi * missed / np.where(lit, level, 1)[:, None], 0)
+        out = np.zeros((int(self.parts.max()) + 1, EACH))
+        for c in range(3):
+            out[:, 1 + c] = np.clip(median_of(self.parts, albedo[:, c]), -1, 1)
+        return out.ravel()
+
+    def _felt(self, x: np.ndarray) -> Array:
+        """(n, 4) the numbers at each pixel."""
+        found = np.where(self.parts[:, None] >= 0, x.reshape(-1, EACH)[self.parts], 0.0)
+        return found.astype(np.float32)
 
     def before(self, now: Situation, x: np.ndarray) -> Situation:
-        more = np.where(self.parts[:, None] >= 0, x.reshape(-1, 3)[self.parts], 0.0)
-        return replace(now, irradiance=now.irradiance * (1 + more).astype(np.float32))
+        return replace(now, irradiance=now.irradiance * (1 + self._felt(x)[:, :1]))
+
+    def added(self, now: Situation, brdfs: BRDFs, x: np.ndarray) -> Array:
+        return self._felt(x)[:, 1:] * self.received / np.pi
 
     def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
-        more = x.reshape(-1, 3).mean(axis=1)
-        more = more - np.median(more)
-        other = np.abs(more) > OTHER
+        patches = x.reshape(-1, EACH) - np.median(x.reshape(-1, EACH), axis=0)
+        more, albedo = patches[:, 0], patches[:, 1:].mean(axis=1)
+        other = (np.abs(more) > OTHER) | (np.abs(albedo) > OTHER)
         share = 100 * float(other.mean())
-        size = 100 * float(np.mean(np.abs(more[other]))) if other.any() else 0.0
+        factor, even = (float(v[other].mean()) if other.any() else 0.0 for v in (more, albedo))
         return (
-            f"there is more than one material: {share:.0f} % of the surface reflects about "
-            f"{size:.0f} % more or less than the rest (paint a mask of it)"
+            f"there is more than one material: {share:.0f} % of the surface reflects otherwise than "
+            f"the rest, {100 * factor:+.0f} % of what that does and an albedo of {even:+.3f} beside "
+            "it (paint a mask of it)"
         )
