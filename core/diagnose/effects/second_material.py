@@ -79,7 +79,7 @@ class SecondMaterial(Effect):
         share = 100 * float(other.mean())
         factor, even = (float(v[other].mean()) if other.any() else 0.0 for v in (more, albedo))
         return (
-            f"there is more than one material: {share:.0f} % of the surface reflects otherwise than "
-            f"the rest, {100 * factor:+.0f} % of what that does and an albedo of {even:+.3f} beside "
-            "it (paint a mask of it)"
+            f"there is more than one material: {share:.0f} % of the surface reflects otherwise, "
+            f"{100 * factor:+.0f} % of what the rest does and an albedo of {even:+.3f} beside it "
+            "(paint a mask of it)"
         )
