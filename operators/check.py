@@ -9,7 +9,7 @@ from ..core.report.diagnosis import describe
 from ..scene.evidence import paint_evidence, show_evidence
 from ..scene.properties import DIAGNOSIS, store_result
 from ..scene.running import tell
-from .fit import PATINA_OT_fit, fit_job
+from .fit import can_fit, fit_job
 from .stepped import Stepped
 
 
@@ -23,7 +23,7 @@ explain, and name the cause"""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return PATINA_OT_fit.poll.__func__(cls, context)
+        return can_fit(cls, context)
 
     def _start(self, context: bpy.types.Context) -> None:
         self._job = DiagnoseJob(fit_job(self, context.scene))

@@ -17,6 +17,14 @@ from ..scene.shadow_images import with_shadow_images
 from .stepped import Stepped
 
 
+def can_fit(operator: type[Stepped], context: bpy.types.Context) -> bool:
+    """False, with a reason, without a capture and while something runs."""
+    if not context.scene.patina.capture:
+        operator.poll_message_set("Import a capture first: it says which photos to measure")
+        return False
+    return operator.idle(context)
+
+
 def fit_job(operator: bpy.types.Operator, scene: bpy.types.Scene) -> FitJob:
     """Of a scene's capture, with what the artist dragged and painted. Raises InputError where the
     capture file is gone."""
@@ -39,10 +47,7 @@ class PATINA_OT_fit(Stepped, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not context.scene.patina.capture:
-            cls.poll_message_set("Import a capture first: it says which photos to measure")
-            return False
-        return cls.idle(context)
+        return can_fit(cls, context)
 
     def _start(self, context: bpy.types.Context) -> None:
         self._job = fit_job(self, context.scene)

@@ -68,7 +68,6 @@ class BRDFs:
         rho = self.evaluate(now.angles, now.pixels.material)
         return (rho + mapping.EPSILON / mapping.cos_map(now.angles)[:, None]) * now.received
 
-    def rows(self, angles: Angles) -> tuple[Array, Array]:
-        """(Q̂ (n, k), cosMap (n,)): ∂ρ/∂c = (ρ + ε / cosMap) Q̂."""
-        _, q = self.basis.rows(angles, self.coefficients.shape[2])
-        return q, mapping.cos_map(angles)
+    def rows(self, angles: Angles) -> Array:
+        """Q̂ (n, k): ∂ρ/∂c = (ρ + ε / cosMap) Q̂."""
+        return self.basis.rows(angles, self.coefficients.shape[2])[1]

@@ -45,11 +45,11 @@ class Footprint:
         return np.asarray(sum(of(turned(part, k)) for k in range(len(CORNERS))) / len(CORNERS))
 
     @cached_property
-    def rows(self) -> dict[int, tuple[Array, Array]]:
+    def rows(self) -> dict[int, Array]:
         """Rows of a basis at the directions that the capture says, by the number of columns."""
         return {}
 
-    def plain_rows(self, brdfs: BRDFs, now: Situation) -> tuple[Array, Array]:
+    def plain_rows(self, brdfs: BRDFs, now: Situation) -> Array:
         """BRDFs.rows of a situation in which no direction is another one than the capture says."""
         count = brdfs.coefficients.shape[2]
         if count not in self.rows:

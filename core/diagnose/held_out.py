@@ -66,13 +66,34 @@ def predict_unseen(fitted: Fitted, fine: bool = False) -> Unseen:
     for part, mine in zip(parts, rows, strict=True):
         change = whole.plus(part, -1.0).solved(fitted)
         residual[mine] -= _moved(fitted, slopes, mine, change)
-    last, model, variance, at = whole.solved(fitted), fitted.model, [], 0
+    return Unseen(residual, robust(residual).sum(axis=1), _by_effect(fitted, whole.solved(fitted)))
+
+
+def variances(fitted: Fitted) -> tuple[Array, ...]:
+    """Of the numbers of each effect, at an optimum."""
+    everything = np.arange(len(fitted.residual))
+    return _by_effect(fitted, Equations.of(fitted, slopes_of(fitted), everything).solved(fitted))
+
+
+def by_square(square: NDArray[np.int32], values: Array) -> NDArray[np.float64]:
+    """(b,) sums of values (n,) over the pixels of every square that has some."""
+    there = np.bincount(square) > 0
+    return np.asarray(np.bincount(square, values)[there], np.float64)
+
+
+def error_of_sum(sums: NDArray[np.float64]) -> float:
+    """Standard error of the sum of independent parts (b,)."""
+    return float(np.sqrt(np.sum((sums - sums.mean()) ** 2)))
+
+
+def _by_effect(fitted: Fitted, change: Change) -> tuple[Array, ...]:
+    model, variance, at = fitted.model, [], 0
     for place, effect in enumerate(model.effects):
         own = place == model.patchy
         count = len(effect.numbers)
-        variance.append(last.local_variance if own else last.variance[at : at + count])
+        variance.append(change.local_variance if own else change.variance[at : at + count])
         at += 0 if own else count
-    return Unseen(residual, robust(residual).sum(axis=1), tuple(variance))
+    return tuple(variance)
 
 
 def _moved(fitted: Fitted, slopes: Slopes, rows: NDArray[np.intp], change: Change) -> Array:

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from .fitted import Fitted, robust
-from .image_cells import cell_numbers, cell_places
+from .held_out import FINE, by_square, error_of_sum, squares
+from .image_cells import cell_places
 
 Array = NDArray[np.floating]
 
-FINE, REACH = 18, 1.5  # cells along a photo's longer side; cells about a pixel that are looked at
+REACH = 1.5  # small squares about a pixel that are looked at
 NEIGHBOURS = 48
 SURE = 3.0  # standard errors over squares
 LEAST = 0.012  # RMS of the photos that the structure amounts to
@@ -50,9 +51,8 @@ class Leftover:
 def leftover(fitted: Fitted) -> Leftover:
     """What neighbours in a photo, of other small squares than a pixel's own, say about it."""
     pixels = fitted.model.pixels
-    n = len(pixels)
     column, row = cell_places(pixels.photo, pixels.x, pixels.y, FINE)
-    cell = cell_numbers(pixels.photo, pixels.x, pixels.y, FINE)
+    cell = squares(fitted, fine=True)
     place = np.stack([column, row, 1e3 * pixels.photo], axis=1)
     counted = np.flatnonzero(np.isfinite(fitted.deviation).all(axis=1))
     near, which = cKDTree(place[counted]).query(
@@ -67,9 +67,7 @@ def leftover(fitted: Fitted) -> Leftover:
     mean = np.stack([np.sum(weight * missed[which, c], axis=1) for c in range(3)], axis=1)
     mean /= (total + SHRINK)[:, None]
     gains = (robust(fitted.residual) - robust(fitted.residual - mean)).sum(axis=1)
-    by_block = np.bincount(cell, gains)[np.bincount(cell) > 0]
+    gained = by_square(cell, gains)
     structure = np.where(np.isfinite(fitted.deviation), mean * fitted.deviation, 0.0)
     size = np.sqrt(np.sum(structure[counted] ** 2) / max(np.sum(fitted.shown[counted] ** 2), 1e-30))
-    spread = np.sqrt(np.sum((by_block - by_block.mean()) ** 2))
-    assert len(structure) == n
-    return Leftover(float(by_block.sum()), float(spread), float(size), structure, pixels.photo)
+    return Leftover(float(gained.sum()), error_of_sum(gained), float(size), structure, pixels.photo)

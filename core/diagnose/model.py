@@ -81,18 +81,18 @@ class Model:
             now = effect.before(now, numbers)
         return now
 
-    def lamps(self, x: Sequence[Vector] | None = None) -> list[Situation]:
+    def lamps(self, now: Situation, x: Sequence[Vector] | None = None) -> list[Situation]:
         """The same for each of the equal parts of the lamp, where an effect gives it a size; each
         part then falls on another corner of the pixel."""
-        parts = [self.situation(x)]
+        parts = [now]
         for effect, numbers in zip(self.effects, self.x if x is None else x, strict=True):
             parts = [lamp for part in parts for lamp in effect.lamps(part, numbers)]
         if len(parts) == 1:
             return parts
         return [turned(part, k % len(CORNERS)) for k, part in enumerate(parts)]
 
-    def rows(self, now: Situation) -> tuple[Array, Array]:
-        """(Q̂ (n, k), cosMap (n,)): ∂ρ/∂c = (ρ + ε / cosMap) Q̂."""
+    def rows(self, now: Situation) -> Array:
+        """Q̂ (n, k): ∂ρ/∂c = (ρ + ε / cosMap) Q̂."""
         if now.moved:
             return self.brdfs.rows(now.angles)
         assert self.footprint is not None
@@ -131,5 +131,5 @@ class Model:
     def predicted(self, x: Sequence[Vector] | None = None) -> Array:
         """(n, 3) what the photos show."""
         now = self.situation(x)
-        reflected = self.reflected(self.lamps(x))
+        reflected = self.reflected(self.lamps(now, x))
         return self.recorded(self.entering(reflected, now, x), now, x)

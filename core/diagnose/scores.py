@@ -50,7 +50,7 @@ def scores(fitted: Fitted, slopes: Slopes, of: NDArray[np.intp], last: int) -> t
         if p:
             pull[:, p:] -= pull[:, :p] @ np.linalg.solve(own, local_own)
         count, e, _ = whole.local.shape
-        prior = _last_deviation(fitted)[-last:].reshape(count, e)
+        prior = model.effects[-1].numbers.deviation.reshape(count, e)
         blocks = whole.local + np.einsum("pe,ef->pef", 1 / prior**2, np.eye(e))
         return pull[:, p:], np.linalg.inv(blocks)
     first = p - last
@@ -59,7 +59,3 @@ def scores(fitted: Fitted, slopes: Slopes, of: NDArray[np.intp], last: int) -> t
         pull = pull[:, first:] - pull[:, :first] @ others
         own = own[first:, first:] - own[first:, :first] @ others
     return pull, np.linalg.inv(own)[None]
-
-
-def _last_deviation(fitted: Fitted) -> Array:
-    return fitted.model.effects[-1].numbers.deviation

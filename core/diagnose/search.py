@@ -19,7 +19,7 @@ from .effect import Effect
 from .effects.outside_basis import OutsideBasis
 from .fitted import Fitted
 from .fixed import Fixed
-from .held_out import Unseen, predict_unseen, squares
+from .held_out import Unseen, by_square, error_of_sum, predict_unseen, squares, variances
 from .leftover import Leftover, leftover
 from .model import Model
 from .solve import fit
@@ -64,7 +64,7 @@ class Trial:
     @property
     def error(self) -> float:
         """Standard error of the gain, over squares."""
-        return _spread(self.by_block)
+        return error_of_sum(self.by_block)
 
     @property
     def convincing(self) -> bool:
@@ -103,8 +103,7 @@ class Trial:
     @property
     def deviation(self) -> Vector:
         """Of the numbers, as the curvature says."""
-        variance = self.unseen.variance
-        return np.sqrt(variance[self.place]) if self.place < len(variance) else np.zeros(0)
+        return np.sqrt(self.unseen.variance[self.place])
 
 
 @dataclass(frozen=True)
@@ -159,10 +158,10 @@ def search(
     left = list(effects)
     for turn in range(MOST_EFFECTS):
         yield turn / MOST_EFFECTS
-        trials = []
+        trials, costs = [], _costs(now)
         promising = _promising(asked(now, left))
         for place, one in enumerate(promising):
-            trials.append(_try(now, one))
+            trials.append(_try(now, costs, one))
             yield (turn + (place + 1) / (len(promising) + 1)) / MOST_EFFECTS
         trials.sort(key=lambda t: -t.gain)
         rounds.append(tuple(trials))
@@ -217,15 +216,14 @@ def _simplest(trials: Sequence[Trial]) -> Trial | None:
         if t is not best
         and t.effect.freedom <= best.effect.freedom
         and t.effect.fine == best.effect.fine
-        and abs(t.gain - best.gain) < ALIKE * _spread(t.by_block - best.by_block)
+        and abs(t.gain - best.gain) < ALIKE * error_of_sum(t.by_block - best.by_block)
     ]
     return replace(best, ties=tuple(same))
 
 
-def _try(now: Fitted, one: Asked) -> Trial:
-    fine = one.effect.fine
-    block = squares(now, fine)  # what is confined to a few large ones could never be sure
-    effect = one.effect
+def _try(now: Fitted, costs: dict[bool, Array], one: Asked) -> Trial:
+    """costs: _costs(now)."""
+    effect, fine = one.effect, one.effect.fine
     fitted = fit(
         now.model.with_effect(effect, effect.guess(_missed_where_bright(now), now.shown)),
         now.deviation,
@@ -234,13 +232,23 @@ def _try(now: Fitted, one: Asked) -> Trial:
         effect = effect.expecting(_usual(fitted))
         model = now.model.with_effect(effect)
         fitted = fit(replace(model, brdfs=fitted.model.brdfs, x=fitted.model.x), now.deviation)
-    predicted = predict_unseen(fitted, fine)
-    gains = predict_unseen(now, fine).cost - predicted.cost
-    counted = np.isfinite(now.deviation).all(axis=1)
-    shown = fitted.shown[counted]
-    change = np.sqrt(np.sum((shown - now.shown[counted]) ** 2) / max(np.sum(shown**2), 1e-30))
-    by_block = np.bincount(block, gains).astype(np.float64)[np.bincount(block) > 0]
-    return Trial(effect, fitted, predicted, by_block, float(change), one.chance)
+    unseen = predict_unseen(fitted, fine)
+    # what is confined to a few large squares could never be sure
+    gained = by_square(squares(now, fine), costs[fine] - unseen.cost)
+    change = _change(fitted.shown, now.shown, now.deviation)
+    return Trial(effect, fitted, unseen, gained, change, one.chance)
+
+
+def _costs(now: Fitted) -> dict[bool, Array]:
+    """(n,) of the model as it is, where large squares are left out (False) and small ones."""
+    return {fine: predict_unseen(now, fine).cost for fine in (False, True)}
+
+
+def _change(shown: Array, without: Array, deviation: Array) -> float:
+    """RMS between two predictions, relative to the first, clipped pixels left out."""
+    counted = np.isfinite(deviation).all(axis=1)
+    size = max(float(np.sum(shown[counted] ** 2)), 1e-30)
+    return float(np.sqrt(np.sum((shown - without)[counted] ** 2) / size))
 
 
 def _outside(now: Fitted) -> list[Trial]:
@@ -252,12 +260,12 @@ def _outside(now: Fitted) -> list[Trial]:
     tight = fit(replace(model, brdfs=model.brdfs.tight()), now.deviation)
     unseen = predict_unseen(now)
     gains = predict_unseen(tight).cost - unseen.cost
-    change = np.sqrt(np.sum((now.shown - tight.shown) ** 2) / np.sum(now.shown**2))
-    block = model.pixels.block
-    by_block = np.bincount(block, gains).astype(np.float64)[np.bincount(block) > 0]
-    said = replace(now, model=replace(model, effects=(*model.effects, OutsideBasis()),
-                                      x=(*model.x, np.zeros(0))))  # fmt: skip
-    trial = Trial(said.model.effects[-1], said, unseen, by_block, float(change), 0.0)
+    change = _change(now.shown, tight.shown, now.deviation)
+    effect = OutsideBasis()
+    effects, x = (*model.effects, effect), (*model.x, np.zeros(0))
+    said = replace(now, model=replace(model, effects=effects, x=x))
+    unseen = replace(unseen, variance=(*unseen.variance, np.zeros(0)))
+    trial = Trial(effect, said, unseen, by_square(squares(now), gains), change, 0.0)
     return [trial] if trial.convincing and change > OUTSIDE else []
 
 
@@ -273,16 +281,11 @@ def _usual(fitted: Fitted) -> Vector:
     what is not known of it (a step of expectation and maximisation)."""
     model = fitted.model
     assert model.patchy is not None
-    variance = predict_unseen(fitted).variance[model.patchy]
+    variance = variances(fitted)[model.patchy]
     patch = model.effects[model.patchy].patch
     assert patch is not None
     each = (np.square(model.x[model.patchy]) + variance).reshape(int(patch.max()) + 1, -1)
     return np.asarray(np.maximum(np.sqrt(each.mean(axis=0)), 1e-3))
-
-
-def _spread(by_block: Vector) -> float:
-    """Standard error of a sum over squares."""
-    return float(np.sqrt(np.sum((by_block - by_block.mean()) ** 2)))
 
 
 def _missed(
@@ -297,9 +300,9 @@ def _missed(
             others = before.model
             for other in kept:
                 if other is not trial:
-                    others = others.with_effect(other.effect)
+                    others = others.with_effect(other.effect, other.x)
             without = fit(others, now.deviation)
-            found = _try(without, Asked(trial.effect, 0.0, trial.chance))
+            found = _try(without, _costs(without), Asked(trial.effect, 0.0, trial.chance))
             again.append(replace(found, ties=trial.ties))
         worst = min(range(len(kept)), key=lambda k: again[k].gain)
         if again[worst].convincing:
@@ -307,5 +310,5 @@ def _missed(
         kept.pop(worst)
     if len(kept) == len(accepted):
         return now, tuple(kept)
-    alone = _try(before, Asked(kept[0].effect, 0.0, kept[0].chance))
+    alone = _try(before, _costs(before), Asked(kept[0].effect, 0.0, kept[0].chance))
     return alone.fitted, (replace(alone, ties=kept[0].ties),)

@@ -15,6 +15,7 @@ from scipy.sparse import csr_array
 
 from .fitted import Fitted
 from .model import Model
+from .situation import Situation
 
 Array = NDArray[np.floating]
 
@@ -59,7 +60,7 @@ def slopes_of(fitted: Fitted) -> Slopes:
     """At the model's present numbers."""
     model, deviation = fitted.model, fitted.deviation
     now = model.situation()
-    reflected, per_log, q = _reflected(model)
+    reflected, per_log, q = _reflected(model, now)
     entering = model.entering(reflected, now)
     recorded = model.recorded(entering, now)
     grown = (1 + RISE) * entering
@@ -93,17 +94,17 @@ def slopes_of(fitted: Fitted) -> Slopes:
     return Slopes(per_log, q, joined, columns, first, local, patch, patches)
 
 
-def _reflected(model: Model) -> tuple[Array, Array, Array]:
+def _reflected(model: Model, now: Situation) -> tuple[Array, Array, Array]:
     """((n, 3) the lamp's light reflected, (n, 3) its ∂/∂ ln(ρ·cosMap + ε), Q̂ (n, k)): means over
     the parts of lamp and pixel, of Q̂ over a few of them, as much as each shows."""
-    parts, brdfs = model.lamps(), model.brdfs
+    parts, brdfs = model.lamps(now), model.brdfs
     reflected, per_log = model.reflected(parts), model.mean(parts, brdfs.slope)
     if len(parts) == 1:
-        return reflected, per_log, model.rows(parts[0])[0]
+        return reflected, per_log, model.rows(now)
     q = shares = np.zeros((), np.float32)
     for part in parts[:: max(1, len(parts) // FEW)]:
         share = brdfs.slope(part).mean(axis=1, dtype=np.float32)[:, None] + np.float32(1e-12)
-        shares, q = shares + share, q + share * model.rows(part)[0]
+        shares, q = shares + share, q + share * model.rows(part)
     return reflected, per_log, q / shares
 
 
