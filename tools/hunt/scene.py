@@ -50,12 +50,11 @@ class Scene:
             out.append(self.studio.photo(shot.camera))
         return out
 
-    def in_part(self, whole: list[Array], name: str, most: float, base=None) -> Hidden:  # type: ignore[no-untyped-def]
-        """Of light that adds up, as much as changes the photos by the wanted RMS. base: photos
-        without it, the plain ones."""
-        base = self.plain if base is None else base
+    def in_part(self, whole: list[Array], name: str, most: float) -> Hidden:
+        """Of light that adds up, as much as changes the photos by the wanted RMS."""
+        base = self.plain
         size = min(most, self.strength / max(rms(whole, base), 1e-9))
-        photos = [p + size * (w - p) for p, w in zip(base, whole, strict=True)]
+        photos = mixed(base, whole, size)
         return Hidden(photos, {name: size}, rms(photos, base))
 
 
@@ -69,6 +68,11 @@ class Hidden:
     strength: float = 0.0
     told: list[Shot] | None = None
     surface: Surface | None = None
+
+
+def mixed(base: list[Array], other: list[Array], part: float) -> list[Array]:
+    """Photos of which a part is of the other."""
+    return [(1 - part) * b + part * o for b, o in zip(base, other, strict=True)]
 
 
 def rms(photos: list[Array], plain: list[Array]) -> float:

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from patina.core.basis import Basis, PrincipalBRDF
+from patina.core.basis import PrincipalBRDF
 
 from .drawn import any_brdf
-from .scene import Hidden, Scene, rms, sought
+from .scene import Hidden, Scene, mixed, rms, sought
 from .shape import bumpy
 
 Array = np.ndarray
@@ -58,26 +58,13 @@ def subsurface(scene: Scene) -> Hidden:
     scene.studio.dress(scene.studio.translucent(colour, scene.rng.uniform(0.05, 0.15)))
     deep = scene.photographed()
     level = np.mean([p.mean() for p in scene.plain]) / np.mean([p.mean() for p in matte])
-    share = float(np.clip(_share(scene, matte, deep, level), 0, 1))
 
-    def mixed(what: list[Array]) -> list[Array]:
-        both = zip(scene.plain, what, strict=True)
-        return [(1 - share) * p + share * level * w for p, w in both]
+    def photos(what: list[Array], share: float) -> list[Array]:
+        return mixed(scene.plain, [level * w for w in what], share)
 
-    found = mixed(deep)
-    return Hidden(found, {"part": share}, rms(found, mixed(matte)))
-
-
-def _share(scene: Scene, matte: list[Array], deep: list[Array], level: float) -> float:
-    def change(share: float) -> float:
-        share = min(share, 1.0)
-        base = [
-            (1 - share) * p + share * level * m for p, m in zip(scene.plain, matte, strict=True)
-        ]
-        more = [b + share * level * (d - m) for b, d, m in zip(base, deep, matte, strict=True)]
-        return rms(more, base)
-
-    return sought(change, 0.2, scene.strength, most=1.0)
+    share = sought(lambda s: rms(photos(deep, s), photos(matte, s)), 0.2, scene.strength, most=1.0)
+    found = photos(deep, share)
+    return Hidden(found, {"part": share}, rms(found, photos(matte, share)))
 
 
 def brushed(scene: Scene) -> Hidden:
@@ -88,8 +75,7 @@ def brushed(scene: Scene) -> Hidden:
 
     def photos(anisotropy: float) -> list[Array]:
         scene.studio.dress(scene.studio.brushed(rough, anisotropy))
-        metal = scene.photographed()
-        return [(1 - shine) * p + shine * w for p, w in zip(matte, metal, strict=True)]
+        return mixed(matte, scene.photographed(), shine)
 
     plain = photos(0.0)
     size = sought(lambda s: rms(photos(s), plain), 0.1, scene.strength, most=0.9)
@@ -112,18 +98,14 @@ def outside(scene: Scene) -> Hidden:
 
 
 def _with_lobe(brdf: PrincipalBRDF, ring: bool, middle: float, size: float) -> PrincipalBRDF:
-    """ln ρ grows by ``size`` over a bump of θh, or of θd about 0."""
+    """ln ρ grows by ``size`` over a bump of θh, or of θd."""
     basis = brdf.basis
     nodes = basis.grid.nodes()
     at = nodes.theta_h if ring else nodes.theta_d
     wide = np.radians(2.0 if ring else 4.0)
     bump = np.exp(-0.5 * np.square((at - middle) / wide)).astype(np.float32)
     bump = np.broadcast_to(bump, basis.grid.shape)
-    wider = _wider(basis, bump)
+    components = np.concatenate([basis.components, bump[None]])
+    wider = replace(basis, components=components, training=None)
     extra = np.full((3, 1), size)
     return PrincipalBRDF(wider, np.concatenate([brdf.coefficients, extra], axis=1))
-
-
-def _wider(basis: Basis, component: Array) -> Basis:
-    components = np.concatenate([basis.components, component[None]])
-    return replace(basis, components=components, training=None)

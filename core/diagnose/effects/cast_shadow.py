@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effect import Array, Effect, Numbers, Setting
+from ..effect import Array, Numbers, Setting
 from ..image_cells import cell_numbers
+from ..patch_effect import PatchEffect
 from ..patches import median_of
 from ..situation import Situation
 
@@ -19,13 +20,11 @@ DARK = 0.3  # of the light, lost, from which a square counts as shadowed
 
 
 @dataclass(frozen=True)
-class CastShadow(Effect):
+class CastShadow(PatchEffect):
     """numbers: for each small square of each photo the part of the light that is lost there,
-    negative. square: (n,) of each pixel; photo: (n,)."""
+    negative. photo: (n,)."""
 
-    square: NDArray[np.intp]
     photo: NDArray[np.int16]
-    usual: tuple[float, ...] = (USUAL,)
     cause = "cast_shadow"
     proof = "a photo of everything that stands about the object, from the lamp"
     fine = True
@@ -36,21 +35,13 @@ class CastShadow(Effect):
         pixels = setting.pixels
         number = cell_numbers(pixels.photo, pixels.x, pixels.y, ACROSS)
         square = np.unique(number, return_inverse=True)[1].ravel()
-        return cls(square.astype(np.intp), pixels.photo)
-
-    @property
-    def patch(self) -> NDArray[np.intp]:
-        return self.square
+        return cls(square.astype(np.intp), (USUAL,), pixels.photo)
 
     @property
     def numbers(self) -> Numbers:
-        names = [f"square {k + 1}" for k in range(int(self.square.max()) + 1)]
+        names = [f"square {k + 1}" for k in range(self.count)]
         alike = Numbers.alike(names, "of the light", 1.0, -1.0, 0.0, step=-1e-2)
-        deviation = np.tile(self.usual, len(names) // len(self.usual))
-        return replace(alike, deviation=deviation)
-
-    def expecting(self, usual: np.ndarray) -> Effect:
-        return replace(self, usual=tuple(usual.tolist()))
+        return replace(alike, deviation=self.deviation)
 
     @property
     def freedom(self) -> int:
@@ -58,7 +49,7 @@ class CastShadow(Effect):
 
     def guess(self, missed: Array, shown: Array) -> np.ndarray:
         part = missed.sum(axis=1) / np.maximum(shown.sum(axis=1), 1e-30)
-        less = np.minimum(median_of(self.square, part), 0)
+        less = np.minimum(median_of(self.parts, part), 0)
         return np.where(less < -DARK, np.maximum(less, -1), 0.0)
 
     def worth(self, x: np.ndarray) -> bool:
@@ -66,7 +57,7 @@ class CastShadow(Effect):
 
     def lost(self, x: np.ndarray) -> Array:
         """(n,) part of the light that does not arrive."""
-        return -x[self.square]
+        return -x[self.parts]
 
     def before(self, now: Situation, x: np.ndarray) -> Situation:
         return replace(now, visible=now.visible * (1 - self.lost(x)).astype(np.float32))

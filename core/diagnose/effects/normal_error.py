@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...angles.vectors import tangents
-from ..effect import Array, Effect, Numbers, Setting
+from ..effect import Array, Numbers, Setting
+from ..patch_effect import PatchEffect
 from ..patches import surface_patches
 from ..situation import Situation
 
@@ -17,14 +17,12 @@ FARTHEST = np.radians(25.0)
 
 
 @dataclass(frozen=True)
-class NormalError(Effect):
+class NormalError(PatchEffect):
     """numbers: for each patch of the surface the tangents of two angles that its normal is tilted
-    by, along ``first`` and ``other``, (n, 3) unit. parts: (n,) patch of each pixel, −1 none."""
+    by, along ``first`` and ``other``, (n, 3) unit."""
 
-    parts: NDArray[np.intp]
     first: Array
     other: Array
-    usual: tuple[float, ...] = (USUAL,) * 2
     cause = "normal_error"
     proof = "a closer scan of a part of the surface"
 
@@ -38,27 +36,17 @@ class NormalError(Effect):
         sums = [np.bincount(patch[known], normal[known, k]) for k in range(3)]
         mean = np.stack(sums, axis=1).astype(np.float64)
         mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9)
-        first, other = tangents(mean)
-        return cls(patch, first[patch].astype(np.float32), other[patch].astype(np.float32))
-
-    @property
-    def patch(self) -> NDArray[np.intp]:
-        return self.parts
+        at = [v[patch].astype(np.float32) for v in tangents(mean)]
+        return cls(patch, (USUAL,) * 2, *at)
 
     @property
     def numbers(self) -> Numbers:
-        count = int(self.parts.max()) + 1
-        names = [f"patch {k + 1}, {way}" for k in range(count) for way in ("first", "second")]
+        names = [f"patch {k + 1}, {way}" for k in range(self.count) for way in ("first", "second")]
         alike = Numbers.alike(names, "rad", 1.0, -FARTHEST, FARTHEST)
-        deviation = np.tile(self.usual, len(names) // len(self.usual))
-        return replace(alike, deviation=deviation)
-
-    def expecting(self, usual: np.ndarray) -> Effect:
-        return replace(self, usual=tuple(usual.tolist()))
+        return replace(alike, deviation=self.deviation)
 
     def before(self, now: Situation, x: np.ndarray) -> Situation:
-        tilt = np.where(self.parts[:, None] >= 0, x.reshape(-1, 2)[self.parts], 0.0)
-        tilt = tilt.astype(np.float32)
+        tilt = self.felt(x)
         normal = now.normal + tilt[:, :1] * self.first + tilt[:, 1:] * self.other
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         return replace(now, normal=normal)

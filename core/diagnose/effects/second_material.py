@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..brdfs import BRDFs
-from ..effect import Array, Effect, Numbers, Setting
+from ..effect import Array, Numbers, Setting
+from ..patch_effect import PatchEffect
 from ..patches import median_of, surface_patches
 from ..situation import Situation
 
@@ -19,58 +19,45 @@ EACH = 4
 
 
 @dataclass(frozen=True)
-class SecondMaterial(Effect):
+class SecondMaterial(PatchEffect):
     """numbers: for each patch of the surface how much more it reflects of what the material does,
     as a part, and how much more it scatters evenly, albedo, red, green, blue. (Linear, so that a
     patch that is left out, and falls back to 0, is predicted by a Newton step as well as by the
-    model itself.) parts: (n,) patch of each pixel, −1 none; received: (n, 3) irradiance there."""
+    model itself.) received: (n, 3) irradiance at each pixel."""
 
-    parts: NDArray[np.intp]
     received: Array
-    usual: tuple[float, ...] = USUAL
     cause = "second_material"
     proof = "a mask of the part that looks different, painted in one photo"
 
     @classmethod
     def of(cls, setting: Setting) -> SecondMaterial | None:
         parts = surface_patches(setting)
-        return cls(parts, Situation.of(setting.pixels).received) if (parts >= 0).any() else None
-
-    @property
-    def patch(self) -> NDArray[np.intp]:
-        return self.parts
+        if not (parts >= 0).any():
+            return None
+        return cls(parts, USUAL, Situation.of(setting.pixels).received)
 
     @property
     def numbers(self) -> Numbers:
-        count = int(self.parts.max()) + 1
+        count = self.count
         kinds = ("more", "red", "green", "blue")
         names = [f"patch {k + 1}, {kind}" for k in range(count) for kind in kinds]
         low, high = np.tile([-0.95, -1, -1, -1], count), np.tile([9.0, 1, 1, 1], count)
-        deviation = np.tile(self.usual, count)
-        return replace(Numbers.alike(names, "", 1.0), low=low, high=high, deviation=deviation)
-
-    def expecting(self, usual: np.ndarray) -> Effect:
-        return replace(self, usual=tuple(usual.tolist()))
+        return replace(Numbers.alike(names, "", 1.0), low=low, high=high, deviation=self.deviation)
 
     def guess(self, missed: Array, shown: Array) -> np.ndarray:
         level = self.received.mean(axis=1)
         lit = level > LIT * np.percentile(level, 90)
         albedo = np.where(lit[:, None], np.pi * missed / np.where(lit, level, 1)[:, None], 0)
-        out = np.zeros((int(self.parts.max()) + 1, EACH))
+        out = np.zeros((self.count, EACH))
         for c in range(3):
             out[:, 1 + c] = np.clip(median_of(self.parts, albedo[:, c]), -1, 1)
         return out.ravel()
 
-    def _felt(self, x: np.ndarray) -> Array:
-        """(n, 4) the numbers at each pixel."""
-        found = np.where(self.parts[:, None] >= 0, x.reshape(-1, EACH)[self.parts], 0.0)
-        return found.astype(np.float32)
-
     def before(self, now: Situation, x: np.ndarray) -> Situation:
-        return replace(now, irradiance=now.irradiance * (1 + self._felt(x)[:, :1]))
+        return replace(now, irradiance=now.irradiance * (1 + self.felt(x)[:, :1]))
 
     def added(self, now: Situation, brdfs: BRDFs, x: np.ndarray) -> Array:
-        return self._felt(x)[:, 1:] * self.received / np.pi
+        return self.felt(x)[:, 1:] * self.received / np.pi
 
     def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
         patches = x.reshape(-1, EACH) - np.median(x.reshape(-1, EACH), axis=0)
