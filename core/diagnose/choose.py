@@ -163,7 +163,6 @@ def _thinned(pixels: Pixels, count: int) -> Pixels:
 
 def _with_photo(pixels: Pixels, photo: LitPhoto) -> Pixels:
     """What the photo shows at the pixels, and which part of it they are in."""
-    height, width = photo.usable.shape
     flat = photo.radiance.reshape(-1, 3)
     seen = flat.take(pixels.pixel, axis=0)
     assert photo.variance is not None
@@ -172,8 +171,8 @@ def _with_photo(pixels: Pixels, photo: LitPhoto) -> Pixels:
         pixels,
         observed=seen,
         noise=np.maximum(variance, np.float32(1e-20)),
-        slope=_slopes(flat, pixels.pixel, height, width),
-        veil=_veil(photo.radiance, pixels),
+        slope=photo_slopes(photo.radiance, pixels.pixel),
+        veil=photo_veil(photo.radiance, pixels.pixel),
         block=cell_numbers(pixels.photo, pixels.x, pixels.y, BLOCKS),
     )
 
@@ -187,8 +186,11 @@ def _turns(view: SurfaceView) -> Array:
     return np.nan_to_num(view.at(out.reshape(*out.shape[:2], 6))).reshape(-1, 2, 3)
 
 
-def _slopes(flat: Array, pixel: NDArray[np.int32], height: int, width: int) -> Array:
-    """(n, 2, 3) derivatives to the right and down, of the photo under a narrow Gaussian."""
+def photo_slopes(radiance: Array, pixel: NDArray[np.int32]) -> Array:
+    """(n, 2, 3) derivatives to the right and down, of a photo (h, w, 3) under a narrow Gaussian, at
+    flat places (n,)."""
+    height, width = radiance.shape[:2]
+    flat = radiance.reshape(-1, 3)
     row, column = np.divmod(pixel, width)
     bell = np.exp(-0.5 * (STENCIL / WIDTH) ** 2)
     bell /= bell.sum()
@@ -204,8 +206,8 @@ def _slopes(flat: Array, pixel: NDArray[np.int32], height: int, width: int) -> A
     return out
 
 
-def _veil(radiance: Array, pixels: Pixels) -> Array:
-    """(n, 3) the photo blurred widely, at the pixels."""
+def photo_veil(radiance: Array, pixel: NDArray[np.int32]) -> Array:
+    """(n, 3) a photo (h, w, 3) blurred widely, at flat places (n,)."""
     height, width = radiance.shape[:2]
     step = max(1, max(height, width) // 128)
     small = np.stack([_shrunk(radiance[..., c], step) for c in range(3)], axis=-1)
@@ -213,7 +215,7 @@ def _veil(radiance: Array, pixels: Pixels) -> Array:
     small = np.stack(
         [gaussian_filter(small[..., c], blur, mode="constant") for c in range(3)], axis=-1
     )
-    row, column = np.divmod(pixels.pixel, width)
+    row, column = np.divmod(pixel, width)
     at = np.minimum(row // step, len(small) - 1), np.minimum(column // step, small.shape[1] - 1)
     return np.asarray(small[at], np.float32)
 

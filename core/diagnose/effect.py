@@ -72,7 +72,7 @@ class Numbers:
 class Setting:
     """What effects are made for. light: (photos,) which of the lights lit each. lights: their
     names; distant: which of them are. centre: (3,) of what the photos show; size: its extent, scan
-    units. brdfs: before any effect. rays: the scan's mesh."""
+    units. level: typical irradiance. brdfs: before any effect. rays: the scan's mesh."""
 
     pixels: Pixels
     brdfs: BRDFs
@@ -82,6 +82,7 @@ class Setting:
     distant: NDArray[np.bool_]
     centre: NDArray[np.float64]
     size: float
+    level: float
 
     @cached_property
     def surroundings(self) -> Surroundings:
@@ -98,6 +99,14 @@ class Setting:
         return face_glow(self, photo)
 
 
+def without_mean(count: int, each: int, place: int) -> NDArray[np.float64]:
+    """(count · each,)²: takes the mean of the numbers at ``place`` of all copies from them."""
+    out = np.eye(count * each)
+    at = np.arange(count) * each + place
+    out[np.ix_(at, at)] -= 1 / count
+    return out
+
+
 def felt_by(copy: NDArray[np.intp], each: int) -> NDArray[np.intp]:
     """(n, each) for numbers of which every photo (light, patch) has its own: copy: (n,) whose each
     pixel feels, −1 none."""
@@ -111,16 +120,33 @@ class Effect(ABC):
     proof: str  # the photo that would tell it from others
     fine = False  # judged on small squares of the photos: only what is beside a place tells of it
     credit = 1.0  # of its gain, where effects are compared
+    of_photo = False  # whether it needs what the photo shows about a pixel
 
     @classmethod
     @abstractmethod
     def of(cls, setting: Setting) -> Effect | None:
         """For a capture; None where it cannot be there."""
 
+    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> Effect | None:
+        """The same for other pixels (m,), of which the same numbers speak; near: (m,) of the pixels
+        that the effect was made for, the nearest of the same photo. None where it does nothing."""
+        return type(self).of(setting)
+
     @property
     @abstractmethod
     def numbers(self) -> Numbers:
         """The unknowns."""
+
+    @property
+    def anchor(self) -> NDArray[np.float64] | None:
+        """(p, p) what is told of the numbers: a part of them that the BRDF could as well have, as
+        the mean of all gains, is left out, since the capture says how bright the light is. None:
+        all of them."""
+        return None
+
+    def told(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(p,) the numbers without that part."""
+        return x if self.anchor is None else self.anchor @ x
 
     def guess(self, missed: Array, shown: Array) -> NDArray[np.float64]:
         """Where the search begins; missed: (n, 3) what the photos show more than the model without

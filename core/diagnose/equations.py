@@ -28,12 +28,12 @@ DENSE = 48  # numbers, up to which a full matrix is faster
 @dataclass(frozen=True)
 class Change:
     """A step: of the coefficients (m, 3, k), of the numbers (p,), of the patches' (P · e,); and the
-    variances of the numbers."""
+    covariance (p, p) of the numbers, the variances (P · e,) of the patches'."""
 
     coefficients: Array
     x: Vector
     local: Vector
-    variance: Vector
+    covariance: Array
     local_variance: Vector
 
 
@@ -123,7 +123,7 @@ class Equations:
         x = covariance @ right
         change = np.stack([found[:, -1] - found[:, :-1] @ x for found in eliminated])
         none = np.zeros(0)
-        return Change(change.reshape(m, 3, k), x, none, np.diag(covariance), none)
+        return Change(change.reshape(m, 3, k), x, none, covariance, none)
 
     def _solved_with_patches(self, fitted: Fitted) -> Change:
         """Patches eliminated first: what is left is full, but small."""
@@ -163,7 +163,7 @@ class Equations:
         spread = np.where(held, 0, alone + both)
         return Change(
             z[:size].reshape(m, 3, k), z[size:], np.where(held, 0, local),
-            np.diag(covariance)[size:], spread,
+            covariance[size:, size:], spread,
         )  # fmt: skip
 
     def _local(self, deviation: Vector, held: NDArray[np.bool_]) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,14 @@ class Fixed(Effect):
     @classmethod
     def of(cls, setting: Setting) -> Effect | None:
         return None
+
+    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> Fixed | None:
+        inner = self.inner.elsewhere(setting, near)
+        return None if inner is None else replace(self, inner=inner)
+
+    @property
+    def of_photo(self) -> bool:  # type: ignore[override]
+        return self.inner.of_photo
 
     @property
     def numbers(self) -> Numbers:

@@ -63,16 +63,20 @@ def predict_unseen(fitted: Fitted, fine: bool = False) -> Unseen:
     for part in parts[1:]:
         whole = whole.plus(part)
     residual = np.array(fitted.residual, np.float64)
+    others = []
     for part, mine in zip(parts, rows, strict=True):
         change = whole.plus(part, -1.0).solved(fitted)
         residual[mine] -= _moved(fitted, slopes, mine, change)
-    return Unseen(residual, robust(residual).sum(axis=1), _by_effect(fitted, whole.solved(fitted)))
+        others.append(change.x)
+    variance = _by_effect(fitted, whole.solved(fitted), np.stack(others))
+    return Unseen(residual, robust(residual).sum(axis=1), variance)
 
 
 def variances(fitted: Fitted) -> tuple[Array, ...]:
     """Of the numbers of each effect, at an optimum."""
     everything = np.arange(len(fitted.residual))
-    return _by_effect(fitted, Equations.of(fitted, slopes_of(fitted), everything).solved(fitted))
+    change = Equations.of(fitted, slopes_of(fitted), everything).solved(fitted)
+    return _by_effect(fitted, change, np.zeros((FOLDS, len(change.x))))
 
 
 def by_square(square: NDArray[np.int32], values: Array) -> NDArray[np.float64]:
@@ -86,13 +90,26 @@ def error_of_sum(sums: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.sum((sums - sums.mean()) ** 2)))
 
 
-def _by_effect(fitted: Fitted, change: Change) -> tuple[Array, ...]:
+def _by_effect(fitted: Fitted, change: Change, others: Array) -> tuple[Array, ...]:
+    """As the curvature says, but no less than what the numbers move by when parts of the photos are
+    left out, others: (f, p) (a jackknife of as many groups, Shao and Wu 1989, together over an
+    effect's numbers): what neighbouring pixels err by is alike, which the curvature does not know.
+    """
     model, variance, at = fitted.model, [], 0
     for place, effect in enumerate(model.effects):
-        own = place == model.patchy
         count = len(effect.numbers)
-        variance.append(change.local_variance if own else change.variance[at : at + count])
-        at += 0 if own else count
+        if place == model.patchy:
+            variance.append(change.local_variance)
+            continue
+        mine = slice(at, at + count)
+        anchor = np.eye(count) if effect.anchor is None else effect.anchor
+        plain = np.diag(anchor @ change.covariance[mine, mine] @ anchor.T)
+        moved = others[:, mine] @ anchor.T
+        jackknife = (FOLDS - 1) * np.mean((moved - moved.mean(axis=0)) ** 2, axis=0)
+        known = plain > 0
+        more = float(np.mean(jackknife[known] / plain[known])) if known.any() else 1.0
+        variance.append(plain * max(more, 1.0))
+        at += count
     return tuple(variance)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from .change import rms_change
 from .fitted import Fitted, robust
 from .held_out import FINE, by_square, error_of_sum, squares
 from .image_cells import cell_places
@@ -17,7 +18,8 @@ Array = NDArray[np.floating]
 REACH = 1.5  # small squares about a pixel that are looked at
 NEIGHBOURS = 48
 SURE = 3.0  # standard errors over squares
-LEAST = 0.012  # RMS of the photos that the structure amounts to
+LEAST = 0.012  # RMS of the photos that the structure amounts to,
+PLAIN = 0.02  # nats a pixel and channel, unless it gains this much
 SHRINK = 4.0  # neighbours' worth of doubt
 
 
@@ -35,7 +37,8 @@ class Leftover:
     @property
     def convincing(self) -> bool:
         """Whether it is there."""
-        return self.gain > SURE * self.error and self.change > LEAST
+        plain = self.gain > PLAIN * self.structure.size
+        return self.gain > SURE * self.error and (self.change > LEAST or plain)
 
     def sentence(self) -> str:
         """For an artist."""
@@ -69,5 +72,5 @@ def leftover(fitted: Fitted) -> Leftover:
     gains = (robust(fitted.residual) - robust(fitted.residual - mean)).sum(axis=1)
     gained = by_square(cell, gains)
     structure = np.where(np.isfinite(fitted.deviation), mean * fitted.deviation, 0.0)
-    size = np.sqrt(np.sum(structure[counted] ** 2) / max(np.sum(fitted.shown[counted] ** 2), 1e-30))
-    return Leftover(float(gained.sum()), error_of_sum(gained), float(size), structure, pixels.photo)
+    size = rms_change(fitted.shown, fitted.shown + structure, fitted.deviation)
+    return Leftover(float(gained.sum()), error_of_sum(gained), size, structure, pixels.photo)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .effect import Array, Effect
+from .effect import Array, Effect, Setting
 
 
 @dataclass(frozen=True)
@@ -16,6 +16,9 @@ class PatchEffect(Effect):
 
     parts: NDArray[np.intp]
     usual: tuple[float, ...]
+
+    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> Effect:
+        return replace(self, parts=self.parts[near])
 
     @property
     def patch(self) -> NDArray[np.intp]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .chance import Asked, asked
+from .change import rms_change
 from .deviation import NORMAL, as_found
 from .effect import Effect
 from .effects.outside_basis import OutsideBasis
@@ -28,7 +29,8 @@ Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
 
 CHANCE = 0.02  # of a false alarm, over all effects that are tried
-LEAST_CHANGE = 0.005  # RMS of the photos: less is not worth a word
+LEAST_CHANGE = 0.005  # RMS of the photos: less is not worth a word,
+PLAIN = 0.05  # nats a pixel and channel, unless it gains this much
 OUTSIDE = 0.008  # RMS of the photos that the slack beside the basis has to explain to be named
 MOST_EFFECTS = 4
 SURE = 3.0  # standard errors over squares that a gain is above 0
@@ -69,18 +71,19 @@ class Trial:
     @property
     def convincing(self) -> bool:
         """Whether it may be named."""
-        return self.sure and self.effect.worth(self.x)
+        return self.sure and self.effect.worth(self.told)
 
     @property
     def sure(self) -> bool:
         """Whether it is no chance, and may be named or stand for what has no name."""
         sure = self.gain > SURE * self.error and self.chance < CHANCE
-        told = self.effect.fine or self.effect.worth(self.x)
-        return sure and self.change > LEAST_CHANGE and told
+        told = self.effect.fine or self.effect.worth(self.told)
+        plain = self.gain > PLAIN * self.unseen.residual.size
+        return sure and (self.change > LEAST_CHANGE or plain) and told
 
     def sentence(self) -> str:
         """What it means, and what photo would tell it from what explains the photos as well."""
-        said = self.effect.sentence(self.x, self.deviation)
+        said = self.effect.sentence(self.told, self.deviation)
         if not self.ties:
             return said
         others = " or ".join(e.cause for e in self.ties)
@@ -101,8 +104,13 @@ class Trial:
         return known.x if isinstance(known, Fixed) else self.fitted.model.x[self.place]
 
     @property
+    def told(self) -> Vector:
+        """The numbers without what the BRDF could as well have."""
+        return self.effect.told(self.x)
+
+    @property
     def deviation(self) -> Vector:
-        """Of the numbers, as the curvature says."""
+        """Of the numbers as they are told."""
         return np.sqrt(self.unseen.variance[self.place])
 
 
@@ -235,20 +243,21 @@ def _try(now: Fitted, costs: dict[bool, Array], one: Asked) -> Trial:
     unseen = predict_unseen(fitted, fine)
     # what is confined to a few large squares could never be sure
     gained = by_square(squares(now, fine), costs[fine] - unseen.cost)
-    change = _change(fitted.shown, now.shown, now.deviation)
+    without = now.shown if effect.patch is not None else _without(fitted.model)
+    change = rms_change(fitted.shown, without, now.deviation)
     return Trial(effect, fitted, unseen, gained, change, one.chance)
+
+
+def _without(model: Model) -> Array:
+    """(n, 3) what the model shows without its last effect, the BRDF the same: another BRDF would
+    take much of it, as it takes the light that glare takes from all that is bright."""
+    effect, x = model.effects[-1], model.x[-1]
+    return replace(model, x=(*model.x[:-1], x - effect.told(x))).predicted()
 
 
 def _costs(now: Fitted) -> dict[bool, Array]:
     """(n,) of the model as it is, where large squares are left out (False) and small ones."""
     return {fine: predict_unseen(now, fine).cost for fine in (False, True)}
-
-
-def _change(shown: Array, without: Array, deviation: Array) -> float:
-    """RMS between two predictions, relative to the first, clipped pixels left out."""
-    counted = np.isfinite(deviation).all(axis=1)
-    size = max(float(np.sum(shown[counted] ** 2)), 1e-30)
-    return float(np.sqrt(np.sum((shown - without)[counted] ** 2) / size))
 
 
 def _outside(now: Fitted) -> list[Trial]:
@@ -260,7 +269,7 @@ def _outside(now: Fitted) -> list[Trial]:
     tight = fit(replace(model, brdfs=model.brdfs.tight()), now.deviation)
     unseen = predict_unseen(now)
     gains = predict_unseen(tight).cost - unseen.cost
-    change = _change(now.shown, tight.shown, now.deviation)
+    change = rms_change(now.shown, tight.shown, now.deviation)
     effect = OutsideBasis()
     effects, x = (*model.effects, effect), (*model.x, np.zeros(0))
     said = replace(now, model=replace(model, effects=effects, x=x))

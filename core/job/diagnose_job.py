@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,6 +29,7 @@ class DiagnoseJob(Job):
     def __init__(self, fit: FitJob) -> None:
         super().__init__()
         self.fit = fit
+        fit.keep = True
         self.setting: Setting | None = None
         self.found: Found | None = None
 
@@ -59,6 +61,8 @@ def setting_of(result: CaptureResult) -> Generator[float, None, Setting]:
     pixels = yield from choose_pixels(
         capture, result.scan, result.rays, result.photos, result.lights
     )
+    scale = np.array([material.scale for material in result.materials], np.float32)
+    pixels = replace(pixels, irradiance=pixels.irradiance / scale[pixels.material, None])
     names = [light.name for light in capture.lights]
     middle = pixels.point.mean(axis=0)
     return Setting(
@@ -70,6 +74,7 @@ def setting_of(result: CaptureResult) -> Generator[float, None, Setting]:
         distant=np.array([light.distant for light in capture.lights]),
         centre=middle,
         size=2 * float(np.percentile(np.linalg.norm(pixels.point - middle, axis=1), 99)),
+        level=float(np.median(pixels.irradiance)),
     )
 
 

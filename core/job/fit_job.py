@@ -24,9 +24,10 @@ from ..samples.face_votes import FaceVotes
 from ..samples.level import at_typical_level
 from ..scan import Scan
 from . import inputs
+from .applied import Applied
 from .beside import beside
 from .estimators import Estimate, estimate
-from .job import Job, Step
+from .job import Job, Step, finished
 from .lights import Lights, find_lights, refined
 from .photos import LitPhotos
 from .sampling import Taken, take_samples
@@ -59,7 +60,8 @@ class MaterialResult:
 @dataclass(frozen=True)
 class CaptureResult:
     """Everything a fit found. face_material: (f,) int, place of each face's material; notes: what
-    was read, assumed and left out, a sentence each."""
+    was read, assumed and left out, a sentence each; effects: that a diagnosis named, and that the
+    materials take into account."""
 
     capture: Capture
     scan: Scan
@@ -70,6 +72,7 @@ class CaptureResult:
     basis: Basis
     materials: tuple[MaterialResult, ...]
     face_material: NDArray[np.int32]
+    effects: tuple[Applied, ...] = ()
 
 
 def _way(entry: LightEntry) -> str:
@@ -82,7 +85,8 @@ class FitJob(Job):
     """Fit every material of a capture; ``result`` is there when the job is done.
 
     prepare: what is done to the scan once it is read (face attributes that no file has). threads:
-    how many look at the photos (None: one a core); the result does not depend on it.
+    how many look at the photos (None: one a core); the result does not depend on it. keep: whether
+    ``samples`` holds those that each material was fitted to, by its name.
     """
 
     def __init__(
@@ -91,9 +95,12 @@ class FitJob(Job):
         basis: Basis | None = None,
         prepare: Callable[[Scan], Scan] | None = None,
         threads: int | None = None,
+        keep: bool = False,
     ) -> None:
         super().__init__()
         self.threads = threads
+        self.keep = keep
+        self.samples: dict[str, SampleTable] = {}
         self.capture = capture
         self.basis = basis
         self.prepare = prepare
@@ -178,6 +185,35 @@ class FitJob(Job):
         scale = 1.0
         if not known:
             table, scale = at_typical_level(table, basis)
+        if self.keep:
+            self.samples[name] = table
+        counts = taken.counts[name]
+        return (
+            yield from self._material(index, table, basis, (known, scale), counts, start, share)
+        )
+
+    def fitted_again(
+        self, index: int, table: SampleTable, before: MaterialResult, start: float, share: float
+    ) -> Generator[Step, None, MaterialResult]:
+        """A material from other samples, in the unit of those it was fitted to before."""
+        basis, counts = finished(self.result).basis, np.array(before.per_photo)
+        unit = before.irradiance_known, before.scale
+        return (yield from self._material(index, table, basis, unit, counts, start, share))
+
+    def _material(
+        self,
+        index: int,
+        table: SampleTable,
+        basis: Basis,
+        unit: tuple[bool, float],
+        counts: NDArray[np.int64],
+        start: float,
+        share: float,
+    ) -> Generator[Step, None, MaterialResult]:
+        """unit: whether irradiance is known, and the samples' scale; counts: taken of every
+        photo."""
+        capture, name = self.capture, self.capture.materials[index].name
+        known, scale = unit
         found = yield from self._estimate(index, table, basis, start, 0.8 * share)
         step = Step(f"Principled material of {name}", start + 0.8 * share)
         yield step
@@ -193,9 +229,9 @@ class FitJob(Job):
         return MaterialResult(
             name=name,
             fit=found.fit,
-            samples=int(taken.counts[name].sum()),
+            samples=int(counts.sum()),
             used=len(table),
-            per_photo=tuple(taken.counts[name].tolist()),
+            per_photo=tuple(counts.tolist()),
             held_out=found.held_out,
             spread=found.spread,
             principled=principled,

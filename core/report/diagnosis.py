@@ -74,7 +74,7 @@ def _cause(trial: Trial, accepted: bool) -> dict[str, Any]:
         "parameters": {
             name: {"value": float(v), "standard_error": float(d), "unit": unit}
             for name, unit, v, d in zip(
-                numbers.names, numbers.units, trial.x, trial.deviation, strict=True
+                numbers.names, numbers.units, trial.told, trial.deviation, strict=True
             )
         },
     }

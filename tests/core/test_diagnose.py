@@ -20,72 +20,13 @@ from patina.core.diagnose.effects.light_intensity import LightIntensity
 from patina.core.diagnose.effects.near_light import NearLight
 from patina.core.diagnose.effects.normal_error import NormalError
 from patina.core.diagnose.effects.vignetting import Vignetting
-from patina.core.diagnose.held_out import predict_unseen
+from patina.core.diagnose.held_out import predict_unseen, variances
 from patina.core.diagnose.model import Model
-from patina.core.diagnose.pixels import Pixels
 from patina.core.diagnose.situation import Situation
 from patina.core.diagnose.slopes import slopes_of
 from patina.core.diagnose.solve import fit
-from patina.core.geometry import RayScene
-from patina.core.scan import Mesh
 from patina.core.steps import drained
-
-PHOTOS, EACH, SIZE = 6, 900, 0.8
-NOISE = 0.01
-
-
-def lit_ball(seed: int = 0) -> Setting:
-    """Pixels of a ball in six photos under three lights, of a material of the basis, with noise;
-    radiance is summed by hand here: ρ E cos θi."""
-    rng = np.random.default_rng(seed)
-    basis = Basis.default()
-    brdf = PrincipalBRDF(basis, basis.training[30:33])
-    parts = []
-    for photo in range(PHOTOS):
-        turn = 2 * np.pi * photo / PHOTOS
-        eye = np.array([np.cos(turn), np.sin(turn), 0.3]) / np.hypot(1, 0.3)
-        side = np.cross(eye, [0, 0, 1.0])
-        side /= np.linalg.norm(side)
-        light = np.cos(0.5 + 0.3 * (photo // 2)) * eye + np.sin(0.5 + 0.3 * (photo // 2)) * side
-        normal = rng.normal(size=(4 * EACH, 3))
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        normal = normal[(normal @ eye > 0.2) & (normal @ light > 0.05)][:EACH]
-        n = len(normal)
-        across = np.cross(side, eye)
-        x, y = (0.4 * normal @ side).astype(np.float32), (0.4 * normal @ across).astype(np.float32)
-        vector = np.ones((n, 3), np.float32)
-        parts.append(
-            Pixels(
-                photo=np.full(n, photo, np.int16), material=np.zeros(n, np.int16),
-                pixel=np.arange(n, dtype=np.int32), x=x, y=y, point=0.4 * normal,
-                normal=normal.astype(np.float32), view=(eye * vector).astype(np.float32),
-                light=(light * vector).astype(np.float32), irradiance=np.float32(np.pi) * vector,
-                visible=np.ones(n, np.float32),
-                edge=np.full(n, 8, np.float32), curvature=np.zeros(n, np.float32),
-                observed=vector, noise=vector, slope=np.zeros((n, 2, 3), np.float32),
-                veil=vector, turn=np.zeros((n, 2, 3), np.float32), usable=np.ones(n, bool),
-                block=(36 * photo + 6 * (x > 0) + 3 * (y > 0)
-                       + np.digitize(np.hypot(x, y), (0.15, 0.28))).astype(np.int32),
-            )
-        )  # fmt: skip
-    pixels = Pixels.join(parts)
-    now = Situation.of(pixels)
-    rho = brdf.evaluate(now.angles)
-    radiance = rho * np.pi * np.sum(pixels.normal * pixels.light, axis=1, keepdims=True)
-    noisy = radiance * (1 + NOISE * rng.standard_normal(radiance.shape))
-    pixels = replace(
-        pixels, observed=noisy.astype(np.float32), noise=np.square(NOISE * radiance),
-        veil=np.broadcast_to(radiance.mean(axis=0), radiance.shape),
-    )  # fmt: skip
-    triangle = Mesh(np.eye(3) * 1e-3, np.array([[0, 1, 2]], np.int32))
-    return Setting(
-        pixels, BRDFs.of([brdf]), RayScene.build(triangle), np.arange(PHOTOS) // 2,
-        ("a", "b", "c"), np.ones(3, bool), np.zeros(3), SIZE,
-    )  # fmt: skip
-
-
-def changed(setting: Setting, observed: np.ndarray) -> Setting:
-    return replace(setting, pixels=replace(setting.pixels, observed=observed.astype(np.float32)))
+from tests.make_lit_ball import NOISE, SIZE, changed, lit_ball
 
 
 def searched(setting: Setting, kinds=(LightDirection, LightIntensity, NearLight, CameraResponse,
@@ -213,8 +154,7 @@ def test_patches_eliminated_first_are_the_same_optimum():
     for kind in (NormalError, Whole):
         model = Model(setting.pixels, setting.brdfs).with_effect(dark)
         fitted = fit(model.with_effect(kind.of(setting)), deviation, steps=0)
-        unseen = predict_unseen(fitted)
-        found.append((unseen.cost, *fitted.model.x, *unseen.variance))
+        found.append((predict_unseen(fitted).cost, *fitted.model.x, *variances(fitted)))
     assert len(found[0][2]) > 100
     for ours, theirs in zip(*found, strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=1e-3, atol=1e-5)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .drawn import FOCAL
 from .scene import IRRADIANCE, Hidden, Scene, Shot, moved, rms, sought
 from .studio import BOUNCES
 
@@ -30,20 +31,20 @@ def intensity(scene: Scene) -> Hidden:
 
 
 def _told(scene: Scene, told, start: float, name: str) -> Hidden:  # type: ignore[no-untyped-def]
-    """The capture says something else than what was photographed; told(size): its shots."""
+    """The capture says something else than what was photographed; told(scene, size): its shots."""
 
-    def change(size: float) -> float:
-        return rms(scene.photographed(told(size)), scene.plain)
+    def change(scene: Scene, size: float) -> float:
+        return rms(scene.photographed(told(scene, size)), scene.plain)
 
-    size = sought(change, start, scene.strength)
-    return Hidden(scene.plain, {name: size}, change(size), told=told(size))
+    size = sought(lambda s: change(scene.small, s), start, scene.strength)
+    return Hidden(scene.plain, {name: size}, change(scene, size), told=told(scene, size))
 
 
 def direction(scene: Scene) -> Hidden:
     """The capture file is told other directions than those of the photos."""
     turns = [scene.rng.normal(size=3) for _ in range(len(scene.shots) // 2)]
 
-    def told(size: float) -> list[Shot]:
+    def told(scene: Scene, size: float) -> list[Shot]:
         out = []
         for place, shot in enumerate(scene.shots):
             turn = np.cross(turns[place // 2], shot.light)
@@ -57,10 +58,10 @@ def pose(scene: Scene) -> Hidden:
     """The capture's cameras are turned a little, so that their photos lie beside the object."""
     turns = [scene.rng.normal(size=2) for _ in scene.shots]
 
-    def told(size: float) -> list[Shot]:
+    def told(scene: Scene, size: float) -> list[Shot]:
         out = []
         for shot, turn in zip(scene.shots, turns, strict=True):
-            a, b = size * turn / shot.camera.focal
+            a, b = size * turn / FOCAL
             tilt = np.array([[1, 0, -a], [0, 1, -b], [a, b, 1.0]])
             rotation = np.linalg.qr(tilt @ shot.camera.rotation)[0]
             rotation *= np.sign(np.sum(rotation * shot.camera.rotation, axis=0))
@@ -75,28 +76,32 @@ def pose(scene: Scene) -> Hidden:
 def near(scene: Scene) -> Hidden:
     """A lamp without size that stands near, as bright at the object's centre."""
 
-    def lit(nearness: float) -> list[Array]:
+    def lit(scene: Scene, nearness: float) -> list[Array]:
         out = []
         for shot in scene.shots:
             scene.studio.near(shot.light / max(nearness, 1e-3), IRRADIANCE, np.zeros(3))
-            out.append(scene.studio.photo(shot.camera))
+            out.append(scene.studio.photo(shot.camera, scene.quick))
         return out
 
-    size = sought(lambda s: rms(lit(s), scene.plain), 0.1, scene.strength, most=NEAREST)
-    photos = lit(size)
+    small = scene.small
+    size = sought(lambda s: rms(lit(small, s), small.plain), 0.1, scene.strength, most=NEAREST)
+    photos = lit(scene, size)
     return Hidden(photos, {"1 / distance": size}, rms(photos, scene.plain))
 
 
 def area(scene: Scene) -> Hidden:
     """The lamp is a disc."""
 
-    def lit(size: float) -> list[Array]:
+    def lit(scene: Scene, size: float) -> list[Array]:
         scene.studio.lamp.data.angle = size
         return scene.photographed()
 
-    size = sought(lambda s: rms(lit(s), scene.plain), np.radians(8.0), scene.strength, 1.5, WIDEST)
+    def change(size: float) -> float:
+        return rms(lit(scene.small, size), scene.small.plain)
+
+    size = sought(change, np.radians(8.0), scene.strength, 1.5, WIDEST)
     scene.studio.noise_free(100)
-    photos = lit(size)
+    photos = lit(scene, size)
     return Hidden(photos, {"angular diameter": size}, rms(photos, scene.plain))
 
 
@@ -118,10 +123,13 @@ def window(scene: Scene) -> Hidden:
 
 
 def bounced(scene: Scene) -> Hidden:
-    """Light goes from one part of the object to another."""
+    """Light goes from one part of a bright matte object to another."""
+    scene.studio.dress(scene.studio.matte(scene.rng.uniform(0.75, 0.95, 3)))
+    scene.studio.bounce(0)
+    once = scene.photographed()
     scene.studio.bounce(BOUNCES)
     scene.studio.noise_free(100)
-    return scene.in_part(scene.photographed(), "part", 1.0)
+    return replace(scene, plain=once).in_part(scene.photographed(), "part", 1.0)
 
 
 def shadow(scene: Scene) -> Hidden:
@@ -133,11 +141,12 @@ def shadow(scene: Scene) -> Hidden:
     at = foremost[scene.rng.integers(len(foremost))] + 1.5 * light
     stretch = scene.rng.uniform(0.5, 2.0)
 
-    def photos(size: float) -> list[Array]:
+    def photos(scene: Scene, size: float) -> list[Array]:
         scene.studio.occluder(at, light, size, size * stretch)
         again = scene.photographed(scene.shots[pair : pair + 2])
         return [*scene.plain[:pair], *again, *scene.plain[pair + 2 :]]
 
-    size = sought(lambda s: rms(photos(s), scene.plain), 0.1, scene.strength, most=1.0)
-    found = photos(size)
+    small = scene.small
+    size = sought(lambda s: rms(photos(small, s), small.plain), 0.1, scene.strength, most=1.0)
+    found = photos(scene, size)
     return Hidden(found, {"radius": size}, rms(found, scene.plain))

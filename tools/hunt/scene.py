@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
@@ -29,10 +30,22 @@ class Shot:
     camera: Camera
     light: Array
 
+    @property
+    def small(self) -> Shot:
+        """Half as wide and high a photo."""
+        one = self.camera
+        width, height = one.size
+        camera = replace(
+            one, focal=one.focal / 2, centre=(one.centre[0] / 2, one.centre[1] / 2),
+            size=(width // 2, height // 2),
+        )  # fmt: skip
+        return replace(self, camera=camera)
+
 
 @dataclass(frozen=True)
 class Scene:
-    """plain: the photos without an effect; strength: the wanted RMS change of them."""
+    """plain: the photos without an effect; strength: the wanted RMS change of them. quick: with a
+    third of the samples a pixel."""
 
     studio: HuntStudio
     surface: Surface
@@ -41,14 +54,23 @@ class Scene:
     plain: list[Array]
     strength: float
     rng: np.random.Generator
+    quick: bool = False
 
     def photographed(self, shots: list[Shot] | None = None) -> list[Array]:
         """Photos of the studio as it is."""
         out = []
         for shot in self.shots if shots is None else shots:
             self.studio.light(shot.light, IRRADIANCE)
-            out.append(self.studio.photo(shot.camera))
+            out.append(self.studio.photo(shot.camera, self.quick))
         return out
+
+    @cached_property
+    def small(self) -> Scene:
+        """The same in photos of half the size, where the strength of an effect is searched for."""
+        plain = [
+            0.25 * (p[::2, ::2] + p[1::2, ::2] + p[::2, 1::2] + p[1::2, 1::2]) for p in self.plain
+        ]
+        return replace(self, shots=[shot.small for shot in self.shots], plain=plain)
 
     def in_part(self, whole: list[Array], name: str, most: float) -> Hidden:
         """Of light that adds up, as much as changes the photos by the wanted RMS."""
@@ -68,6 +90,12 @@ class Hidden:
     strength: float = 0.0
     told: list[Shot] | None = None
     surface: Surface | None = None
+
+
+def _halved(photo: Array) -> Array:
+    """Means over squares of two pixels."""
+    height, width, channels = photo.shape
+    return photo.reshape(height // 2, 2, width // 2, 2, channels).mean(axis=(1, 3))
 
 
 def mixed(base: list[Array], other: list[Array], part: float) -> list[Array]:

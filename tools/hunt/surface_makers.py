@@ -22,13 +22,16 @@ def normals(scene: Scene) -> Hidden:
     seed, wave = int(scene.rng.integers(1 << 30)), scene.rng.uniform(9, 16)
     rough = bool(scene.rng.random() < 0.5)
 
-    def photos(size: float) -> list[Array]:
+    def photos(scene: Scene, size: float) -> list[Array]:
         scene.studio.shape(bumpy(scene.surface, size, wave, seed))
         scene.studio.dress(scene.studio.measured(scene.brdf))
         return scene.photographed()
 
-    size = sought(lambda s: rms(photos(s), scene.plain), 0.002, scene.strength, most=LARGEST_BUMP)
-    found = photos(size)
+    def change(size: float) -> float:
+        return rms(photos(scene.small, size), scene.small.plain)
+
+    size = sought(change, 0.002, scene.strength, most=LARGEST_BUMP)
+    found = photos(scene, size)
     strength = rms(found, scene.plain)
     if rough:
         told = bumpy(scene.surface, size, wave, seed)
@@ -73,13 +76,14 @@ def brushed(scene: Scene) -> Hidden:
     scene.studio.dress(scene.studio.matte(scene.rng.uniform(0.1, 0.6, 3)))
     matte = scene.photographed()
 
-    def photos(anisotropy: float) -> list[Array]:
+    def photos(scene: Scene, anisotropy: float) -> list[Array]:
         scene.studio.dress(scene.studio.brushed(rough, anisotropy))
-        return mixed(matte, scene.photographed(), shine)
+        return mixed(scene.plain, scene.photographed(), shine)
 
-    plain = photos(0.0)
-    size = sought(lambda s: rms(photos(s), plain), 0.1, scene.strength, most=0.9)
-    found = photos(size)
+    scene = replace(scene, plain=matte)
+    plain, small = photos(scene, 0.0), photos(scene.small, 0.0)
+    size = sought(lambda s: rms(photos(scene.small, s), small), 0.1, scene.strength, most=0.9)
+    found = photos(scene, size)
     return Hidden(found, {"anisotropy": size}, rms(found, plain))
 
 
@@ -88,12 +92,13 @@ def outside(scene: Scene) -> Hidden:
     ring = bool(scene.rng.random() < 0.5)
     middle = np.radians(scene.rng.uniform(12, 25))
 
-    def photos(size: float) -> list[Array]:
+    def photos(scene: Scene, size: float) -> list[Array]:
         scene.studio.dress(scene.studio.measured(_with_lobe(scene.brdf, ring, middle, size)))
         return scene.photographed()
 
-    size = sought(lambda s: rms(photos(s), scene.plain), 0.2, scene.strength, most=2.5)
-    found = photos(size)
+    small = scene.small
+    size = sought(lambda s: rms(photos(small, s), small.plain), 0.2, scene.strength, most=2.5)
+    found = photos(scene, size)
     return Hidden(found, {"ring" if ring else "angle": size}, rms(found, scene.plain))
 
 

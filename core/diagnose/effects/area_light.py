@@ -15,9 +15,22 @@ from ..situation import Situation
 RADII = np.radians([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 13.0])  # about the lamp's middle, of shadow rays
 AROUND = 8
 PARTS = 12  # of the lamp
-GOLDEN = np.pi * (3 - np.sqrt(5))
 LEAST = np.radians(1.0)  # the sun itself is half a degree wide
 USUAL, START = np.radians(6.0), np.radians(3.0)
+
+
+def _disc(count: int) -> NDArray[np.float64]:
+    """(count, 2) points spread over a disc of radius 1, whose mean and second moments are the
+    disc's: a sunflower's own mean lies beside the middle, as if the lamp stood elsewhere."""
+    turn = np.pi * (3 - np.sqrt(5)) * np.arange(count)
+    out = np.sqrt((np.arange(count) + 0.5) / count)
+    points = np.stack([out * np.cos(turn), out * np.sin(turn)], axis=1)
+    points -= points.mean(axis=0)
+    spread = np.linalg.cholesky(points.T @ points / count)
+    return np.asarray(0.5 * np.linalg.solve(spread, points.T).T)
+
+
+DISC = _disc(PARTS)
 
 
 @dataclass(frozen=True)
@@ -73,10 +86,8 @@ class AreaLight(Effect):
         visible = np.clip(now.visible + free - now.pixels.visible, 0, 1)
         visible = np.where(self.distant, visible, now.visible)
         parts = []
-        for part in range(PARTS):
-            out = np.tan(radius) * np.sqrt((part + 0.5) / PARTS)
-            turn = GOLDEN * part
-            aside = out * (np.cos(turn) * self.first + np.sin(turn) * self.other)
+        for first, other in np.tan(radius) * DISC:
+            aside = first * self.first + other * self.other
             towards = now.light + np.where(self.distant[:, None], aside, 0).astype(np.float32)
             towards /= np.linalg.norm(towards, axis=1, keepdims=True)
             parts.append(replace(now, light=towards, visible=visible))

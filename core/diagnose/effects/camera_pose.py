@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ class CameraPose(Effect):
     x: Array
     y: Array
     cause = "camera_pose"
+    of_photo = True
     proof = "the same photos aligned again, with more landmarks"
 
     @classmethod
@@ -32,6 +33,10 @@ class CameraPose(Effect):
         pixels = setting.pixels
         photos, place = np.unique(pixels.photo, return_inverse=True)
         return cls(tuple(photos.tolist()), place.ravel(), pixels.slope, pixels.x, pixels.y)
+
+    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> CameraPose:
+        pixels = setting.pixels
+        return replace(self, photo=self.photo[near], slope=pixels.slope, x=pixels.x, y=pixels.y)
 
     @property
     def numbers(self) -> Numbers:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..effect import Array, Effect, Numbers, Setting
 from ..situation import Situation
@@ -25,6 +26,9 @@ class CameraResponse(Effect):
     @classmethod
     def of(cls, setting: Setting) -> CameraResponse:
         return cls(max(float(np.median(setting.pixels.observed)), 1e-9))
+
+    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> CameraResponse:
+        return self
 
     @property
     def numbers(self) -> Numbers:

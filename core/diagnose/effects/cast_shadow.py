@@ -37,6 +37,9 @@ class CastShadow(PatchEffect):
         square = np.unique(number, return_inverse=True)[1].ravel()
         return cls(square.astype(np.intp), (USUAL,), pixels.photo)
 
+    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> CastShadow:
+        return replace(self, parts=self.parts[near], photo=self.photo[near])
+
     @property
     def numbers(self) -> Numbers:
         names = [f"square {k + 1}" for k in range(self.count)]

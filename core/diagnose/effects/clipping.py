@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..effect import Array, Effect, Numbers, Setting
 from ..situation import Situation
@@ -25,6 +26,9 @@ class Clipping(Effect):
     def of(cls, setting: Setting) -> Clipping:
         seen = setting.pixels.observed
         return cls(np.maximum(seen.max(axis=0), 1e-9).astype(np.float64))
+
+    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> Clipping:
+        return self
 
     @property
     def numbers(self) -> Numbers:

@@ -43,6 +43,9 @@ class LightDirection(Effect):
         names = tuple(setting.lights[k] for k in wanted)
         return cls(names, *tangents(directions), place)
 
+    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> LightDirection:
+        return replace(self, light=self.light[near])
+
     @property
     def numbers(self) -> Numbers:
         names = [f"{name}, {way}" for name in self.names for way in ("first", "second")]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effect import Effect, Numbers, Setting, felt_by
+from ..effect import Effect, Numbers, Setting, felt_by, without_mean
 from ..situation import Situation
 
 USUAL = 0.1  # of the logarithm
@@ -28,6 +28,9 @@ class LightIntensity(Effect):
         photos, place = np.unique(setting.pixels.photo, return_inverse=True)
         return cls(tuple(photos.tolist()), place.ravel()) if len(photos) > 1 else None
 
+    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> LightIntensity:
+        return replace(self, photo=self.photo[near])
+
     @property
     def numbers(self) -> Numbers:
         names = [f"photo {p + 1}" for p in self.photos]
@@ -36,6 +39,10 @@ class LightIntensity(Effect):
     @property
     def feels(self) -> NDArray[np.intp]:
         return felt_by(self.photo, 1)
+
+    @property
+    def anchor(self) -> NDArray[np.float64]:
+        return without_mean(len(self.photos), 1, 0)
 
     def before(self, now: Situation, x: np.ndarray) -> Situation:
         gain = np.exp(x)[self.photo].astype(np.float32)

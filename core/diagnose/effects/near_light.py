@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effect import Array, Effect, Numbers, Setting, felt_by
+from ..effect import Array, Effect, Numbers, Setting, felt_by, without_mean
 from ..situation import Situation
 from .light_direction import LightDirection
 
@@ -36,8 +36,11 @@ class NearLight(Effect):
         from_afar = LightDirection.of(setting)
         if from_afar is None:
             return None
-        offset = ((setting.pixels.point - setting.centre) / setting.size).astype(np.float32)
-        return cls(from_afar, offset, setting.size)
+        return cls(from_afar, _offset(setting), setting.size)
+
+    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> NearLight:
+        from_afar = self.from_afar.elsewhere(setting, near)
+        return replace(self, from_afar=from_afar, offset=_offset(setting))
 
     @property
     def numbers(self) -> Numbers:
@@ -58,6 +61,10 @@ class NearLight(Effect):
     @property
     def feels(self) -> NDArray[np.intp]:
         return felt_by(self.from_afar.light, EACH)
+
+    @property
+    def anchor(self) -> NDArray[np.float64]:
+        return without_mean(len(self.from_afar.names), EACH, EACH - 1)
 
     def nearness(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(lights,) sizes of the object over the distance."""
@@ -85,3 +92,8 @@ class NearLight(Effect):
             f"{self.size / nearness:.3g} scan units away ({1 / nearness:.1f} times the object's "
             f"size): the near side gets up to {unevenness:.0f} % more light than the far one"
         )
+
+
+def _offset(setting: Setting) -> Array:
+    """(n, 3) from the centre, in sizes."""
+    return ((setting.pixels.point - setting.centre) / setting.size).astype(np.float32)

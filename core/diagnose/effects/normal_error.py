@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...angles.vectors import tangents
 from ..effect import Array, Numbers, Setting
@@ -38,6 +39,9 @@ class NormalError(PatchEffect):
         mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9)
         at = [v[patch].astype(np.float32) for v in tangents(mean)]
         return cls(patch, (USUAL,) * 2, *at)
+
+    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> NormalError:
+        return replace(self, parts=self.parts[near], first=self.first[near], other=self.other[near])
 
     @property
     def numbers(self) -> Numbers:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..brdfs import BRDFs
 from ..effect import Array, Numbers, Setting
@@ -35,6 +36,10 @@ class SecondMaterial(PatchEffect):
         if not (parts >= 0).any():
             return None
         return cls(parts, USUAL, Situation.of(setting.pixels).received)
+
+    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> SecondMaterial:
+        received = Situation.of(setting.pixels).received
+        return replace(self, parts=self.parts[near], received=received)
 
     @property
     def numbers(self) -> Numbers:

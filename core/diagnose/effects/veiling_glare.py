@@ -17,6 +17,7 @@ class VeilingGlare(Effect):
 
     veil: Array
     cause = "veiling_glare"
+    of_photo = True
     proof = "one photo with a hood on the lens and black behind the object"
 
     @classmethod

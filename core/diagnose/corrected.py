@@ -1,0 +1,94 @@
+"""Samples as they would be without the effects that a diagnosis named: what an estimator is given.
+
+What the camera did is taken back by one Newton step about the prediction, which no noise can throw
+far; light that was added is subtracted; directions, irradiance and shadows are what the effects
+make them; and what a lamp's size or a stretched highlight does is a ratio of two predictions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import half_difference
+from ..angles.vectors import dot
+from ..samples import SampleTable
+from .effect import Setting
+from .model import Model
+from .of_samples import nearest
+from .pixels import Pixels
+
+CHUNK = 20_000  # samples at a time: what each sees around itself takes a kilobyte
+NUDGE = 1e-2  # of the prediction
+LEAST_RESPONSE = 0.3  # of the camera's usual one: less is a plateau, which tells nothing
+LEAST_COS, LEAST_LIGHT = 0.05, 0.5  # θi; part of the lamp's light that arrives
+FARTHEST = 3.0  # factor by which a prediction may correct
+
+
+def corrected(
+    table: SampleTable, pixels: Pixels, model: Model, setting: Setting
+) -> Generator[float, None, SampleTable]:
+    """Samples (n,) → those (m ≤ n) that can be corrected; yields the fraction done. pixels: of the
+    samples (of_samples.py); model: with the effects, at its optimum; setting: that it was made for.
+    """
+    parts = []
+    near = nearest(pixels, setting.pixels)
+    for start in range(0, len(table), CHUNK):
+        yield start / len(table)
+        rows = np.arange(start, min(start + CHUNK, len(table)))
+        here = replace(setting, pixels=pixels.select(rows))
+        parts.append(_corrected(table.select(rows), elsewhere(model, here, near[rows])))
+    return SampleTable.concatenate(parts) if parts else table
+
+
+def elsewhere(model: Model, setting: Setting, near: NDArray[np.intp]) -> Model:
+    """The same model for the setting's pixels; near: (m,) of the model's own the nearest."""
+    effects, x = [], []
+    for effect, numbers in zip(model.effects, model.x, strict=True):
+        moved = effect.elsewhere(setting, near)
+        if moved is not None:
+            effects.append(moved)
+            x.append(effect.told(numbers))
+    return Model(setting.pixels, model.brdfs, tuple(effects), tuple(x))
+
+
+def _corrected(table: SampleTable, model: Model) -> SampleTable:
+    now = model.situation()
+    lamps = model.lamps(now)
+    reflected = model.reflected(lamps)
+    entering = model.entering(reflected, now)
+    recorded = model.recorded(entering, now)
+    step = NUDGE * np.maximum(entering, 1e-12)
+    response = (model.recorded(entering + step, now) - recorded) / step
+    usual = np.median(response, axis=0)
+    good = (response > LEAST_RESPONSE * usual).all(axis=1)
+    arrived = entering + (table.radiance - recorded) / np.maximum(response, 1e-3 * usual)
+    radiance = arrived - (entering - reflected)
+    if len(lamps) > 1 or now.stretch is not None:
+        point = model.brdfs.reflected(replace(now, stretch=None))
+        ratio = point / np.maximum(reflected, 1e-30)
+        good &= ((ratio < FARTHEST) & (ratio > 1 / FARTHEST)).all(axis=1)
+        radiance = radiance * ratio
+    cos_i = dot(now.normal, now.light)
+    cos_o = dot(now.normal, table.view)
+    good &= (cos_i > LEAST_COS) & (cos_o > LEAST_COS) & (now.visible > LEAST_LIGHT)
+    good &= np.isfinite(radiance).all(axis=1)
+    irradiance = (now.irradiance * now.visible[:, None]).astype(np.float32)
+    angles = half_difference(now.normal, now.light, table.view)
+    rho = radiance / np.maximum(irradiance * np.maximum(cos_i, LEAST_COS)[:, None], 1e-30)
+    return replace(
+        table,
+        theta_h=np.asarray(angles.theta_h, np.float32),
+        theta_d=np.asarray(angles.theta_d, np.float32),
+        phi_d=np.asarray(angles.phi_d, np.float32),
+        cos_i=cos_i.astype(np.float32),
+        cos_o=cos_o.astype(np.float32),
+        rho=rho.astype(np.float32),
+        radiance=radiance.astype(np.float32),
+        irradiance=irradiance,
+        normal=np.asarray(now.normal, np.float32),
+        light=np.asarray(now.light, np.float32),
+    ).select(np.flatnonzero(good))

@@ -1,0 +1,63 @@
+"""The pixels of a fit's samples, as a diagnosis' effects want them."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ..capture import Capture
+from ..job import inputs
+from ..job.photos import LitPhotos
+from ..samples import SampleTable
+from ..scan import Scan
+from .choose import REACH, photo_slopes, photo_veil
+from .pixels import Pixels
+
+APART = 1e3  # half diagonals between two photos
+
+
+def pixels_of_samples(
+    table: SampleTable, material: int, capture: Capture, scan: Scan, photos: LitPhotos, read: bool
+) -> Generator[float, None, Pixels]:
+    """Of every sample (n,), all of one material; yields the fraction done. read: whether photos
+    are, for ``slope`` and ``veil``, which are 0 otherwise, as ``turn`` and ``block`` always are.
+    Raises InputError for a photo that is no longer there."""
+    n = len(table)
+    x, y = np.zeros(n, np.float32), np.zeros(n, np.float32)
+    slope, veil = np.zeros((n, 2, 3), np.float32), np.zeros((n, 3), np.float32)
+    numbers = np.unique(table.photo)
+    for done, place in enumerate(numbers.tolist()):
+        yield done / len(numbers)
+        rows = np.flatnonzero(table.photo == place)
+        camera = inputs.camera_of(capture, scan, place)
+        pixel = table.pixel[rows]
+        row, column = np.divmod(pixel, camera.width)
+        half = 0.5 * np.hypot(camera.width, camera.height)
+        x[rows] = (column + 0.5 - camera.width / 2) / half
+        y[rows] = (row + 0.5 - camera.height / 2) / half
+        if read:
+            radiance = photos.read(place).radiance
+            slope[rows] = photo_slopes(radiance, pixel)
+            veil[rows] = photo_veil(radiance, pixel)
+    return Pixels(
+        photo=table.photo, material=np.full(n, material, np.int16), pixel=table.pixel, x=x, y=y,
+        point=table.point, normal=table.normal, view=table.view, light=table.light,
+        irradiance=table.irradiance, visible=np.ones(n, np.float32),
+        edge=np.full(n, REACH, np.float32), curvature=table.curvature, observed=table.radiance,
+        noise=np.full((n, 3), 1e-20, np.float32), slope=slope, veil=veil,
+        turn=np.zeros((n, 2, 3), np.float32), usable=np.ones(n, bool),
+        block=np.zeros(n, np.int32),
+    )  # fmt: skip
+
+
+def nearest(pixels: Pixels, looked_at: Pixels) -> NDArray[np.intp]:
+    """(n,) of each pixel the nearest of the others in the same photo, or, where a photo has none,
+    in another."""
+    return np.asarray(cKDTree(_places(looked_at)).query(_places(pixels))[1], np.intp)
+
+
+def _places(pixels: Pixels) -> NDArray[np.float64]:
+    return np.stack([pixels.x, pixels.y, APART * pixels.photo.astype(np.float64)], axis=1)

@@ -1,0 +1,133 @@
+"""Samples rid of an effect are those of photos without it; the same numbers, other pixels."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from patina.core.angles import half_difference
+from patina.core.basis import PrincipalBRDF
+from patina.core.diagnose.brdfs import BRDFs
+from patina.core.diagnose.corrected import corrected, elsewhere
+from patina.core.diagnose.effect import Setting
+from patina.core.diagnose.effects import EFFECTS
+from patina.core.diagnose.effects.area_light import AreaLight
+from patina.core.diagnose.effects.camera_response import CameraResponse
+from patina.core.diagnose.effects.cast_shadow import CastShadow
+from patina.core.diagnose.effects.clipping import Clipping
+from patina.core.diagnose.effects.light_direction import LightDirection
+from patina.core.diagnose.effects.light_intensity import LightIntensity
+from patina.core.diagnose.effects.near_light import NearLight
+from patina.core.diagnose.effects.vignetting import Vignetting
+from patina.core.diagnose.model import Model
+from patina.core.diagnose.of_samples import nearest
+from patina.core.samples import SampleTable
+from patina.core.steps import drained
+from tests.make_lit_ball import changed, lit_ball
+
+
+def table_of(setting: Setting) -> SampleTable:
+    """The samples that a fit would take at the setting's pixels."""
+    pixels = setting.pixels
+    angles = half_difference(pixels.normal, pixels.light, pixels.view)
+    cos_i = np.sum(pixels.normal * pixels.light, axis=1)
+    own = {f.name: getattr(pixels, f.name, None) for f in fields(SampleTable)}
+    own |= {
+        "theta_h": angles.theta_h, "theta_d": angles.theta_d, "phi_d": angles.phi_d,
+        "cos_i": cos_i, "cos_o": np.sum(pixels.normal * pixels.view, axis=1),
+        "radiance": pixels.observed, "weight": np.ones(len(pixels), np.float32),
+        "rho": pixels.observed / (pixels.irradiance * cos_i[:, None]),
+    }  # fmt: skip
+    return SampleTable(**own)
+
+
+EXAMPLES = {
+    LightIntensity: np.array([0.1, -0.1, 0.2, 0.0, -0.25, 0.05]),
+    LightDirection: np.array([0.02, -0.03, 0.01, 0.04, 0.0, -0.02]),
+    NearLight: np.array([0.2, 0.01, 0.0, 0.1, 0.2, 0.0, 0.0, -0.1, 0.2, 0.0, 0.01, 0.0]),
+    CameraResponse: np.array([0.2, 0.01]),
+    Vignetting: np.array([-0.3, 0.1]),
+    AreaLight: np.array([0.1]),
+}
+
+
+@pytest.mark.parametrize("kind", EXAMPLES, ids=lambda k: k.cause)
+def test_samples_rid_of_an_effect_show_the_brdf(kind):
+    """Photos made with an effect, corrected with the same numbers: ρ is the BRDF's, at the
+    directions that the effect says."""
+    setting = lit_ball(3)
+    bare = BRDFs.of([_brdf_of(setting)])
+    model = Model(setting.pixels, bare).with_effect(kind.of(setting), EXAMPLES[kind])
+    shown = model.predicted()
+    setting = changed(setting, shown)
+    model = replace(model, pixels=setting.pixels, footprint=None)
+    found = drained(corrected(table_of(setting), setting.pixels, model, setting))
+    assert len(found) > 0.85 * len(shown)
+    truth = bare.evaluate(found.angles, np.zeros(len(found), np.int16))
+    np.testing.assert_allclose(found.rho, truth, rtol=2e-3, atol=1e-5)
+    assert np.all(found.cos_i > 0)
+
+
+def _brdf_of(setting: Setting):
+    brdfs = setting.brdfs
+    return PrincipalBRDF(brdfs.basis, brdfs.coefficients[0])
+
+
+def test_what_is_clipped_tells_nothing_and_is_dropped():
+    setting = lit_ball(4)
+    top = float(setting.pixels.observed.max())
+    setting = changed(setting, np.minimum(setting.pixels.observed, 0.3 * top))
+    effect = Clipping.of(setting)
+    level = np.log(8.0) + np.log(effect.top / (0.3 * top))
+    model = Model(setting.pixels, setting.brdfs).with_effect(effect, level)
+    found = drained(corrected(table_of(setting), setting.pixels, model, setting))
+    on_plateau = (setting.pixels.observed > 0.29 * top).any(axis=1)
+    assert len(found) < len(setting.pixels) - 0.5 * on_plateau.sum()
+    assert found.radiance.max() < 0.45 * top
+
+
+def test_the_same_numbers_speak_of_other_pixels():
+    """Every effect of half of the pixels, moved to the other half, shows what it would have."""
+    setting = lit_ball(5)
+    rng = np.random.default_rng(0)
+    order = rng.permutation(len(setting.pixels))
+    one = replace(setting, pixels=setting.pixels.select(np.sort(order[: len(order) // 2])))
+    near = nearest(setting.pixels, one.pixels)
+    assert (one.pixels.photo[near] == setting.pixels.photo).all()
+    for kind in (*EXAMPLES, CastShadow):
+        whole, half = kind.of(setting), kind.of(one)
+        if kind is CastShadow:
+            x = -rng.uniform(0, 0.5, len(half.numbers))
+        else:
+            x = EXAMPLES[kind]
+        told = Model(one.pixels, one.brdfs).with_effect(half, x)
+        moved = elsewhere(told, setting, near).predicted()
+        if kind is CastShadow:  # of half of the pixels, squares are other ones
+            same = np.flatnonzero(np.isin(np.arange(len(near)), order[: len(order) // 2]))
+            np.testing.assert_allclose(moved[same], told.predicted(), rtol=1e-5)
+        else:
+            if kind is CameraResponse:  # what is grey was said when the numbers were found
+                whole = half
+            x = whole.told(x)
+            plain = Model(setting.pixels, setting.brdfs).with_effect(whole, x).predicted()
+            np.testing.assert_allclose(moved, plain, rtol=1e-5, atol=1e-7)
+
+
+@pytest.mark.parametrize("kind", EFFECTS, ids=lambda k: k.cause)
+def test_every_effect_can_be_moved(kind):
+    setting = lit_ball(6)
+    effect = kind.of(setting)
+    if effect is None:
+        pytest.skip("cannot be there on a ball alone")
+    near = nearest(setting.pixels, setting.pixels)
+    moved = effect.elsewhere(setting, near)
+    assert moved is not None and len(moved.numbers) == len(effect.numbers)
+
+
+def test_a_gain_that_all_photos_share_is_the_brdfs():
+    effect = LightIntensity.of(lit_ball(0))
+    np.testing.assert_allclose(effect.told(np.full(6, 0.3)), 0, atol=1e-12)
+    drift = np.array([0.1, -0.1, 0.2, 0.0, -0.25, 0.05])
+    np.testing.assert_allclose(effect.told(drift + 1.0), drift, atol=1e-12)
