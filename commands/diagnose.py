@@ -1,43 +1,65 @@
-"""``diagnose CAPTURE --out DIR``: fit, say what is wrong and why, and what is gained."""
+"""``diagnose CAPTURE --out DIR``: fit, say what is wrong and why, and fit again without it."""
 
 from __future__ import annotations
 
 import argparse
 
 from ..core.capture import read_capture
+from ..core.diagnose.effects import EFFECTS
+from ..core.diagnose.search import Found
 from ..core.job import FitJob, finished
-from ..core.job.diagnose_job import DiagnoseJob
-from ..core.report import diagnosis
+from ..core.job.check_job import CheckJob
+from ..core.report import diagnosis, diagnosis_json
 from . import capture_arguments
+from .fit import tell, write_results
 from .progress import Progress
 from .solve import check_threads
 from .staging import check_out, staged_folder
 
-HELP = "fit a capture and say what is wrong with it"
+HELP = "fit a capture, say what is wrong with it, and fit it again with that in the model"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    capture_arguments.add_arguments(parser, "the diagnosis")
+    capture_arguments.add_arguments(parser, "the diagnosis and the materials")
+    parser.add_argument(
+        "--without",
+        nargs="+",
+        default=[],
+        metavar="CAUSE",
+        choices=[kind.cause for kind in EFFECTS],
+        help="leave these out of the second fit, even if they are named: %(choices)s",
+    )
 
 
 def run(arguments: argparse.Namespace) -> None:
     check_threads(arguments.threads)
     out = check_out(arguments.out)
-    job = DiagnoseJob(FitJob(read_capture(arguments.capture), threads=arguments.threads))
-    job.drain(Progress(share=0.97))
-    found, setting = finished(job.found), finished(job.setting)
+    fit = FitJob(read_capture(arguments.capture), threads=arguments.threads)
+    job = CheckJob(fit, without=arguments.without)
+    progress = Progress(share=0.9)
+    job.drain(progress)
+    progress.share = 1.0
+    checked, after = job.checked, finished(job.result)
+    found, before = finished(checked.found), finished(checked.result)
     with staged_folder(out) as folder:
-        diagnosis.write_pages(folder / "report", arguments.capture.name, found, setting)
-        diagnosis.write(folder / "diagnosis.json", found)
+        report = folder / "report"
+        diagnosis.write_pages(report, found, finished(checked.setting), before, after)
+        diagnosis_json.write(folder / "diagnosis.json", found, before, after)
+        write_results(folder, out, after, job.stages, progress, "report/materials")
+    _tell_causes(found)
+    tell(out, after)
+    print(f"      {out / 'diagnosis.json'}")
+
+
+def _tell_causes(found: Found) -> None:
     for trial in found.accepted:
         print(f"{trial.effect.cause}: {trial.sentence()}")
     if found.unexplained:
         print(f"unknown: {found.left.sentence()}")
     if not found.causes:
         print("none: nothing that can be named is wrong beyond noise and the scan's own errors")
+    before, after = found.error_before, found.error_after
     print(
-        f"not noise: {100 * found.not_noise_before:.0f} % of what the prediction misses, "
-        f"{100 * found.not_noise_after:.0f} % with what is named in the model"
+        f"left-out parts of the photos: {100 * before.parts:.1f} % off, "
+        f"{100 * after.parts:.1f} % with what is named in the model"
     )
-    print(f"wrote {out / 'diagnosis.json'}")
-    print(f"      {out / 'report' / 'index.html'}")

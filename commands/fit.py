@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -41,20 +41,32 @@ def fit_to_folder(capture_file: Path, out: Path, threads: int | None = None) -> 
     result = finished(job.result)
     progress.share = 1.0
     with staged_folder(out) as folder:
-        stages = [*job.stages]
-        with timed(stages, "tables", progress, 0.9):
-            for material in result.materials:
-                merl_file.write(folder / f"{material.name}.binary", material.fit.brdf.table())
-        with timed(stages, "report", progress, 0.92):
-            for _ in write_report(folder / "report", result):
-                pass
-        with timed(stages, "scene.blend", progress, 0.97):
-            from ..scene.blend_file import write_blend  # needs bpy
-
-            notes = write_blend(folder / "scene.blend", out / "scene.blend", result, stages)
-        result_json.write(folder / "result.json", result, stages, notes)
-    _tell(out, result)
+        write_results(folder, out, result, job.stages, progress)
+    tell(out, result)
     return result
+
+
+def write_results(
+    folder: Path,
+    out: Path,
+    result: CaptureResult,
+    stages: Sequence[Stage],
+    progress: Progress,
+    report: str = "report",
+) -> None:
+    """Tables, report, scene.blend and result.json into a staged folder that moves to ``out``."""
+    stages = [*stages]
+    with timed(stages, "tables", progress, 0.9):
+        for material in result.materials:
+            merl_file.write(folder / f"{material.name}.binary", material.fit.brdf.table())
+    with timed(stages, "report", progress, 0.92):
+        for _ in write_report(folder / report, result):
+            pass
+    with timed(stages, "scene.blend", progress, 0.97):
+        from ..scene.blend_file import write_blend  # needs bpy
+
+        notes = write_blend(folder / "scene.blend", out / "scene.blend", result, stages)
+    result_json.write(folder / "result.json", result, stages, notes)
 
 
 @contextmanager
@@ -66,7 +78,8 @@ def timed(stages: list[Stage], name: str, progress: Progress, fraction: float) -
     stages.append(Stage(name, time.perf_counter() - since, peak_memory()))
 
 
-def _tell(out: Path, result: CaptureResult) -> None:
+def tell(out: Path, result: CaptureResult) -> None:
+    """What was found, for whoever reads the terminal."""
     for material in result.materials:
         unseen = (
             "" if material.held_out is None

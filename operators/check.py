@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import bpy
 
-from ..core.job.diagnose_job import DiagnoseJob
-from ..core.report.diagnosis import describe
+from ..core.job import CaptureResult, Job
+from ..core.job.check_job import CheckJob
+from ..core.job.refit_job import RefitJob
+from ..core.report.diagnosis_json import describe
+from ..scene.apply import apply_result
+from ..scene.checked import keep, kept
 from ..scene.evidence import paint_evidence, show_evidence
-from ..scene.properties import DIAGNOSIS, store_result
+from ..scene.properties import DIAGNOSIS, capture_path, store_result
 from ..scene.running import tell
 from .fit import can_fit, fit_job
 from .stepped import Stepped
@@ -15,7 +19,7 @@ from .stepped import Stepped
 
 class PATINA_OT_check(Stepped, bpy.types.Operator):
     """Fit the materials, then find what the photos show that scan, light and materials do not \
-explain, and name the cause"""
+explain, name the cause, and fit again with it in the model"""
 
     bl_idname = "patina.check"
     bl_label = "Check"
@@ -26,16 +30,22 @@ explain, and name the cause"""
         return can_fit(cls, context)
 
     def _start(self, context: bpy.types.Context) -> None:
-        self._job = DiagnoseJob(fit_job(self, context.scene))
+        self._job = CheckJob(fit_job(self, context.scene))
         self._scene = context.scene.name
 
     def _finish(self, context: bpy.types.Context) -> None:
-        found, setting, result = self._job.found, self._job.setting, self._job.result
+        checked, after = self._job.checked, self._job.result
+        found, setting, before = checked.found, checked.setting, checked.result
         scene = bpy.data.scenes.get(self._scene)
-        if found is None or setting is None or result is None or scene is None:
+        if found is None or setting is None or before is None or after is None or scene is None:
             self.report({"WARNING"}, "The scene is gone; nothing was kept")
             return
-        store_result(str(result.capture.file), describe(found), DIAGNOSIS)
+        keep(checked)
+        scene.patina.causes.clear()
+        for effect in after.effects:
+            scene.patina.causes.add().name = effect.cause
+        _show(self, scene, after, self._job)
+        store_result(str(before.capture.file), describe(found, before, after), DIAGNOSIS)
         mesh, vertices = scene.patina.mesh, setting.rays.mesh.vertices
         if mesh is not None and not paint_evidence(mesh, vertices, setting.pixels, found):
             self.report({"WARNING"}, f"{mesh.name} no longer has the scan's vertices: not coloured")
@@ -43,6 +53,47 @@ explain, and name the cause"""
             self.report({"WARNING"}, f"{trial.effect.cause}: {trial.sentence()}")
         if not found.causes:
             self.report({"INFO"}, "Nothing that can be named is wrong")
+
+
+class PATINA_OT_refit(Stepped, bpy.types.Operator):
+    """Fit the materials again, with only those causes in the model that are switched on"""
+
+    bl_idname = "patina.refit"
+    bl_label = "Fit Again"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if kept(capture_path(context.scene)) is None:
+            cls.poll_message_set("Check first: samples are kept only as long as Blender runs")
+            return False
+        return cls.idle(context)
+
+    def _start(self, context: bpy.types.Context) -> None:
+        off = [cause.name for cause in context.scene.patina.causes if not cause.use]
+        self._job = RefitJob(kept(capture_path(context.scene)), without=off)
+        self._scene = context.scene.name
+
+    def _finish(self, context: bpy.types.Context) -> None:
+        checked, after = self._job.checked, self._job.result
+        scene = bpy.data.scenes.get(self._scene)
+        if after is None or scene is None or checked.result is None or checked.found is None:
+            self.report({"WARNING"}, "The scene is gone; the materials were not applied")
+            return
+        _show(self, scene, after, self._job)
+        told = describe(checked.found, checked.result, after)
+        store_result(str(after.capture.file), told, DIAGNOSIS)
+
+
+def _show(
+    operator: bpy.types.Operator, scene: bpy.types.Scene, result: CaptureResult, job: Job
+) -> None:
+    """The materials onto the mesh, what should be known about them to the user."""
+    for note in apply_result(scene, result, job.stages):
+        operator.report({"WARNING"}, note)
+    used = ", ".join(effect.cause for effect in result.effects)
+    told = f"with {used} in the model" if used else "as the capture says"
+    operator.report({"INFO"}, f"{len(result.materials)} materials fitted {told}")
 
 
 class PATINA_OT_show_evidence(bpy.types.Operator):
@@ -73,7 +124,7 @@ class PATINA_OT_show_evidence(bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (PATINA_OT_check, PATINA_OT_show_evidence)
+CLASSES = (PATINA_OT_check, PATINA_OT_refit, PATINA_OT_show_evidence)
 
 
 def register() -> None:
@@ -83,5 +134,6 @@ def register() -> None:
 
 def unregister() -> None:
     tell(None)
+    keep(None)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

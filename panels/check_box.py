@@ -10,30 +10,46 @@ from ..scene.evidence import MISSED
 from .wrapped import wrapped
 
 MOST = 6
+MEASURES = (("Left-out parts", "held_out"), ("Left-out photos", "held_out_photos"))
 
 
-def draw_check(layout: bpy.types.UILayout, diagnosis: dict[str, Any]) -> None:
-    """diagnosis: the content of diagnosis.json."""
+def draw_check(
+    layout: bpy.types.UILayout,
+    diagnosis: dict[str, Any],
+    causes: bpy.types.bpy_prop_collection,
+) -> None:
+    """diagnosis: the content of diagnosis.json; causes: PatinaCause, what can be switched off."""
     named = [c for c in diagnosis["named"] if c != "none"]
     text = ", ".join(n.replace("_", " ") for n in named) or "Nothing that can be named"
     layout.label(text=text, icon="ERROR" if named else "CHECKMARK")
-    before, after = diagnosis["baseline"]["not_noise"], diagnosis["extended"]["not_noise"]
-    layout.label(text=f"Not noise: {100 * before:.0f} % of what is missed")
-    if named:
-        layout.label(text=f"… with these causes: {100 * after:.0f} %", icon="BLANK1")
+    before, after = diagnosis["baseline"], diagnosis["extended"]
+    for label, key in MEASURES:
+        if before[key] is not None and after[key] is not None:
+            row = layout.row()
+            row.label(text=label)
+            row.label(text=f"{100 * before[key]:.1f} → {100 * after[key]:.1f} %")
     show = layout.operator("patina.show_evidence", text="What is Missed", icon="OVERLAY")
     show.cause = MISSED
-    causes = diagnosis["causes"]
-    most = max((_sure(c) for c in causes), default=1.0)
-    for cause in causes[:MOST]:
+    ranked = diagnosis["causes"]
+    most = max((_sure(c) for c in ranked), default=1.0)
+    for cause in ranked[:MOST]:
         box = layout.box()
         row = box.row()
         name = cause["cause"].replace("_", " ")
+        switch = causes.get(cause["cause"])
+        if switch is not None and cause["accepted"]:
+            row.prop(switch, "use", text="")
         row.progress(text=name, factor=min(max(_sure(cause) / max(most, 1e-9), 0), 1), type="BAR")
         if cause["accepted"]:
             row.operator("patina.show_evidence", text="", icon="HIDE_OFF").cause = cause["cause"]
             wrapped(box, cause["sentence"], "BLANK1")
-    if diagnosis["left"]["named"]:
+    if len(causes):
+        used = {cause.name for cause in causes if cause.use}
+        changed = used != set(diagnosis["applied"])
+        row = layout.row()
+        row.alert = changed
+        row.operator("patina.refit", icon="FILE_REFRESH" if changed else "CHECKMARK")
+    if diagnosis["unexplained"]:
         wrapped(layout, diagnosis["left"]["sentence"], "QUESTION")
 
 

@@ -101,7 +101,7 @@ class PATINA_PT_check(_Stage, bpy.types.Panel):
         layout.operator("patina.check", icon="VIEWZOOM")
         diagnosis = stored_result(capture_path(context.scene), DIAGNOSIS)
         if diagnosis is not None:
-            draw_check(layout, diagnosis)
+            draw_check(layout, diagnosis, context.scene.patina.causes)
 
 
 class PATINA_PT_material(_Stage, bpy.types.Panel):

@@ -12,6 +12,16 @@ RESULT, DIAGNOSIS = "Patina result", "Patina diagnosis"  # names of texts
 CAPTURE = "patina_capture"  # on whatever was made from a capture: the file, absolute
 
 
+class PatinaCause(bpy.types.PropertyGroup):
+    """A cause that a check named; ``name`` is the word of the vocabulary."""
+
+    use: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Take into Account",
+        description="Rid the samples of this before the materials are fitted to them",
+        default=True,
+    )
+
+
 class PatinaScene(bpy.types.PropertyGroup):
     """Scene.patina."""
 
@@ -31,6 +41,7 @@ class PatinaScene(bpy.types.PropertyGroup):
         description="Fit one material to each material slot of the scanned mesh, instead of those "
         "of the capture file",
     )
+    causes: bpy.props.CollectionProperty(type=PatinaCause)  # type: ignore[valid-type]
 
 
 def store_result(capture: str, description: dict[str, Any], kind: str = RESULT) -> None:
@@ -67,6 +78,7 @@ def _text(capture: str, kind: str) -> bpy.types.Text | None:
 
 
 def register() -> None:
+    bpy.utils.register_class(PatinaCause)
     bpy.utils.register_class(PatinaScene)
     bpy.types.Scene.patina = bpy.props.PointerProperty(type=PatinaScene)
 
@@ -74,3 +86,4 @@ def register() -> None:
 def unregister() -> None:
     del bpy.types.Scene.patina
     bpy.utils.unregister_class(PatinaScene)
+    bpy.utils.unregister_class(PatinaCause)

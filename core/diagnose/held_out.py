@@ -55,9 +55,22 @@ def squares(fitted: Fitted, fine: bool = False) -> NDArray[np.int32]:
 
 def predict_unseen(fitted: Fitted, fine: bool = False) -> Unseen:
     """At an optimum; fine: small squares are left out, whose neighbours stay."""
+    return _unseen(fitted, folds(fitted, fine))
+
+
+def predict_unseen_photos(fitted: Fitted) -> Unseen | None:
+    """At an optimum, whole photos left out, a fifth of them at a time; numbers that are a photo's
+    own are then not known. None where there is one photo only."""
+    photos, place = np.unique(fitted.model.pixels.photo, return_inverse=True)
+    if len(photos) < 2:
+        return None
+    return _unseen(fitted, (place.ravel() % min(FOLDS, len(photos))).astype(np.int32))
+
+
+def _unseen(fitted: Fitted, of: NDArray[np.int32]) -> Unseen:
+    """of: (n,) fold of every pixel."""
     slopes = slopes_of(fitted)
-    of = folds(fitted, fine)
-    rows = [np.flatnonzero(of == f) for f in range(FOLDS)]
+    rows = [np.flatnonzero(of == f) for f in range(int(of.max()) + 1)]
     parts = [Equations.of(fitted, slopes, r) for r in rows]
     whole = parts[0]
     for part in parts[1:]:
@@ -105,7 +118,7 @@ def _by_effect(fitted: Fitted, change: Change, others: Array) -> tuple[Array, ..
         anchor = np.eye(count) if effect.anchor is None else effect.anchor
         plain = np.diag(anchor @ change.covariance[mine, mine] @ anchor.T)
         moved = others[:, mine] @ anchor.T
-        jackknife = (FOLDS - 1) * np.mean((moved - moved.mean(axis=0)) ** 2, axis=0)
+        jackknife = (len(others) - 1) * np.mean((moved - moved.mean(axis=0)) ** 2, axis=0)
         known = plain > 0
         more = float(np.mean(jackknife[known] / plain[known])) if known.any() else 1.0
         variance.append(plain * max(more, 1.0))

@@ -24,6 +24,7 @@ from .held_out import Unseen, by_square, error_of_sum, predict_unseen, squares, 
 from .leftover import Leftover, leftover
 from .model import Model
 from .solve import fit
+from .unseen_error import UnseenError, unseen_error
 
 Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
@@ -119,7 +120,8 @@ class Found:
     """accepted: in the order of acceptance, with their numbers in the whole model. rounds: what was
     fitted at each, best first; the last is the one that found nothing. before, after: the fits
     without and with all accepted. not_noise: part of the residual's variance that its pixels'
-    deviations do not account for. left: structure that nothing accepted explains."""
+    deviations do not account for. left: structure that nothing accepted explains. error_before,
+    error_after: of left-out parts and photos."""
 
     accepted: tuple[Trial, ...]
     rounds: tuple[tuple[Trial, ...], ...]
@@ -130,6 +132,8 @@ class Found:
     not_noise_before: float
     not_noise_after: float
     left: Leftover
+    error_before: UnseenError
+    error_after: UnseenError
 
     @property
     def ranked(self) -> list[Trial]:
@@ -182,9 +186,11 @@ def search(
         left = [e for e in left if e.cause != best.effect.cause]
     now, kept = _missed(before, now, accepted)
     kept = (*kept, *_outside(now))
+    unseen = predict_unseen(before), predict_unseen(now)
     return Found(
-        kept, tuple(rounds), before, now, predict_unseen(before), predict_unseen(now),
+        kept, tuple(rounds), before, now, *unseen,
         _not_noise(before, expected), _not_noise(now, expected), leftover(now),
+        unseen_error(before, unseen[0], expected), unseen_error(now, unseen[1], expected),
     )  # fmt: skip
 
 

@@ -1,89 +1,34 @@
-"""diagnosis.json and the report's section: what the model gets wrong, and what helps."""
+"""The pages of a diagnosis: what the model gets wrong, where, and what helps."""
 
 from __future__ import annotations
 
 from html import escape
 from pathlib import Path
-from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
-from ..diagnose import slack
 from ..diagnose.coordinates import coordinates, trend
 from ..diagnose.effect import Setting
-from ..diagnose.fitted import Fitted
 from ..diagnose.search import Found, Trial
+from ..job import CaptureResult
 from ..photo import write_png
 from .page import page
 from .residual_picture import residual_picture
-from .result_json import program_version, write_json
+from .sphere import write_sphere
 from .trend_chart import trend_chart
 
-FORMAT = 1
 MOST_SHOWN = 6  # charts: those along which the residual changes most
 STEPS = (0.05, 0.1, 0.2, 0.5, 1.0)  # of a chart's vertical axis
 
 
-def describe(found: Found) -> dict[str, Any]:
-    """The content of diagnosis.json. Costs are nats a pixel and channel; angles are radians."""
-    tried = {t.effect.cause: t for trials in found.rounds for t in trials}
-    return {
-        "format": FORMAT,
-        "program": {"name": "patina", "version": program_version()},
-        "named": list(found.causes) or ["none"],
-        "baseline": {"held_out": found.unseen_before.mean, "not_noise": found.not_noise_before},
-        "extended": {"held_out": found.unseen_after.mean, "not_noise": found.not_noise_after},
-        "causes": [_cause(t, t in found.accepted) for t in found.ranked],
-        "left": {
-            "named": found.unexplained,
-            "gain": found.left.gain,
-            "standard_error": found.left.error,
-            "rms": found.left.change,
-            "sentence": found.left.sentence(),
-        },
-        "coefficients": {
-            "before": _coefficients(found.before),
-            "after": _coefficients(found.after),
-        },
-        "tried": sorted(tried),
-    }
-
-
-def _coefficients(fitted: Fitted) -> list[Any]:
-    """Of each material and channel, in the basis; the slack beside it is left out."""
-    brdfs = fitted.model.brdfs
-    return [c.round(6).tolist() for c in brdfs.coefficients[..., : -slack.COUNT]]
-
-
-def write(path: Path, found: Found) -> None:
-    """Write the file; it appears whole or not at all."""
-    write_json(path, describe(found))
-
-
-def _cause(trial: Trial, accepted: bool) -> dict[str, Any]:
-    numbers = trial.effect.numbers
-    return {
-        "cause": trial.effect.cause,
-        "accepted": accepted,
-        "sentence": trial.sentence(),
-        "ties": [effect.cause for effect in trial.ties],
-        "held_out_gain": trial.gain,
-        "standard_error": trial.error,
-        "p_value": trial.chance,
-        "rms_change": trial.change,
-        "parameters": {
-            name: {"value": float(v), "standard_error": float(d), "unit": unit}
-            for name, unit, v, d in zip(
-                numbers.names, numbers.units, trial.told, trial.deviation, strict=True
-            )
-        },
-    }
-
-
-def write_pages(folder: Path, name: str, found: Found, setting: Setting) -> Path:
-    """index.html and pictures; name: the capture file's."""
+def write_pages(
+    folder: Path, found: Found, setting: Setting, before: CaptureResult, after: CaptureResult
+) -> Path:
+    """index.html and pictures; before, after: the fits without and with what was named."""
     folder.mkdir(parents=True, exist_ok=True)
-    html = page(name, section(found, setting) + _pictures(folder, found, setting))
+    body = section(found, setting) + _materials(folder, before, after)
+    html = page(before.capture.file.name, body + _pictures(folder, found, setting))
     (folder / "index.html").write_text(html, "utf-8")
     return folder / "index.html"
 
@@ -122,10 +67,54 @@ def section(found: Found, setting: Setting) -> str:
         f"neither noise nor the scan's known errors; with what is named in the model "
         f"{100 * found.not_noise_after:.0f} %. A gain is what the model with a cause predicts "
         "better of parts of the photos that it was not fitted to, in standard errors.</p>"
-        f"<table><tr><th>cause</th><th>gain</th><th></th><th>what it would mean</th></tr>{rows}"
-        f"</table><div class='charts'>{_charts(found, setting)}</div><p class='sub'>What the "
-        "photos show more than the prediction, relative; red before, blue after; bars: two "
-        "standard errors.</p>"
+        f"{_errors(found)}<table><tr><th>cause</th><th>gain</th><th></th><th>what it would mean"
+        f"</th></tr>{rows}</table><div class='charts'>{_charts(found, setting)}</div>"
+        "<p class='sub'>What the photos show more than the prediction, relative; red before, blue "
+        "after; bars: two standard errors.</p>"
+    )
+
+
+def _errors(found: Found) -> str:
+    """HTML: how well what was left out is predicted."""
+    before, after = found.error_before, found.error_after
+    rows = [
+        ("RMS error of left-out parts of the photos", before.parts, after.parts),
+        ("RMS error of left-out photos", before.photos, after.photos),
+    ]
+    cells = "".join(
+        f"<tr><th>{what}</th><td>{100 * a:.1f} %</td><td>{100 * b:.1f} %</td></tr>"
+        for what, a, b in rows
+        if a is not None and b is not None
+    )
+    return (
+        f"<table><tr><th></th><th>before</th><th>after</th></tr>{cells}<tr><th>typical error over "
+        f"what noise and the scan's known errors make</th><td>{before.over_floor:.2f}</td>"
+        f"<td>{after.over_floor:.2f}</td></tr></table>"
+    )
+
+
+def _materials(folder: Path, before: CaptureResult, after: CaptureResult) -> str:
+    """HTML: each material as a sphere, without and with what was named."""
+    if not after.effects:
+        return ""
+    rows = ""
+    for one, other in zip(before.materials, after.materials, strict=True):
+        cells = ""
+        for suffix, said, material in (("before", "before", one), ("after", "after", other)):
+            name = f"sphere_{one.name}_{suffix}.png"
+            write_sphere(folder / name, material.fit.brdf.evaluate)
+            held = material.held_out
+            told = "" if held is None else f": unseen photos to {100 * held.error:.1f} % RMS"
+            cells += (
+                f"<figure><img src='{escape(quote(name))}' alt='lit sphere, {said}'>"
+                f"<figcaption>{escape(one.name)}, {said}{told}</figcaption></figure>"
+            )
+        rows += f"<div class='triple'>{cells}</div>"
+    causes = ", ".join(effect.cause for effect in after.effects)
+    return (
+        f"<h2>The material with {escape(causes)} in the model</h2>{rows}<p class='sub'>Photos are "
+        "corrected by what was named before the second fit sees them; the second material is the "
+        "proposed one. <a href='materials/index.html'>Its own report</a>.</p>"
     )
 
 

@@ -17,7 +17,7 @@ from ..predict.compose import predict_photo
 from . import display
 from .figures import figures
 from .polar import Curve, polar_chart
-from .sphere import Reflector, lit_sphere
+from .sphere import Reflector, write_sphere
 
 STYLE = Path(__file__).parents[2] / "assets" / "report" / "style.css"
 LONGEST = 640
@@ -27,7 +27,7 @@ ROWS = 256  # of a photo at a time
 def write_report(folder: Path, result: CaptureResult) -> Iterator[float]:
     """Write index.html and pictures into ``folder``; yields the fraction done before each piece."""
     folder.mkdir(parents=True, exist_ok=True)
-    body: list[str] = []
+    body = [f"<p>Taken into account: {escape(e.sentence)}.</p>" for e in result.effects]
     photos = [result.capture.photo_name(place) for place in range(len(result.capture.photos))]
     count = len(result.materials) + len(result.capture.photos)
     for done, material in enumerate(result.materials):
@@ -98,10 +98,8 @@ def _spheres(folder: Path, material: MaterialResult) -> str:
     ]
     cells = []
     for suffix, label, reflector in shown:
-        sphere, coverage = lit_sphere(reflector)
-        alpha = (coverage * 255 + 0.5).astype(np.uint8)
         name = f"sphere_{material.name}{suffix}.png"
-        write_png(folder / name, np.dstack([display.srgb(sphere), alpha]))
+        write_sphere(folder / name, reflector)
         cells.append(
             f"<figure><img src='{escape(quote(name))}' alt='lit sphere, {label}'>"
             f"<figcaption>{label}</figcaption></figure>"

@@ -16,6 +16,7 @@ from ..fit import PaperFit
 from ..fit.measured_result import MeasuredResult
 from ..fit.spread import Spread
 from ..job import CaptureResult, MaterialResult, Stage, inputs
+from ..job.applied import Applied
 from ..light import Light
 from .figures import half_width, told_gains
 
@@ -65,6 +66,7 @@ def describe(
         if result.lights.unexplained is None
         else dict(zip(("before", "after"), result.lights.unexplained, strict=True)),
         "lights": [_light(result, light) for light in result.lights.by_name.values()],
+        "effects": [_effect(effect) for effect in result.effects],
         "materials": [_material(result, m) for m in result.materials],
         "warnings": list(notes),
         "stages": [
@@ -89,6 +91,19 @@ def _light(result: CaptureResult, light: Light) -> dict[str, Any]:
         "refined": {
             key: {"value": value, "standard_error": error if np.isfinite(error) else None}
             for key, (value, error) in moved.items()
+        },
+    }
+
+
+def _effect(effect: Applied) -> dict[str, Any]:
+    """What a diagnosis named and the materials take into account."""
+    told = zip(effect.names, effect.units, effect.numbers, effect.errors, strict=True)
+    return {
+        "cause": effect.cause,
+        "sentence": effect.sentence,
+        "parameters": {
+            name: {"value": value, "standard_error": error, "unit": unit}
+            for name, unit, value, error in told
         },
     }
 

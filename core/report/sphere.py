@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from ..angles import Angles, half_difference
 from ..appearance.lobe_stack import LobeStack
 from ..appearance.principled import Configuration, Principled
+from ..photo import write_png
+from . import display
 
 KEY = np.array([-0.5, 0.6, 0.62])  # left, above, in front
 RIM = np.array([0.85, 0.25, -0.30])
@@ -45,6 +48,13 @@ def lit_sphere(
     blocks = image.reshape(size, oversample, size, oversample, 3).mean(axis=(1, 3))
     coverage = inside.reshape(size, oversample, size, oversample).mean(axis=(1, 3))
     return blocks, coverage.astype(np.float32)
+
+
+def write_sphere(path: Path, reflector: Reflector) -> None:
+    """The picture as a PNG, transparent beside the sphere."""
+    sphere, coverage = lit_sphere(reflector)
+    alpha = (coverage * 255 + 0.5).astype(np.uint8)
+    write_png(path, np.dstack([display.srgb(sphere), alpha]))
 
 
 def _reflectance(

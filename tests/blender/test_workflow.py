@@ -177,27 +177,46 @@ def test_the_fit_operator_gives_the_numbers_of_the_api() -> None:
     assert counts()["materials"] == before["materials"]
 
 
-def test_a_check_is_kept_and_shown_on_the_mesh() -> None:
+def test_a_check_names_a_drift_fits_with_it_and_can_do_without() -> None:
     path = made().make_capture(folder() / "ball", photos=4)
+    told = path.read_text()
+    path.write_text(told.replace('file = "lit_2.exr"', 'file = "lit_2.exr"\nexposure = 1.5'))
     bpy.ops.patina.import_capture(filepath=str(path))
+    assert not bpy.ops.patina.refit.poll()  # nothing was checked yet
     choose = extension("core.diagnose.choose").choose_pixels
     usual, choose.__defaults__ = choose.__defaults__, (3000,)  # some Blenders' numpy is slow
     try:
         assert bpy.ops.patina.check() == {"FINISHED"}
     finally:
         choose.__defaults__ = usual
-    said = json.loads(bpy.data.texts["Patina diagnosis"].as_string())
-    assert said["format"] == 1 and said["named"] and said["causes"]
     stored = extension("scene.properties").stored_result
-    kind = extension("scene.properties").DIAGNOSIS
-    assert stored(str(path.resolve()), kind) == said
-    assert stored(str(path.resolve())) is None  # a check is no fit
-    mesh = bpy.context.scene.patina.mesh
+    kind, mine = extension("scene.properties").DIAGNOSIS, str(path.resolve())
+    said, fit = stored(mine, kind), stored(mine)
+    assert said["named"][0] == "light_intensity"
+    assert said["applied"] == [e["cause"] for e in fit["effects"]]
+    gains = [v["value"] for v in said["causes"][0]["parameters"].values()]
+    truth = -np.log([1, 1.5, 1, 1])
+    assert np.abs(gains - (truth - truth.mean())).max() < 0.05
+    assert said["extended"]["held_out"] < said["baseline"]["held_out"]
+
+    scene, mesh = bpy.context.scene, bpy.context.scene.patina.mesh
     layer = mesh.data.color_attributes["Patina: missed"]
     assert len(layer.data) == len(mesh.data.vertices)
-    assert bpy.ops.patina.show_evidence(cause="missed") == {"FINISHED"}
-    assert mesh.data.color_attributes.active_color.name == "Patina: missed"
-    assert len([t for t in bpy.data.texts if t.name.startswith("Patina diagnosis")]) == 1
+    for name in ("missed", "light_intensity"):
+        assert bpy.ops.patina.show_evidence(cause=name) == {"FINISHED"}
+        assert mesh.data.color_attributes.active_color.name == f"Patina: {name}"
+
+    assert [c.name for c in scene.patina.causes] == said["applied"]
+    for cause in scene.patina.causes:
+        cause.use = False
+    assert bpy.ops.patina.refit() == {"FINISHED"}
+    without = stored(mine)
+    assert without["effects"] == [] and stored(mine, kind)["applied"] == []
+    one, other = (f["materials"][0]["coefficients"] for f in (fit, without))
+    assert np.abs(np.subtract(one, other)).max() > 1e-3
+    assert mesh.data.materials[0]["patina_measured"] == "surface"
+    for name in ("Patina diagnosis", "Patina result"):
+        assert len([t for t in bpy.data.texts if t.name.startswith(name)]) == 1
 
 
 def test_results_survive_saving_and_loading() -> None:

@@ -1,0 +1,45 @@
+"""How well left-out parts of the photos are predicted, in words that a user knows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .change import rms_change
+from .deviation import NORMAL
+from .fitted import Fitted
+from .held_out import Unseen, predict_unseen_photos
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class UnseenError:
+    """parts, photos: RMS error of left-out squares and of left-out photos, relative to what the
+    photos show up to white; photos: None of one photo. over_floor: the typical error of left-out
+    squares over what noise of the photos and the scan's known errors would make."""
+
+    parts: float
+    photos: float | None
+    over_floor: float
+
+
+def unseen_error(fitted: Fitted, unseen: Unseen, expected: Array) -> UnseenError:
+    """unseen: of left-out squares; expected: (n, 3) deviation before anything was fitted."""
+    whole = predict_unseen_photos(fitted)
+    ratio = np.abs(unseen.residual * fitted.deviation / expected)
+    ratio = ratio[np.isfinite(expected)]
+    return UnseenError(
+        _rms(fitted, unseen),
+        None if whole is None else _rms(fitted, whole),
+        float(np.median(ratio)) / NORMAL if len(ratio) else 0.0,
+    )
+
+
+def _rms(fitted: Fitted, unseen: Unseen) -> float:
+    observed = fitted.model.pixels.observed
+    missed = unseen.residual * fitted.deviation
+    good = np.isfinite(fitted.deviation)
+    return rms_change(observed, observed - np.where(good, missed, 0), fitted.deviation)

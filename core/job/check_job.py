@@ -1,0 +1,32 @@
+"""Fit, diagnose, and fit again with what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+
+from .diagnose_job import DiagnoseJob
+from .fit_job import CaptureResult, FitJob
+from .job import Job, Step
+from .refit_job import RefitJob
+
+SHARE = 0.85  # of the job, before the second fit
+
+
+class CheckJob(Job):
+    """``checked`` is the diagnosis with the fit as it was, ``result`` the fit with what was named
+    in the model, but without the causes ``without``; they are there when the job is done."""
+
+    def __init__(self, fit: FitJob, without: Collection[str] = ()) -> None:
+        super().__init__()
+        self.checked = DiagnoseJob(fit)
+        self.without = frozenset(without)
+        self.result: CaptureResult | None = None
+
+    def run(self) -> Iterator[Step]:
+        """The diagnosis' steps, then those of the second fit."""
+        for step in self.checked.run():
+            yield Step(step.stage, SHARE * step.fraction)
+        again = RefitJob(self.checked, without=self.without)
+        for step in again.run():
+            yield Step(step.stage, SHARE + (1 - SHARE) * step.fraction)
+        self.result = again.result

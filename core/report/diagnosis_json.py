@@ -1,0 +1,82 @@
+"""diagnosis.json: what a capture's model gets wrong, the causes, and what is gained."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ..diagnose.search import Found, Trial
+from ..diagnose.unseen_error import UnseenError
+from ..job import CaptureResult
+from .result_json import program_version, write_json
+
+FORMAT = 2
+
+
+def describe(found: Found, before: CaptureResult, after: CaptureResult) -> dict[str, Any]:
+    """The content of diagnosis.json; before, after: the fits without and with what was named.
+    Gains are nats; angles are radians."""
+    tried = {t.effect.cause for trials in found.rounds for t in trials}
+    return {
+        "format": FORMAT,
+        "program": {"name": "patina", "version": program_version()},
+        "capture": str(before.capture.file),
+        "named": list(found.causes) or ["none"],
+        "baseline": _errors(found.error_before, found.not_noise_before),
+        "extended": _errors(found.error_after, found.not_noise_after),
+        "causes": [_cause(t, t in found.accepted) for t in found.ranked],
+        "unexplained": found.unexplained,
+        "left": {
+            "gain": found.left.gain,
+            "standard_error": found.left.error,
+            "rms": found.left.change,
+            "sentence": found.left.sentence(),
+        },
+        "applied": [effect.cause for effect in after.effects],
+        "materials": [
+            {
+                "name": one.name,
+                "coefficients_before": one.fit.brdf.coefficients.tolist(),
+                "coefficients_after": other.fit.brdf.coefficients.tolist(),
+                "held_out_before": None if one.held_out is None else one.held_out.error,
+                "held_out_after": None if other.held_out is None else other.held_out.error,
+            }
+            for one, other in zip(before.materials, after.materials, strict=True)
+        ],
+        "tried": sorted(tried),
+    }
+
+
+def write(path: Path, found: Found, before: CaptureResult, after: CaptureResult) -> None:
+    """Write the file; it appears whole or not at all."""
+    write_json(path, describe(found, before, after))
+
+
+def _errors(error: UnseenError, not_noise: float) -> dict[str, float | None]:
+    """RMS errors relative to the photos' light."""
+    return {
+        "held_out": error.parts,
+        "held_out_photos": error.photos,
+        "held_out_over_noise_floor": error.over_floor,
+        "not_noise": not_noise,
+    }
+
+
+def _cause(trial: Trial, accepted: bool) -> dict[str, Any]:
+    numbers = trial.effect.numbers
+    return {
+        "cause": trial.effect.cause,
+        "accepted": accepted,
+        "sentence": trial.sentence(),
+        "ties": [effect.cause for effect in trial.ties],
+        "held_out_gain": trial.gain,
+        "standard_error": trial.error,
+        "p_value": trial.chance,
+        "rms_change": trial.change,
+        "parameters": {
+            name: {"value": float(v), "standard_error": float(d), "unit": unit}
+            for name, unit, v, d in zip(
+                numbers.names, numbers.units, trial.told, trial.deviation, strict=True
+            )
+        },
+    }

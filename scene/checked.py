@@ -1,0 +1,20 @@
+"""The last check, while Blender runs: a second fit needs its samples, which no .blend holds."""
+
+from __future__ import annotations
+
+from ..core.job.diagnose_job import DiagnoseJob
+
+_last: DiagnoseJob | None = None
+
+
+def keep(job: DiagnoseJob | None) -> None:
+    """Instead of the one before; None: none."""
+    global _last
+    _last = job
+
+
+def kept(capture: str) -> DiagnoseJob | None:
+    """The last check, if it was of that capture file."""
+    if _last is None or _last.result is None or str(_last.result.capture.file) != capture:
+        return None
+    return _last
