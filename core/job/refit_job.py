@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Generator, Iterator
+from collections.abc import Collection, Generator, Iterator, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from ..diagnose.chosen import can_be_applied, with_causes
 from ..diagnose.corrected import corrected
 from ..diagnose.fixed import Fixed
 from ..diagnose.model import Model
 from ..diagnose.of_samples import pixels_of_samples
-from ..diagnose.search import Trial
+from ..diagnose.search import Found, Trial
 from ..errors import PatinaError
 from ..samples import SampleTable
 from .applied import Applied
@@ -22,6 +24,7 @@ from .job import Job, Step, finished
 STAGE = "fitting with what was found"
 FEWEST = 50  # samples of a material that are left
 CORRECTING = 0.3  # of the time
+MORE = 0.05  # ln of what errors of unseen photos may grow by
 
 
 class RefitJob(Job):
@@ -37,27 +40,44 @@ class RefitJob(Job):
         self.result: CaptureResult | None = None
 
     def run(self) -> Iterator[Step]:
-        """One material after the other."""
+        """With all causes; where unseen photos are then predicted worse, without the last of them,
+        which was accepted when the others were in the model."""
         before, found = finished(self.checked.result), finished(self.checked.found)
         chosen = [t for t in can_be_applied(found) if t.effect.cause not in self.without]
-        if not chosen:
-            self.result = before
-            return
+        dropped: list[str] = []
+        attempt = 0.5
+        while chosen:
+            materials, applied = yield from self._with(before, found, chosen, 1 - 2 * attempt)
+            worse = _worse(before.materials, materials)
+            if worse is None:
+                said = tuple(dropped)
+                materials = [replace(m, warnings=(*m.warnings, *said)) for m in materials]
+                self.result = replace(before, materials=tuple(materials), effects=applied)
+                return
+            dropped.append(f"{chosen.pop().effect.cause} is not taken into account: {worse}")
+            attempt /= 2
+        materials = [replace(m, warnings=(*m.warnings, *dropped)) for m in before.materials]
+        self.result = replace(before, materials=tuple(materials))
+
+    def _with(
+        self, before: CaptureResult, found: Found, chosen: Sequence[Trial], done: float
+    ) -> Generator[Step, None, tuple[list[MaterialResult], tuple[Applied, ...]]]:
+        """One material after the other; done: of the job, of which this takes half the rest."""
         causes = [trial.effect.cause for trial in chosen]
-        step = Step(STAGE, 0.0)
+        step = Step(STAGE, done)
         yield step
         fitted = yield from beside(lambda: with_causes(found, causes), step)
         materials = []
+        share = 0.5 * (1 - done) / len(before.materials)
         for index, material in enumerate(before.materials):
-            start, share = index / len(before.materials), 1 / len(before.materials)
+            start = done + index * share
             try:
                 again = yield from self._again(index, material, fitted.model, start, share)
             except PatinaError as error:
                 said = f"fitted without {', '.join(causes)}: {error}"
                 again = replace(material, warnings=(*material.warnings, said))
             materials.append(again)
-        applied = tuple(_applied(trial, fitted.model) for trial in chosen)
-        self.result = replace(before, materials=tuple(materials), effects=applied)
+        return materials, tuple(_applied(trial, fitted.model) for trial in chosen)
 
     def _again(
         self, index: int, material: MaterialResult, model: Model, start: float, share: float
@@ -77,6 +97,23 @@ class RefitJob(Job):
         steps = pixels_of_samples(table, index, before.capture, before.scan, before.photos, read)
         pixels = yield from _quietly(steps, step)
         return (yield from _quietly(corrected(table, pixels, model, setting), step))
+
+
+def _worse(before: Sequence[MaterialResult], after: Sequence[MaterialResult]) -> str | None:
+    """In words, where unseen photos are predicted worse than without: a model may explain what it
+    was fitted to by something that is not there."""
+    known = [
+        (one.held_out.error, other.held_out.error)
+        for one, other in zip(before, after, strict=True)
+        if one.held_out is not None and other.held_out is not None
+    ]
+    if not known:
+        return None
+    grown = np.mean([np.log(max(b, 1e-9) / max(a, 1e-9)) for a, b in known])
+    if grown < MORE:
+        return None
+    said = ", ".join(f"{100 * a:.1f} to {100 * b:.1f} %" for a, b in known)
+    return f"with it, errors of unseen photos grow from {said}"
 
 
 def _applied(trial: Trial, model: Model) -> Applied:

@@ -11,13 +11,15 @@ from ..effect import Array, Effect, Numbers, Setting
 from ..situation import Situation
 
 USUAL = 0.15
+WHITE = 99.0  # percentile
 DARKEST = 1e-4  # of white, where the curve's logarithm is cut off
 
 
 @dataclass(frozen=True)
 class CameraResponse(Effect):
     """numbers: what the exponent is off by, and how it changes over a factor e of brightness; both
-    about ``grey``, the photos' typical radiance, which stays as it is."""
+    about ``grey``, the photos' mean radiance, which stays as it is: how bright the whole is, no
+    photo tells of its own curve."""
 
     grey: float
     cause = "camera_response"
@@ -25,7 +27,9 @@ class CameraResponse(Effect):
 
     @classmethod
     def of(cls, setting: Setting) -> CameraResponse:
-        return cls(max(float(np.median(setting.pixels.observed)), 1e-9))
+        seen = setting.pixels.observed
+        white = float(np.percentile(seen, WHITE))
+        return cls(max(float(np.minimum(seen, white).mean()), 1e-9))
 
     def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> CameraResponse:
         return self
