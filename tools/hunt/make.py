@@ -71,9 +71,12 @@ class Truth:
     seed: int
 
 
-def make(folder: Path, cause: str, strength: float, seed: int) -> Truth:
+def make(
+    folder: Path, cause: str, strength: float, seed: int, plain_folder: Path | None = None
+) -> Truth:
     """Write capture, mesh, cameras and photos into ``folder``. cause: "none", a key of MAKERS or
-    OUTSIDERS, or two of them with a + between, the second of ON_PICTURES."""
+    OUTSIDERS, or two of them with a + between, the second of ON_PICTURES. plain_folder: where the
+    same is written without the effect."""
     rng = np.random.default_rng([seed, 7])
     studio = HuntStudio()
     surface = lumpy(seed)
@@ -85,6 +88,9 @@ def make(folder: Path, cause: str, strength: float, seed: int) -> Truth:
     hidden = _hidden(replace(scene, plain=plain), [] if cause == "none" else cause.split("+"))
     photos = camera_faults.with_noise(hidden.photos, rng)
     _write(folder, hidden.surface or surface, hidden.told or scene.shots, photos)
+    if plain_folder is not None:
+        noise = np.random.default_rng([seed, 8])
+        _write(plain_folder, surface, scene.shots, camera_faults.with_noise(plain, noise))
     return Truth(cause, hidden.strength, hidden.numbers, material, seed)
 
 

@@ -1,15 +1,24 @@
-"""`run.py hunt`: captures with a hidden effect, diagnosed; the table of docs/diagnosis.md."""
+"""`run.py hunt`: captures with a hidden effect, diagnosed; the table of docs/diagnosis.md.
+
+Rows are kept in a file as they are found, so that the table can be made in pieces.
+"""
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
-import tempfile
-import time
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..common import say
 from ..package import load_patina
+
+if TYPE_CHECKING:
+    from .judged import Row
 
 STRENGTHS = (0.01, 0.03, 0.1)
 SEEDS = 5
@@ -18,57 +27,125 @@ SEEDS = 5
 def main() -> int:
     """Make and diagnose captures; prints a row each, then how many were right."""
     load_patina()
-    from .make import MAKERS, OUTSIDERS
+    from .judged import judged
+    from .make import MAKERS, ON_PICTURES, OUTSIDERS
 
     parser = argparse.ArgumentParser(prog="run.py hunt", description=__doc__)
-    parser.add_argument("causes", nargs="*", help=f"of none, {', '.join(MAKERS)}; default: all")
+    parser.add_argument("causes", nargs="*", help=f"of none, {', '.join((*MAKERS, *OUTSIDERS))}, "
+                        f"or two with a + between, the second of {', '.join(ON_PICTURES)}; "
+                        "default: none and all of the vocabulary")  # fmt: skip
     parser.add_argument("--strengths", type=float, nargs="+", default=STRENGTHS, metavar="RMS")
     parser.add_argument("--seeds", type=int, nargs="+", default=list(range(1, SEEDS + 1)))
+    parser.add_argument("--rows", type=Path, metavar="FILE", help="rows found before (JSON lines): "
+                        "they are not looked for again, and new ones are added")  # fmt: skip
+    parser.add_argument("--threads", type=int, metavar="N")
+    parser.add_argument("--only-print", action="store_true", help="the rows of --rows, no hunt")
     told = parser.parse_args()
     known = {"none", *MAKERS, *OUTSIDERS}
     unknown = [c for c in told.causes if not known.issuperset(c.split("+"))]
     if unknown:
         parser.error(f"nothing hides {unknown[0]!r}; there are none, {', '.join(MAKERS)}")
-    print("| hidden | RMS change | seed | named | gain, standard errors | made | diagnosed |")
-    print("|---|---|---|---|---|---|---|")
-    right: dict[tuple[str, float], list[bool]] = {}
-    for cause in told.causes or ("none", *MAKERS):
-        for strength in told.strengths if cause != "none" else (0.0,):
-            for seed in told.seeds:
-                named = _one(cause, strength, seed)
-                right.setdefault((cause, strength), []).append((named or ("none",)) == (cause,))
-    print("\n| hidden | RMS change | right |\n|---|---|---|")
-    for (cause, strength), found in right.items():
-        print(f"| {cause} | {100 * strength:.0f} % | {sum(found)} of {len(found)} |")
+    rows = read_rows(told.rows)
+    wanted = [] if told.only_print else list(_wanted(told, ("none", *MAKERS)))
+    for cause, strength, seed in wanted:
+        if any((r.cause, r.wanted, r.seed) == (cause, strength, seed) for r in rows):
+            continue
+        row = judged(cause, strength, seed, told.threads)
+        rows.append(row)
+        named = ", ".join(row.named) or "none"
+        say(f"{cause} at {100 * strength:.0f} %, seed {seed}: {named}")
+        if told.rows is not None:
+            with told.rows.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(asdict(row)) + "\n")
+    print(table(rows))
     return 0
 
 
-def _one(cause: str, strength: float, seed: int) -> tuple[str, ...]:
-    """Make, diagnose, print the row; what was named."""
-    from patina.core.capture import read_capture
-    from patina.core.job import FitJob
-    from patina.core.job.diagnose_job import DiagnoseJob
+def _wanted(told: argparse.Namespace, usual: Sequence[str]) -> Iterator[tuple[str, float, int]]:
+    for cause in told.causes or usual:
+        for strength in told.strengths if cause != "none" else (0.0,):
+            for seed in told.seeds:
+                yield cause, strength, seed
 
-    from .make import make
 
-    with tempfile.TemporaryDirectory() as folder:
-        since = time.perf_counter()
-        truth = make(Path(folder), cause, strength, seed)
-        made = time.perf_counter()
-        job = DiagnoseJob(FitJob(read_capture(Path(folder) / "hunt.capture.toml")))
-        job.drain()
-        done = time.perf_counter()
-    assert job.found is not None
-    accepted = job.found.accepted
-    gain = f"{accepted[0].gain / max(accepted[0].error, 1e-9):.1f}" if accepted else "–"
-    named = ", ".join(job.found.causes) or "none"
-    print(
-        f"| {cause} | {100 * truth.strength:.1f} % | {seed} | {named} | {gain} | "
-        f"{made - since:.0f} s | {done - made:.0f} s |",
-        flush=True,
-    )
-    say(f"{cause} at {100 * strength:.0f} %, seed {seed}: {named}")
-    return job.found.causes
+def read_rows(path: Path | None) -> list[Row]:
+    """Of a file that may not be there yet."""
+    from .judged import Row
+
+    if path is None or not path.exists():
+        return []
+    found = []
+    for line in path.read_text("utf-8").splitlines():
+        values = json.loads(line)
+        for key in ("named", "ties", "seconds"):
+            values[key] = tuple(values[key])
+        found.append(Row(**values))
+    return found
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Markdown: every row, how many were right, and what was named for what."""
+    lines = [
+        "| hidden | RMS change | seed | named | gain | BRDF error ÷ without | error ÷ floor | in "
+        "interval | made | diagnosed |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for row in sorted(rows, key=lambda r: (r.cause, r.wanted, r.seed)):
+        named = ", ".join(row.named) or "none"
+        if row.ties:
+            named += f" (or {', '.join(row.ties)})"
+        brdf = "–" if row.brdf is None else f"{row.brdf:.2f}"
+        inside = f"{row.inside} of {row.told}" if row.told else "–"
+        made, took = row.seconds
+        lines.append(
+            f"| {row.cause} | {100 * row.strength:.1f} % | {row.seed} | "
+            f"{named if row.right else f'**{named}**'} | {row.gain:.1f} | {brdf} | "
+            f"{row.over_floor:.2f} | {inside} | {made:.0f} s | {took:.0f} s |"
+        )
+    return "\n".join([*lines, "", *_sums(rows), "", *_confusion(rows)])
+
+
+def _sums(rows: Sequence[Row]) -> list[str]:
+    groups: dict[str, list[Row]] = defaultdict(list)
+    for row in rows:
+        if row.cause == "none":
+            group = "none: nothing named"
+        elif row.hidden == {"unknown"}:
+            group = "beyond the vocabulary: `unknown`"
+        elif "+" in row.cause:
+            group = "pairs: both and no third"
+        else:
+            group = f"right cause first, at {100 * row.wanted:.0f} %"
+        groups[group].append(row)
+    lines = ["| | right | another name |", "|---|---|---|"]
+    for group, mine in sorted(groups.items()):
+        right, wrong = sum(r.right for r in mine), sum(r.wrong_name for r in mine)
+        lines.append(f"| {group} | {right} of {len(mine)} | {wrong} |")
+    told = sum(row.told for row in rows)
+    if told:
+        inside = sum(row.inside for row in rows)
+        lines.append(f"| numbers within their 95 % interval | {inside} of {told} | |")
+    ratios = sorted(row.brdf for row in rows if row.brdf is not None and row.right)
+    if ratios:
+        within = sum(ratio <= 1.2 for ratio in ratios)
+        said = f"{within} of {len(ratios)} (median {ratios[len(ratios) // 2]:.2f})"
+        lines.append(f"| BRDF error ÷ without the effect ≤ 1.2, where right | {said} | |")
+    within = sum(row.over_floor <= 1.1 for row in rows)
+    lines.append(f"| error of left-out parts ÷ floor ≤ 1.1 | {within} of {len(rows)} | |")
+    return lines
+
+
+def _confusion(rows: Sequence[Row]) -> list[str]:
+    """Hidden against named first, single causes of all strengths."""
+    counts: dict[str, Counter[str]] = defaultdict(Counter)
+    for row in rows:
+        if "+" not in row.cause:
+            counts[row.cause][(row.named or ("none",))[0]] += 1
+    lines = ["| hidden | named first |", "|---|---|"]
+    for cause, found in sorted(counts.items()):
+        said = ", ".join(f"{name} {count}" for name, count in found.most_common())
+        lines.append(f"| {cause} | {said} |")
+    return lines
 
 
 if __name__ == "__main__":

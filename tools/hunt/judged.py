@@ -1,0 +1,152 @@
+"""One capture of the hunt, made, diagnosed and judged against what was hidden in it."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from patina.core.basis import Basis, PrincipalBRDF, mapping
+from patina.core.capture import read_capture
+from patina.core.diagnose.effect import Setting
+from patina.core.diagnose.search import Trial
+from patina.core.fit.spread import directions
+from patina.core.job import CaptureResult, FitJob
+from patina.core.job.check_job import CheckJob
+
+from .make import OUTSIDERS, Truth, make
+
+SURE = 1.96  # standard errors to either side of a 95 % interval
+OWN_BRDF = ("second_material", "subsurface", "anisotropy", "outside_basis", "interreflection")
+"""What hides in the material itself, so that the material drawn is not the truth."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """cause, seed, wanted: of the capture; strength: RMS change as it came out. named: causes, best
+    first; ties: those declared of the first. gain: of the first, in standard errors. brdf: error of
+    the second fit over that of a fit to photos without the effect, None where the material is
+    another one. over_floor: of left-out parts, after. inside, told: how many of the numbers that
+    the truth says lie in their 95 % interval, and of how many. seconds: making, diagnosing."""
+
+    cause: str
+    wanted: float
+    seed: int
+    strength: float
+    named: tuple[str, ...]
+    ties: tuple[str, ...]
+    gain: float
+    brdf: float | None
+    over_floor: float
+    inside: int
+    told: int
+    seconds: tuple[float, float]
+
+    @property
+    def hidden(self) -> set[str]:
+        """The causes that are there."""
+        if self.cause == "none":
+            return set()
+        return {"unknown"} if self.cause in OUTSIDERS else set(self.cause.split("+"))
+
+    @property
+    def right(self) -> bool:
+        """The cause first; of none nothing, of a pair both and nothing else; beyond the vocabulary
+        ``unknown``, alone or beside others."""
+        if len(self.hidden) != 1:
+            return set(self.named) == self.hidden
+        if self.hidden == {"unknown"}:
+            return "unknown" in self.named
+        return self.named[:1] == tuple(self.hidden)
+
+    @property
+    def wrong_name(self) -> bool:
+        """A single cause for which another one is named first, and not even as a tie."""
+        first = set(self.named[:1]) - {"unknown"}
+        return not self.right and bool(first) and not self.hidden & set(self.ties)
+
+
+def judged(cause: str, strength: float, seed: int, threads: int | None = None) -> Row:
+    """Make a capture in a folder that is thrown away, and look what is found in it."""
+    with tempfile.TemporaryDirectory() as folder:
+        since = time.perf_counter()
+        hidden, plain = Path(folder) / "hidden", Path(folder) / "plain"
+        truth = make(hidden, cause, strength, seed, plain_folder=plain)
+        made = time.perf_counter()
+        job = CheckJob(FitJob(read_capture(hidden / "hunt.capture.toml"), threads=threads))
+        job.drain()
+        done = time.perf_counter()
+        found, after = job.checked.found, job.result
+        assert found is not None and after is not None and job.checked.setting is not None
+        first = found.accepted[0] if found.accepted else None
+        of = {trial.effect.cause: trial for trial in found.accepted}
+        hits = [
+            hit
+            for name in cause.split("+")
+            if name in of
+            for hit in _hits(of[name], truth.numbers, job.checked.setting)
+        ]
+        error = None
+        if not set(cause.split("+")) & set(OWN_BRDF):
+            again = FitJob(read_capture(plain / "hunt.capture.toml"), threads=threads)
+            again.drain()
+            assert again.result is not None
+            error = _brdf_error(after, truth) / _brdf_error(again.result, truth)
+    return Row(
+        cause=cause,
+        wanted=strength,
+        seed=seed,
+        strength=truth.strength,
+        named=found.causes,
+        ties=() if first is None else tuple(e.cause for e in first.ties),
+        gain=0.0 if first is None else first.gain / max(first.error, 1e-9),
+        brdf=error,
+        over_floor=found.error_after.over_floor,
+        inside=sum(hits),
+        told=len(hits),
+        seconds=(made - since, done - made),
+    )
+
+
+def _brdf_error(result: CaptureResult, truth: Truth) -> float:
+    """RMS of ln(ρ·cosMap + ε) over all directions."""
+    basis = Basis.default()
+    assert basis.training is not None
+    rows = basis.training[3 * truth.material : 3 * truth.material + 3]
+    angles = directions(basis.grid)
+    weight = mapping.cos_map(angles)[:, None]
+    true, ours = (
+        np.log(np.maximum(brdf.evaluate(angles) * weight, 0) + mapping.EPSILON)
+        for brdf in (PrincipalBRDF(basis, rows), result.materials[0].fit.brdf)
+    )
+    return float(np.sqrt(np.mean((ours - true) ** 2)))
+
+
+def _hits(trial: Trial, truth: Mapping[str, float], setting: Setting) -> list[bool]:
+    """Whether numbers that the truth says are within their intervals; none where it says others."""
+    x, deviation = trial.told, trial.deviation
+    cause = trial.effect.cause
+    if cause == "light_intensity":
+        wanted = np.array([truth[f"photo {k + 1}"] for k in range(len(x))])
+        wanted -= wanted.mean()
+    elif cause == "near_light":
+        x, deviation = x[::4], deviation[::4]
+        wanted = np.full(len(x), truth["1 / distance"] * setting.size)
+    elif cause == "light_direction":
+        moved, spread = x.reshape(-1, 2), deviation.reshape(-1, 2)
+        x = np.hypot(*moved.T)
+        deviation = np.hypot(*(moved * spread).T) / np.maximum(x, 1e-9)
+        wanted = np.full(len(x), truth["angle"])
+    elif cause == "ambient_light":
+        wanted = np.full(3, truth["radiance"] * np.pi / setting.level)
+    elif cause == "area_light":
+        wanted = np.array([truth["angular diameter"]])
+    elif cause == "veiling_glare":
+        wanted = np.array([truth["part"]])
+    else:
+        return []
+    return [bool(hit) for hit in np.abs(x - wanted) < SURE * deviation]
