@@ -24,7 +24,7 @@ from .job import Job, Step, finished
 STAGE = "fitting with what was found"
 FEWEST = 50  # samples of a material that are left
 CORRECTING = 0.3  # of the time
-MORE = 0.05  # ln of what errors of unseen photos may grow by
+MORE = 0.03  # ln of what errors of unseen photos may grow by
 
 
 class RefitJob(Job):
