@@ -11,7 +11,18 @@ from pathlib import Path
 from .common import ROOT
 from .package import load_patina
 
-BENCHES = ("basis", "sampling", "fit", "light", "real", "solve", "noise", "viewport", "speed")
+BENCHES = (
+    "basis",
+    "sampling",
+    "fit",
+    "light",
+    "real",
+    "solve",
+    "noise",
+    "viewport",
+    "diagnose",
+    "speed",
+)
 
 
 def main() -> int:

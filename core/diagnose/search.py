@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .chance import Asked, asked
 from .change import rms_change
-from .deviation import NORMAL, as_found
+from .deviation import as_found
 from .effect import Effect
 from .effects.outside_basis import OutsideBasis
 from .fitted import Fitted
@@ -91,6 +91,15 @@ class Trial:
         proofs = "; or ".join(dict.fromkeys(e.proof for e in (self.effect, *self.ties)))
         return f"{said}. The photos cannot tell it from {others}; this would: {proofs}"
 
+    def changed(self) -> Array:
+        """(n, 3) radiance that the effect adds to what the photos show, the BRDF the same."""
+        model = self.fitted.model
+        return (
+            self.fitted.shown - without_last(model)
+            if len(model.x[-1])
+            else 0 * model.pixels.observed
+        )
+
     @property
     def place(self) -> int:
         """Of the effect in the model."""
@@ -119,8 +128,7 @@ class Trial:
 class Found:
     """accepted: in the order of acceptance, with their numbers in the whole model. rounds: what was
     fitted at each, best first; the last is the one that found nothing. before, after: the fits
-    without and with all accepted. not_noise: part of the residual's variance that its pixels'
-    deviations do not account for. left: structure that nothing accepted explains. error_before,
+    without and with all accepted. left: structure that nothing accepted explains. error_before,
     error_after: of left-out parts and photos."""
 
     accepted: tuple[Trial, ...]
@@ -129,8 +137,6 @@ class Found:
     after: Fitted
     unseen_before: Unseen
     unseen_after: Unseen
-    not_noise_before: float
-    not_noise_after: float
     left: Leftover
     error_before: UnseenError
     error_after: UnseenError
@@ -168,12 +174,19 @@ def search(
     accepted: list[Trial] = []
     rounds: list[tuple[Trial, ...]] = []
     left = list(effects)
+    refused: dict[str, float] = {}
     for turn in range(MOST_EFFECTS):
         yield turn / MOST_EFFECTS
         trials, costs = [], _costs(now)
-        promising = _promising(asked(now, left))
+        promising = [
+            one
+            for one in _promising(asked(now, left))
+            if one.gain > refused.get(one.effect.cause, -np.inf)
+        ]
         for place, one in enumerate(promising):
             trials.append(_try(now, costs, one))
+            if trials[-1].gain < 0:  # once is enough, unless it promises more
+                refused[one.effect.cause] = one.gain
             yield (turn + (place + 1) / (len(promising) + 1)) / MOST_EFFECTS
         trials.sort(key=lambda t: -t.gain)
         rounds.append(tuple(trials))
@@ -189,7 +202,7 @@ def search(
     unseen = predict_unseen(before), predict_unseen(now)
     return Found(
         kept, tuple(rounds), before, now, *unseen,
-        _not_noise(before, expected), _not_noise(now, expected), leftover(now),
+        leftover(now),
         unseen_error(before, unseen[0], expected), unseen_error(now, unseen[1], expected),
     )  # fmt: skip
 
@@ -207,13 +220,6 @@ def _promising(found: Sequence[Asked]) -> list[Asked]:
             worth = one.gain >= PROMISING * most or any(one is f for f in few[:TRIED])
         chosen += [one] if worth else []
     return chosen
-
-
-def _not_noise(fitted: Fitted, expected: Array) -> float:
-    """Of the residual's variance; expected: (n, 3) deviation before anything was seen."""
-    residual = fitted.residual * fitted.deviation / expected
-    scale = float(np.median(np.abs(residual[np.isfinite(residual)]))) / NORMAL
-    return max(0.0, 1.0 - 1.0 / max(scale, 1e-9) ** 2)
 
 
 def _simplest(trials: Sequence[Trial]) -> Trial | None:
@@ -249,12 +255,12 @@ def _try(now: Fitted, costs: dict[bool, Array], one: Asked) -> Trial:
     unseen = predict_unseen(fitted, fine)
     # what is confined to a few large squares could never be sure
     gained = by_square(squares(now, fine), costs[fine] - unseen.cost)
-    without = now.shown if effect.patch is not None else _without(fitted.model)
+    without = now.shown if effect.patch is not None else without_last(fitted.model)
     change = rms_change(fitted.shown, without, now.deviation)
     return Trial(effect, fitted, unseen, gained, change, one.chance)
 
 
-def _without(model: Model) -> Array:
+def without_last(model: Model) -> Array:
     """(n, 3) what the model shows without its last effect, the BRDF the same: another BRDF would
     take much of it, as it takes the light that glare takes from all that is bright."""
     effect, x = model.effects[-1], model.x[-1]

@@ -19,23 +19,32 @@ Array = NDArray[np.floating]
 class UnseenError:
     """parts, photos: RMS error of left-out squares and of left-out photos, relative to what the
     photos show up to white; photos: None of one photo. over_floor: the typical error of left-out
-    squares over what noise of the photos and the scan's known errors would make."""
+    squares over what noise of the photos and the scan's known errors would make. not_noise: part of
+    the typical squared error that the photos' own noise does not make."""
 
     parts: float
     photos: float | None
     over_floor: float
+    not_noise: float
 
 
 def unseen_error(fitted: Fitted, unseen: Unseen, expected: Array) -> UnseenError:
     """unseen: of left-out squares; expected: (n, 3) deviation before anything was fitted."""
     whole = predict_unseen_photos(fitted)
-    ratio = np.abs(unseen.residual * fitted.deviation / expected)
-    ratio = ratio[np.isfinite(expected)]
+    noise = np.sqrt(fitted.model.pixels.noise)
     return UnseenError(
         _rms(fitted, unseen),
         None if whole is None else _rms(fitted, whole),
-        float(np.median(ratio)) / NORMAL if len(ratio) else 0.0,
+        _typical(fitted, unseen, expected),
+        max(0.0, 1 - 1 / max(_typical(fitted, unseen, noise), 1e-9) ** 2),
     )
+
+
+def _typical(fitted: Fitted, unseen: Unseen, unit: Array) -> float:
+    """Error in a unit (n, 3) of each pixel; 1 where the errors are normal and that large."""
+    missed = np.abs(unseen.residual * fitted.deviation / unit)
+    missed = missed[np.isfinite(fitted.deviation)]
+    return float(np.median(missed)) / NORMAL if len(missed) else 0.0
 
 
 def _rms(fitted: Fitted, unseen: Unseen) -> float:

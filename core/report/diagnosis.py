@@ -27,7 +27,8 @@ def write_pages(
 ) -> Path:
     """index.html and pictures; before, after: the fits without and with what was named."""
     folder.mkdir(parents=True, exist_ok=True)
-    body = section(found, setting) + _materials(folder, before, after)
+    body = section(found, setting) + _evidence(folder, found, setting)
+    body += _materials(folder, before, after)
     html = page(before.capture.file.name, body + _pictures(folder, found, setting))
     (folder / "index.html").write_text(html, "utf-8")
     return folder / "index.html"
@@ -59,14 +60,12 @@ def _pictures(folder: Path, found: Found, setting: Setting) -> str:
 def section(found: Found, setting: Setting) -> str:
     """HTML: the ranking, then the residual along what betrays causes."""
     left = f"<p>{escape(found.left.sentence())}</p>" if found.unexplained else ""
-    rows = "".join(_row(t, t in found.accepted, found) for t in found.ranked)
+    rows = "".join(_row(t, t in found.accepted) for t in found.ranked)
     named = ", ".join(found.causes) or "nothing that can be named"
     return (
         f"<h2>What is wrong</h2><p><b>{escape(named)}</b></p>{left}"
-        f"<p class='sub'>{100 * found.not_noise_before:.0f} % of what the prediction misses is "
-        f"neither noise nor the scan's known errors; with what is named in the model "
-        f"{100 * found.not_noise_after:.0f} %. A gain is what the model with a cause predicts "
-        "better of parts of the photos that it was not fitted to, in standard errors.</p>"
+        "<p class='sub'>A gain is what the model with a cause predicts better of parts of the "
+        "photos that it was not fitted to, in standard errors.</p>"
         f"{_errors(found)}<table><tr><th>cause</th><th>gain</th><th></th><th>what it would mean"
         f"</th></tr>{rows}</table><div class='charts'>{_charts(found, setting)}</div>"
         "<p class='sub'>What the photos show more than the prediction, relative; red before, blue "
@@ -86,10 +85,43 @@ def _errors(found: Found) -> str:
         for what, a, b in rows
         if a is not None and b is not None
     )
+    floor, noise = (
+        (before.over_floor, after.over_floor), (before.not_noise, after.not_noise)
+    )  # fmt: skip
     return (
-        f"<table><tr><th></th><th>before</th><th>after</th></tr>{cells}<tr><th>typical error over "
-        f"what noise and the scan's known errors make</th><td>{before.over_floor:.2f}</td>"
-        f"<td>{after.over_floor:.2f}</td></tr></table>"
+        f"<table><tr><th></th><th>before</th><th>after</th></tr>{cells}<tr><th>part of the typical "
+        f"squared error that is not the photos' noise</th><td>{100 * noise[0]:.0f} %</td><td>"
+        f"{100 * noise[1]:.0f} %</td></tr><tr><th>typical error over what noise and the scan's "
+        f"known errors make</th><td>{floor[0]:.2f}</td><td>{floor[1]:.2f}</td></tr></table>"
+    )
+
+
+def evidence_file(cause: str) -> str:
+    """The picture of what a cause changes."""
+    return f"evidence_{cause}.png"
+
+
+def _evidence(folder: Path, found: Found, setting: Setting) -> str:
+    """HTML: what each accepted cause changes, in the photo that it changes most."""
+    cells, pixels = "", setting.pixels
+    for trial in found.accepted:
+        changed = trial.changed() / found.before.deviation
+        strength = np.bincount(pixels.photo, np.sum(changed**2, axis=1))
+        if not strength.any():
+            continue
+        photo = int(np.argmax(strength / np.maximum(np.bincount(pixels.photo), 1)))
+        cause, file = trial.effect.cause, evidence_file(trial.effect.cause)
+        write_png(folder / file, residual_picture(pixels, -changed, photo))
+        cells += (
+            f"<figure><img src='{file}' alt='{cause}'><figcaption>{cause} in photo {photo + 1}"
+            "</figcaption></figure>"
+        )
+    if not cells:
+        return ""
+    return (
+        "<h2>What the causes do</h2><p class='sub'><span class='key'></span> darker … brighter by "
+        "the cause, in the photo that it changes most, full colour at three times what such a "
+        f"pixel usually misses.</p><div class='residuals'>{cells}</div>"
     )
 
 
@@ -118,7 +150,7 @@ def _materials(folder: Path, before: CaptureResult, after: CaptureResult) -> str
     )
 
 
-def _row(trial: Trial, accepted: bool, found: Found) -> str:
+def _row(trial: Trial, accepted: bool) -> str:
     sure = trial.gain / max(trial.error, 1e-9)
     width = int(np.clip(12 * sure, 0, 160))
     said = trial.sentence() if accepted else ""

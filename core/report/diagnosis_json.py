@@ -8,6 +8,7 @@ from typing import Any
 from ..diagnose.search import Found, Trial
 from ..diagnose.unseen_error import UnseenError
 from ..job import CaptureResult
+from .diagnosis import evidence_file
 from .result_json import program_version, write_json
 
 FORMAT = 2
@@ -22,8 +23,8 @@ def describe(found: Found, before: CaptureResult, after: CaptureResult) -> dict[
         "program": {"name": "patina", "version": program_version()},
         "capture": str(before.capture.file),
         "named": list(found.causes) or ["none"],
-        "baseline": _errors(found.error_before, found.not_noise_before),
-        "extended": _errors(found.error_after, found.not_noise_after),
+        "baseline": _errors(found.error_before),
+        "extended": _errors(found.error_after),
         "causes": [_cause(t, t in found.accepted) for t in found.ranked],
         "unexplained": found.unexplained,
         "left": {
@@ -52,18 +53,19 @@ def write(path: Path, found: Found, before: CaptureResult, after: CaptureResult)
     write_json(path, describe(found, before, after))
 
 
-def _errors(error: UnseenError, not_noise: float) -> dict[str, float | None]:
+def _errors(error: UnseenError) -> dict[str, float | None]:
     """RMS errors relative to the photos' light."""
     return {
         "held_out": error.parts,
         "held_out_photos": error.photos,
         "held_out_over_noise_floor": error.over_floor,
-        "not_noise": not_noise,
+        "not_noise": error.not_noise,
     }
 
 
 def _cause(trial: Trial, accepted: bool) -> dict[str, Any]:
     numbers = trial.effect.numbers
+    drawn = accepted and len(numbers) > 0
     return {
         "cause": trial.effect.cause,
         "accepted": accepted,
@@ -73,6 +75,7 @@ def _cause(trial: Trial, accepted: bool) -> dict[str, Any]:
         "standard_error": trial.error,
         "p_value": trial.chance,
         "rms_change": trial.change,
+        "evidence": f"report/{evidence_file(trial.effect.cause)}" if drawn else None,
         "parameters": {
             name: {"value": float(v), "standard_error": float(d), "unit": unit}
             for name, unit, v, d in zip(

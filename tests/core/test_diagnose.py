@@ -119,7 +119,7 @@ def test_what_is_not_understood_is_no_proof():
     wild = setting.pixels.observed * (1 + 0.15 * rng.standard_normal((len(setting.pixels), 3)))
     found = searched(changed(setting, wild))
     assert found.causes == ()
-    assert found.not_noise_before > 0.8
+    assert found.error_before.not_noise > 0.8
     deviation = pixel_deviation(setting.pixels, setting.brdfs, np.radians(0.2))
     shown = Model(setting.pixels, setting.brdfs).predicted()
     residual = (wild - shown) / deviation
