@@ -12,6 +12,7 @@ MODULES: tuple[str, ...] = (
     "scene.lamps",
     "scene.worlds",
     "scene.fallback",
+    "scene.checked",
     "operators.import_capture",
     "operators.solve",
     "operators.masks",

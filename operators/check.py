@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..core.diagnose.chosen import can_be_applied
 from ..core.job import CaptureResult, Job
 from ..core.job.check_job import CheckJob
 from ..core.job.refit_job import RefitJob
@@ -30,6 +31,7 @@ explain, name the cause, and fit again with it in the model"""
         return can_fit(cls, context)
 
     def _start(self, context: bpy.types.Context) -> None:
+        keep(None)  # two at once would be too much
         self._job = CheckJob(fit_job(self, context.scene))
         self._scene = context.scene.name
 
@@ -42,8 +44,10 @@ explain, name the cause, and fit again with it in the model"""
             return
         keep(checked)
         scene.patina.causes.clear()
-        for effect in after.effects:
-            scene.patina.causes.add().name = effect.cause
+        applied = {effect.cause for effect in after.effects}
+        for trial in can_be_applied(found):
+            cause = scene.patina.causes.add()
+            cause.name, cause.use = trial.effect.cause, trial.effect.cause in applied
         _show(self, scene, after, self._job)
         store_result(str(before.capture.file), describe(found, before, after), DIAGNOSIS)
         mesh, vertices = scene.patina.mesh, setting.rays.mesh.vertices
@@ -71,7 +75,7 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
 
     def _start(self, context: bpy.types.Context) -> None:
         off = [cause.name for cause in context.scene.patina.causes if not cause.use]
-        self._job = RefitJob(kept(capture_path(context.scene)), without=off)
+        self._job = RefitJob(kept(capture_path(context.scene)), without=off, exactly=True)
         self._scene = context.scene.name
 
     def _finish(self, context: bpy.types.Context) -> None:
@@ -134,6 +138,5 @@ def register() -> None:
 
 def unregister() -> None:
     tell(None)
-    keep(None)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

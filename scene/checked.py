@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import bpy
+
 from ..core.job.diagnose_job import DiagnoseJob
+from .handlers import attach, detach
 
 _last: DiagnoseJob | None = None
 
@@ -18,3 +21,23 @@ def kept(capture: str) -> DiagnoseJob | None:
     if _last is None or _last.result is None or str(_last.result.capture.file) != capture:
         return None
     return _last
+
+
+@bpy.app.handlers.persistent
+def _forget(*_: object) -> None:
+    """Another file is opened."""
+    keep(None)
+
+
+HANDLERS = (("load_pre", _forget),)
+
+
+def register() -> None:
+    """Watch for another file."""
+    attach(HANDLERS)
+
+
+def unregister() -> None:
+    """No more, and forget the last check."""
+    detach(HANDLERS)
+    keep(None)

@@ -64,7 +64,7 @@ def lit_ball(seed: int = 0) -> Setting:
     triangle = Mesh(np.eye(3) * 1e-3, np.array([[0, 1, 2]], np.int32))
     return Setting(
         pixels, BRDFs.of([brdf]), RayScene.build(triangle), np.arange(PHOTOS) // 2,
-        ("a", "b", "c"), np.ones(3, bool), np.zeros(3), SIZE, np.pi,
+        ("a", "b", "c"), np.ones(3, bool), np.zeros(3), SIZE, np.pi, np.ones(1, np.float32),
     )  # fmt: skip
 
 

@@ -20,9 +20,10 @@ def with_causes(found: Found, causes: Collection[str]) -> Fitted:
     """At its optimum; causes: of those that are accepted. Without some, the others' numbers are
     fitted again."""
     trials = can_be_applied(found)
-    chosen = [t for t in trials if t.effect.cause in causes]
-    if len(chosen) == len(trials):
+    if all(t.effect.cause in causes for t in trials):
         return found.after
+    loose = [t for t in found.accepted if t.effect.cause in NO_CORRECTION]
+    chosen = [t for t in trials if t.effect.cause in causes] + loose
     model = found.before.model
     for trial in chosen:
         model = model.with_effect(trial.effect, trial.x)

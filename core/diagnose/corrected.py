@@ -11,19 +11,18 @@ from collections.abc import Generator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..angles import half_difference
 from ..angles.vectors import dot
 from ..samples import SampleTable
-from .effect import Setting
+from .effect import Near, Setting
 from .model import Model
 from .of_samples import nearest
 from .pixels import Pixels
 
 CHUNK = 20_000  # samples at a time: what each sees around itself takes a kilobyte
 NUDGE = 1e-2  # of the prediction
-LEAST_RESPONSE = 0.3  # of the camera's usual one: less is a plateau, which tells nothing
+LEAST_RESPONSE = 0.2  # ∂ ln recorded/∂ ln light: less is a plateau, or the veil of another place
 LEAST_COS, LEAST_LIGHT = 0.05, 0.5  # θi; part of the lamp's light that arrives
 FARTHEST = 3.0  # factor by which a prediction may correct
 
@@ -35,17 +34,19 @@ def corrected(
     samples (of_samples.py); model: with the effects, at its optimum; setting: that it was made for.
     """
     parts = []
-    near = nearest(pixels, setting.pixels)
-    for start in range(0, len(table), CHUNK):
-        yield start / len(table)
-        rows = np.arange(start, min(start + CHUNK, len(table)))
+    near = nearest(pixels, setting.pixels, setting.size)
+    # of a photo that the diagnosis did not look at nothing is known
+    known = np.flatnonzero(setting.pixels.photo[near.photo] == pixels.photo)
+    for start in range(0, len(known), CHUNK):
+        yield start / len(known)
+        rows = known[start : start + CHUNK]
         here = replace(setting, pixels=pixels.select(rows))
-        parts.append(_corrected(table.select(rows), elsewhere(model, here, near[rows])))
-    return SampleTable.concatenate(parts) if parts else table
+        parts.append(_corrected(table.select(rows), elsewhere(model, here, near.select(rows))))
+    return SampleTable.concatenate(parts) if parts else SampleTable.empty()
 
 
-def elsewhere(model: Model, setting: Setting, near: NDArray[np.intp]) -> Model:
-    """The same model for the setting's pixels; near: (m,) of the model's own the nearest."""
+def elsewhere(model: Model, setting: Setting, near: Near) -> Model:
+    """The same model for the setting's pixels; near: of the model's own the nearest."""
     effects, x = [], []
     for effect, numbers in zip(model.effects, model.x, strict=True):
         moved = effect.elsewhere(setting, near)
@@ -63,9 +64,10 @@ def _corrected(table: SampleTable, model: Model) -> SampleTable:
     recorded = model.recorded(entering, now)
     step = NUDGE * np.maximum(entering, 1e-12)
     response = (model.recorded(entering + step, now) - recorded) / step
-    usual = np.median(response, axis=0)
-    good = (response > LEAST_RESPONSE * usual).all(axis=1)
-    arrived = entering + (table.radiance - recorded) / np.maximum(response, 1e-3 * usual)
+    relative = response * entering / np.where(recorded > 0, recorded, np.inf)
+    good = (relative > LEAST_RESPONSE).all(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):  # of what is not good
+        arrived = entering + (table.radiance - recorded) / response
     radiance = arrived - (entering - reflected)
     if len(lamps) > 1 or now.stretch is not None:
         point = model.brdfs.reflected(replace(now, stretch=None))

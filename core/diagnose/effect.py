@@ -69,10 +69,25 @@ class Numbers:
 
 
 @dataclass(frozen=True)
+class Near:
+    """Of other pixels (m,) the nearest of those that effects were made for: (m,) in the same photo,
+    and (m,) on the surface, in whatever photo."""
+
+    photo: NDArray[np.intp]
+    surface: NDArray[np.intp]
+
+    def select(self, rows: NDArray[np.intp]) -> Near:
+        """Of some of them."""
+        return Near(self.photo[rows], self.surface[rows])
+
+
+@dataclass(frozen=True)
 class Setting:
     """What effects are made for. light: (photos,) which of the lights lit each. lights: their
     names; distant: which of them are. centre: (3,) of what the photos show; size: its extent, scan
-    units. level: typical irradiance. brdfs: before any effect. rays: the scan's mesh."""
+    units. level: typical irradiance. scale: (materials,) what each material's reflectance was
+    multiplied by, and irradiance on it divided by, where that is not known. brdfs: before any
+    effect. rays: the scan's mesh."""
 
     pixels: Pixels
     brdfs: BRDFs
@@ -83,6 +98,12 @@ class Setting:
     centre: NDArray[np.float64]
     size: float
     level: float
+    scale: NDArray[np.float32]
+
+    @property
+    def own_level(self) -> Array:
+        """(n, 1) typical irradiance, in the unit of each pixel's material."""
+        return (self.level / self.scale[self.pixels.material])[:, None].astype(np.float32)
 
     @cached_property
     def surroundings(self) -> Surroundings:
@@ -127,9 +148,9 @@ class Effect(ABC):
     def of(cls, setting: Setting) -> Effect | None:
         """For a capture; None where it cannot be there."""
 
-    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> Effect | None:
-        """The same for other pixels (m,), of which the same numbers speak; near: (m,) of the pixels
-        that the effect was made for, the nearest of the same photo. None where it does nothing."""
+    def elsewhere(self, setting: Setting, near: Near) -> Effect | None:
+        """The same for other pixels (m,), of which the same numbers speak; near: the nearest of the
+        pixels that the effect was made for. None where it does nothing."""
         return type(self).of(setting)
 
     @property

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .brdfs import BRDFs
-from .effect import Array, Effect, Numbers, Setting
+from .effect import Array, Effect, Near, Numbers, Setting
 from .situation import Situation
 
 
@@ -24,7 +24,7 @@ class Fixed(Effect):
     def of(cls, setting: Setting) -> Effect | None:
         return None
 
-    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> Fixed | None:
+    def elsewhere(self, setting: Setting, near: Near) -> Fixed | None:
         inner = self.inner.elsewhere(setting, near)
         return None if inner is None else replace(self, inner=inner)
 

@@ -41,5 +41,7 @@ def face_glow(setting: Setting, photo: int) -> Array:
     else:
         near = cKDTree(pixels.point).query(centre, NEAREST)[1]
         material = np.round(np.median(pixels.material[near], axis=1)).astype(np.int64)
-    light = pixels.irradiance[one] * np.where(dark, 0, cosine)[:, None]
+    albedo /= setting.scale[:, None]
+    irradiance = pixels.irradiance[one] * setting.scale[pixels.material[one]]
+    light = irradiance * np.where(dark, 0, cosine)[:, None]
     return np.asarray(albedo[material] / np.pi * light, np.float32)

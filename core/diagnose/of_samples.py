@@ -14,9 +14,11 @@ from ..job.photos import LitPhotos
 from ..samples import SampleTable
 from ..scan import Scan
 from .choose import REACH, photo_slopes, photo_veil
+from .effect import Near
 from .pixels import Pixels
 
 APART = 1e3  # half diagonals between two photos
+SIDE = 0.02  # of the object's size, that surfaces at right angles count as farther apart
 
 
 def pixels_of_samples(
@@ -53,11 +55,20 @@ def pixels_of_samples(
     )  # fmt: skip
 
 
-def nearest(pixels: Pixels, looked_at: Pixels) -> NDArray[np.intp]:
-    """(n,) of each pixel the nearest of the others in the same photo, or, where a photo has none,
-    in another."""
-    return np.asarray(cKDTree(_places(looked_at)).query(_places(pixels))[1], np.intp)
+def nearest(pixels: Pixels, looked_at: Pixels, size: float) -> Near:
+    """Of each pixel (n,) those of the others that are nearest in the same photo (where it has none,
+    in another one) and on the surface, the two sides of a thin wall apart; size: of the object."""
+    return Near(
+        np.asarray(cKDTree(_in_photos(looked_at)).query(_in_photos(pixels))[1], np.intp),
+        np.asarray(
+            cKDTree(_on_surface(looked_at, size)).query(_on_surface(pixels, size))[1], np.intp
+        ),
+    )
 
 
-def _places(pixels: Pixels) -> NDArray[np.float64]:
+def _in_photos(pixels: Pixels) -> NDArray[np.float64]:
     return np.stack([pixels.x, pixels.y, APART * pixels.photo.astype(np.float64)], axis=1)
+
+
+def _on_surface(pixels: Pixels, size: float) -> NDArray[np.float64]:
+    return np.concatenate([pixels.point / size, SIDE * pixels.normal], axis=1)

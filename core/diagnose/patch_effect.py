@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .effect import Array, Effect, Setting
+from .effect import Array, Effect, Near, Setting
 
 
 @dataclass(frozen=True)
@@ -17,8 +17,8 @@ class PatchEffect(Effect):
     parts: NDArray[np.intp]
     usual: tuple[float, ...]
 
-    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> Effect:
-        return replace(self, parts=self.parts[near])
+    def elsewhere(self, setting: Setting, near: Near) -> Effect:
+        return replace(self, parts=self.parts[near.surface])
 
     @property
     def patch(self) -> NDArray[np.intp]:

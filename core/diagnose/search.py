@@ -121,7 +121,7 @@ class Trial:
     @property
     def deviation(self) -> Vector:
         """Of the numbers as they are told."""
-        return np.sqrt(self.unseen.variance[self.place])
+        return np.sqrt(np.maximum(self.unseen.variance[self.place], 0.0))
 
 
 @dataclass(frozen=True)
@@ -255,7 +255,8 @@ def _try(now: Fitted, costs: dict[bool, Array], one: Asked) -> Trial:
     unseen = predict_unseen(fitted, fine)
     # what is confined to a few large squares could never be sure
     gained = by_square(squares(now, fine), costs[fine] - unseen.cost)
-    without = now.shown if effect.patch is not None else without_last(fitted.model)
+    own = effect.patch is None and len(effect.numbers) > 0
+    without = without_last(fitted.model) if own else now.shown
     change = rms_change(fitted.shown, without, now.deviation)
     return Trial(effect, fitted, unseen, gained, change, one.chance)
 

@@ -62,6 +62,7 @@ def setting_of(result: CaptureResult) -> Generator[float, None, Setting]:
         capture, result.scan, result.rays, result.photos, result.lights
     )
     scale = np.array([material.scale for material in result.materials], np.float32)
+    level = float(np.median(pixels.irradiance))
     pixels = replace(pixels, irradiance=pixels.irradiance / scale[pixels.material, None])
     names = [light.name for light in capture.lights]
     middle = pixels.point.mean(axis=0)
@@ -74,7 +75,8 @@ def setting_of(result: CaptureResult) -> Generator[float, None, Setting]:
         distant=np.array([light.distant for light in capture.lights]),
         centre=middle,
         size=2 * float(np.percentile(np.linalg.norm(pixels.point - middle, axis=1), 99)),
-        level=float(np.median(pixels.irradiance)),
+        level=level,
+        scale=scale,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Generator, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,16 +27,31 @@ CORRECTING = 0.3  # of the time
 MORE = 0.03  # ln of what errors of unseen photos may grow by
 
 
+@dataclass(frozen=True)
+class Again:
+    """A material's second fit. material: None where it could not be fitted; light: RMS radiance of
+    its samples over what it was; warnings: what is to be said; applied: the effects."""
+
+    material: MaterialResult | None
+    light: float
+    warnings: tuple[str, ...]
+    applied: tuple[Applied, ...] = ()
+
+
 class RefitJob(Job):
     """``result`` is the fit with the effects in the model; where none is, the fit as it was.
 
-    checked: a finished diagnosis. without: causes that it named and that are left out.
+    checked: a finished diagnosis. without: causes that it named and that are left out. exactly: the
+    rest is taken into account even where unseen photos are then predicted worse.
     """
 
-    def __init__(self, checked: DiagnoseJob, without: Collection[str] = ()) -> None:
+    def __init__(
+        self, checked: DiagnoseJob, without: Collection[str] = (), exactly: bool = False
+    ) -> None:
         super().__init__()
         self.checked = checked
         self.without = without
+        self.exactly = exactly
         self.result: CaptureResult | None = None
 
     def run(self) -> Iterator[Step]:
@@ -47,11 +62,15 @@ class RefitJob(Job):
         dropped: list[str] = []
         attempt = 0.5
         while chosen:
-            materials, applied = yield from self._with(before, found, chosen, 1 - 2 * attempt)
-            worse = _worse(before.materials, materials)
+            again = yield from self._with(before, found, chosen, 1 - 2 * attempt)
+            worse = None if self.exactly else _worse(before.materials, again)
             if worse is None:
-                said = tuple(dropped)
-                materials = [replace(m, warnings=(*m.warnings, *said)) for m in materials]
+                fitted = [a.material is not None for a in again]
+                materials = [
+                    replace(m, warnings=(*m.warnings, *a.warnings, *dropped))
+                    for m, a in zip(_proposed(before, again), again, strict=True)
+                ]
+                applied = again[0].applied if any(fitted) else ()
                 self.result = replace(before, materials=tuple(materials), effects=applied)
                 return
             dropped.append(f"{chosen.pop().effect.cause} is not taken into account: {worse}")
@@ -61,32 +80,35 @@ class RefitJob(Job):
 
     def _with(
         self, before: CaptureResult, found: Found, chosen: Sequence[Trial], done: float
-    ) -> Generator[Step, None, tuple[list[MaterialResult], tuple[Applied, ...]]]:
+    ) -> Generator[Step, None, list[Again]]:
         """One material after the other; done: of the job, of which this takes half the rest."""
         causes = [trial.effect.cause for trial in chosen]
         step = Step(STAGE, done)
         yield step
         fitted = yield from beside(lambda: with_causes(found, causes), step)
-        materials = []
+        applied = tuple(_applied(trial, fitted.model) for trial in chosen)
+        out = []
         share = 0.5 * (1 - done) / len(before.materials)
         for index, material in enumerate(before.materials):
             start = done + index * share
             try:
-                again = yield from self._again(index, material, fitted.model, start, share)
+                one = yield from self._again(index, material, fitted.model, start, share)
+                out.append(replace(one, applied=applied))
             except PatinaError as error:
                 said = f"fitted without {', '.join(causes)}: {error}"
-                again = replace(material, warnings=(*material.warnings, said))
-            materials.append(again)
-        return materials, tuple(_applied(trial, fitted.model) for trial in chosen)
+                out.append(Again(None, 1.0, (said,), applied))
+        return out
 
     def _again(
         self, index: int, material: MaterialResult, model: Model, start: float, share: float
-    ) -> Generator[Step, None, MaterialResult]:
+    ) -> Generator[Step, None, Again]:
         table = yield from self._corrected(index, material.name, model, Step(STAGE, start))
         if len(table) < FEWEST:
             raise PatinaError(f"too few samples can be corrected: {len(table)}")
         start, share = start + CORRECTING * share, (1 - CORRECTING) * share
-        return (yield from self.checked.fit.fitted_again(index, table, material, start, share))
+        fitted = yield from self.checked.fit.fitted_again(index, table, material, start, share)
+        own = self.checked.fit.samples[material.name].radiance
+        return Again(fitted, _rms(table.radiance) / max(_rms(own), 1e-30), ())
 
     def _corrected(
         self, index: int, name: str, model: Model, step: Step
@@ -99,13 +121,26 @@ class RefitJob(Job):
         return (yield from _quietly(corrected(table, pixels, model, setting), step))
 
 
-def _worse(before: Sequence[MaterialResult], after: Sequence[MaterialResult]) -> str | None:
+def _rms(radiance: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(radiance, dtype=np.float64))))
+
+
+def _proposed(before: CaptureResult, again: Sequence[Again]) -> list[MaterialResult]:
+    """The second fit's where there is one."""
+    both = zip(before.materials, again, strict=True)
+    return [one if a.material is None else a.material for one, a in both]
+
+
+def _worse(before: Sequence[MaterialResult], after: Sequence[Again]) -> str | None:
     """In words, where unseen photos are predicted worse than without: a model may explain what it
-    was fitted to by something that is not there."""
+    was fitted to by something that is not there. Errors are relative to the light; where light was
+    taken away it is the light as it was."""
     known = [
-        (one.held_out.error, other.held_out.error)
+        (one.held_out.error, other.material.held_out.error * min(other.light, 1.0))
         for one, other in zip(before, after, strict=True)
-        if one.held_out is not None and other.held_out is not None
+        if other.material is not None
+        and one.held_out is not None
+        and other.material.held_out is not None
     ]
     if not known:
         return None

@@ -33,15 +33,8 @@ def write_report(folder: Path, result: CaptureResult) -> Iterator[float]:
     for done, material in enumerate(result.materials):
         yield done / count
         body.append(_material_section(folder, material, photos))
-    body.append(
-        "<h2>Photo, prediction, difference</h2><p class='sub'>Each prediction is made from the "
-        "scanned mesh, the light and the fitted materials: direct light and cast shadows. "
-        "Difference: <span class='key'></span> prediction too dark … too bright, full colour at "
-        "± 30 % of the photo's white. Dark grey: no surface or no material.</p>"
-    )
-    for place in range(len(result.capture.photos)):
-        yield (len(result.materials) + place) / count
-        body.append(_photo_row(folder, result, place))
+    if not result.effects:  # these predictions know the capture's own light and camera only
+        yield from _photo_rows(folder, result, body)
     head = (
         f"{len(result.capture.photos)} lit photos · {len(result.scan.mesh.faces):,} faces · basis "
         f"{result.basis.version}"
@@ -105,6 +98,20 @@ def _spheres(folder: Path, material: MaterialResult) -> str:
             f"<figcaption>{label}</figcaption></figure>"
         )
     return "".join(cells)
+
+
+def _photo_rows(folder: Path, result: CaptureResult, body: list[str]) -> Iterator[float]:
+    """Add all photos to the page; yields the fraction done of the whole."""
+    count = len(result.materials) + len(result.capture.photos)
+    body.append(
+        "<h2>Photo, prediction, difference</h2><p class='sub'>Each prediction is made from the "
+        "scanned mesh, the light and the fitted materials: direct light and cast shadows. "
+        "Difference: <span class='key'></span> prediction too dark … too bright, full colour at "
+        "± 30 % of the photo's white. Dark grey: no surface or no material.</p>"
+    )
+    for place in range(len(result.capture.photos)):
+        yield (len(result.materials) + place) / count
+        body.append(_photo_row(folder, result, place))
 
 
 def _photo_row(folder: Path, result: CaptureResult, place: int) -> str:

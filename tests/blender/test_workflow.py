@@ -206,7 +206,8 @@ def test_a_check_names_a_drift_fits_with_it_and_can_do_without() -> None:
         assert bpy.ops.patina.show_evidence(cause=name) == {"FINISHED"}
         assert mesh.data.color_attributes.active_color.name == f"Patina: {name}"
 
-    assert [c.name for c in scene.patina.causes] == said["applied"]
+    assert [c.name for c in scene.patina.causes if c.use] == said["applied"]
+    assert scene.patina.causes[0].name == "light_intensity"
     for cause in scene.patina.causes:
         cause.use = False
     assert bpy.ops.patina.refit() == {"FINISHED"}

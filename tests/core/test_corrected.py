@@ -94,8 +94,8 @@ def test_the_same_numbers_speak_of_other_pixels():
     rng = np.random.default_rng(0)
     order = rng.permutation(len(setting.pixels))
     one = replace(setting, pixels=setting.pixels.select(np.sort(order[: len(order) // 2])))
-    near = nearest(setting.pixels, one.pixels)
-    assert (one.pixels.photo[near] == setting.pixels.photo).all()
+    near = nearest(setting.pixels, one.pixels, setting.size)
+    assert (one.pixels.photo[near.photo] == setting.pixels.photo).all()
     for kind in (*EXAMPLES, CastShadow):
         whole, half = kind.of(setting), kind.of(one)
         if kind is CastShadow:
@@ -105,7 +105,7 @@ def test_the_same_numbers_speak_of_other_pixels():
         told = Model(one.pixels, one.brdfs).with_effect(half, x)
         moved = elsewhere(told, setting, near).predicted()
         if kind is CastShadow:  # of half of the pixels, squares are other ones
-            same = np.flatnonzero(np.isin(np.arange(len(near)), order[: len(order) // 2]))
+            same = np.flatnonzero(np.isin(np.arange(len(near.photo)), order[: len(order) // 2]))
             np.testing.assert_allclose(moved[same], told.predicted(), rtol=1e-5)
         else:
             if kind is CameraResponse:  # what is grey was said when the numbers were found
@@ -121,7 +121,7 @@ def test_every_effect_can_be_moved(kind):
     effect = kind.of(setting)
     if effect is None:
         pytest.skip("cannot be there on a ball alone")
-    near = nearest(setting.pixels, setting.pixels)
+    near = nearest(setting.pixels, setting.pixels, setting.size)
     moved = effect.elsewhere(setting, near)
     assert moved is not None and len(moved.numbers) == len(effect.numbers)
 

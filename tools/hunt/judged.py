@@ -67,7 +67,7 @@ class Row:
     def wrong_name(self) -> bool:
         """A single cause for which another one is named first, and not even as a tie."""
         first = set(self.named[:1]) - {"unknown"}
-        return not self.right and bool(first) and not self.hidden & set(self.ties)
+        return not self.right and bool(first - self.hidden) and not self.hidden & set(self.ties)
 
 
 def judged(cause: str, strength: float, seed: int, threads: int | None = None) -> Row:

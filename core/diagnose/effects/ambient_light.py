@@ -23,7 +23,7 @@ class AmbientLight(Effect):
     @classmethod
     def of(cls, setting: Setting) -> AmbientLight:
         around = setting.surroundings
-        level = setting.level / np.pi
+        level = setting.own_level / np.pi
         return cls(level * around.under((around.face < 0).astype(np.float32)))
 
     @property

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effect import Array, Effect, Numbers, Setting, felt_by
+from ..effect import Array, Effect, Near, Numbers, Setting, felt_by
 from ..situation import Situation
 
 USUAL = 1.0  # pixels
@@ -34,9 +34,11 @@ class CameraPose(Effect):
         photos, place = np.unique(pixels.photo, return_inverse=True)
         return cls(tuple(photos.tolist()), place.ravel(), pixels.slope, pixels.x, pixels.y)
 
-    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> CameraPose:
+    def elsewhere(self, setting: Setting, near: Near) -> CameraPose:
         pixels = setting.pixels
-        return replace(self, photo=self.photo[near], slope=pixels.slope, x=pixels.x, y=pixels.y)
+        return replace(
+            self, photo=self.photo[near.photo], slope=pixels.slope, x=pixels.x, y=pixels.y
+        )
 
     @property
     def numbers(self) -> Numbers:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..effect import Array, Effect, Numbers, Setting
+from ..effect import Array, Effect, Near, Numbers, Setting
 from ..situation import Situation
 
 USUAL = 0.15
@@ -31,7 +30,7 @@ class CameraResponse(Effect):
         white = float(np.percentile(seen, WHITE))
         return cls(max(float(np.minimum(seen, white).mean()), 1e-9))
 
-    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> CameraResponse:
+    def elsewhere(self, setting: Setting, near: Near) -> CameraResponse:
         return self
 
     @property

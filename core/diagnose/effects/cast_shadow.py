@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effect import Array, Numbers, Setting
+from ..effect import Array, Near, Numbers, Setting
 from ..image_cells import cell_numbers
 from ..patch_effect import PatchEffect
 from ..patches import median_of
@@ -37,8 +37,8 @@ class CastShadow(PatchEffect):
         square = np.unique(number, return_inverse=True)[1].ravel()
         return cls(square.astype(np.intp), (USUAL,), pixels.photo)
 
-    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> CastShadow:
-        return replace(self, parts=self.parts[near], photo=self.photo[near])
+    def elsewhere(self, setting: Setting, near: Near) -> CastShadow:
+        return replace(self, parts=self.parts[near.photo], photo=self.photo[near.photo])
 
     @property
     def numbers(self) -> Numbers:

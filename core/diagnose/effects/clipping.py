@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..effect import Array, Effect, Numbers, Setting
+from ..effect import Array, Effect, Near, Numbers, Setting
 from ..situation import Situation
 
 SOFT = 0.01  # of the plateau, over which the end is rounded
@@ -27,7 +26,7 @@ class Clipping(Effect):
         seen = setting.pixels.observed
         return cls(np.maximum(seen.max(axis=0), 1e-9).astype(np.float64))
 
-    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> Clipping:
+    def elsewhere(self, setting: Setting, near: Near) -> Clipping:
         return self
 
     @property

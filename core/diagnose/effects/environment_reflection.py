@@ -31,7 +31,7 @@ class EnvironmentReflection(Effect):
         z, turn = 1 - (2 * k + 1) / LOBES, np.pi * (3 - np.sqrt(5)) * k
         r = np.sqrt(1 - z**2)
         directions = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
-        level = setting.level / np.pi
+        level = setting.own_level / np.pi
         open_ = (around.face < 0).astype(np.float32)
         reflected = []
         for d in directions.astype(np.float32):

@@ -2,37 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..brdfs import BRDFs
-from ..effect import Array, Effect, Numbers, Setting
+from ..effect import Array, Effect, Near, Numbers, Setting
 from ..situation import Situation
 
 
 @dataclass(frozen=True)
 class Interreflection(Effect):
     """numbers: the bounced light over what one bounce of the fitted materials gives. reflected:
-    (n, 3) that bounce."""
+    (n, 3) that bounce; glow: by photo, (f, 3) what every face of the mesh sends off."""
 
     reflected: Array
+    glow: dict[int, Array]
     cause = "interreflection"
     proof = "one photo with a black cloth over the parts that face the bright ones"
 
     @classmethod
     def of(cls, setting: Setting) -> Interreflection | None:
-        around = setting.surroundings
-        if not (around.face >= 0).any():
+        if not (setting.surroundings.face >= 0).any():
             return None
-        reflected = np.zeros((len(setting.pixels), 3), np.float32)
-        for photo in np.unique(setting.pixels.photo):
-            rows = np.flatnonzero(setting.pixels.photo == photo)
-            glow = setting.glow(int(photo))  # (f, 3) radiance of every face, 0 in shadow
-            face = around.face[rows]
-            seen = np.where((face >= 0)[..., None], glow[np.maximum(face, 0)], 0)
-            reflected[rows] = np.einsum("ndc,ndc->nc", around.reflected[rows], seen)
-        return cls(reflected)
+        glow = {int(photo): setting.glow(int(photo)) for photo in np.unique(setting.pixels.photo)}
+        return cls(_bounced(setting, glow), glow)
+
+    def elsewhere(self, setting: Setting, near: Near) -> Interreflection:
+        return replace(self, reflected=_bounced(setting, self.glow))
 
     @property
     def numbers(self) -> Numbers:
@@ -48,3 +46,15 @@ class Interreflection(Effect):
             f"lamp makes them ({x[0]:.1f} times what one bounce of the fitted material gives; up "
             f"to {most:.2g} in units of 1/100 radiance)"
         )
+
+
+def _bounced(setting: Setting, glow: Mapping[int, Array]) -> Array:
+    """(n, 3) reflected of what the faces that each pixel sees send off, 0 in shadow."""
+    around, pixels = setting.surroundings, setting.pixels
+    reflected = np.zeros((len(pixels), 3), np.float32)
+    for photo in np.unique(pixels.photo):
+        rows = np.flatnonzero(pixels.photo == photo)
+        face = around.face[rows]
+        seen = np.where((face >= 0)[..., None], glow[int(photo)][np.maximum(face, 0)], 0)
+        reflected[rows] = np.einsum("ndc,ndc->nc", around.reflected[rows], seen)
+    return reflected / setting.scale[pixels.material, None]

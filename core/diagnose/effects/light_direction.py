@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...angles.vectors import tangents
-from ..effect import Array, Effect, Numbers, Setting, felt_by
+from ..effect import Array, Effect, Near, Numbers, Setting, felt_by
 from ..situation import Situation
 
 USUAL = np.radians(3.0)
@@ -43,8 +43,8 @@ class LightDirection(Effect):
         names = tuple(setting.lights[k] for k in wanted)
         return cls(names, *tangents(directions), place)
 
-    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> LightDirection:
-        return replace(self, light=self.light[near])
+    def elsewhere(self, setting: Setting, near: Near) -> LightDirection:
+        return replace(self, light=self.light[near.photo])
 
     @property
     def numbers(self) -> Numbers:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effect import Effect, Numbers, Setting, felt_by, without_mean
+from ..effect import Effect, Near, Numbers, Setting, felt_by, without_mean
 from ..situation import Situation
 
 USUAL = 0.1  # of the logarithm
@@ -28,8 +28,8 @@ class LightIntensity(Effect):
         photos, place = np.unique(setting.pixels.photo, return_inverse=True)
         return cls(tuple(photos.tolist()), place.ravel()) if len(photos) > 1 else None
 
-    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> LightIntensity:
-        return replace(self, photo=self.photo[near])
+    def elsewhere(self, setting: Setting, near: Near) -> LightIntensity:
+        return replace(self, photo=self.photo[near.photo])
 
     @property
     def numbers(self) -> Numbers:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effect import Array, Effect, Numbers, Setting, felt_by, without_mean
+from ..effect import Array, Effect, Near, Numbers, Setting, felt_by, without_mean
 from ..situation import Situation
 from .light_direction import LightDirection
 
@@ -38,7 +38,7 @@ class NearLight(Effect):
             return None
         return cls(from_afar, _offset(setting), setting.size)
 
-    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> NearLight:
+    def elsewhere(self, setting: Setting, near: Near) -> NearLight:
         from_afar = self.from_afar.elsewhere(setting, near)
         return replace(self, from_afar=from_afar, offset=_offset(setting))
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...angles.vectors import tangents
-from ..effect import Array, Numbers, Setting
+from ..effect import Array, Near, Numbers, Setting
 from ..patch_effect import PatchEffect
 from ..patches import surface_patches
 from ..situation import Situation
@@ -40,8 +39,9 @@ class NormalError(PatchEffect):
         at = [v[patch].astype(np.float32) for v in tangents(mean)]
         return cls(patch, (USUAL,) * 2, *at)
 
-    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> NormalError:
-        return replace(self, parts=self.parts[near], first=self.first[near], other=self.other[near])
+    def elsewhere(self, setting: Setting, near: Near) -> NormalError:
+        at = near.surface
+        return replace(self, parts=self.parts[at], first=self.first[at], other=self.other[at])
 
     @property
     def numbers(self) -> Numbers:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..brdfs import BRDFs
-from ..effect import Array, Numbers, Setting
+from ..effect import Array, Near, Numbers, Setting
 from ..patch_effect import PatchEffect
 from ..patches import median_of, surface_patches
 from ..situation import Situation
@@ -37,9 +36,9 @@ class SecondMaterial(PatchEffect):
             return None
         return cls(parts, USUAL, Situation.of(setting.pixels).received)
 
-    def elsewhere(self, setting: Setting, near: NDArray[np.intp]) -> SecondMaterial:
+    def elsewhere(self, setting: Setting, near: Near) -> SecondMaterial:
         received = Situation.of(setting.pixels).received
-        return replace(self, parts=self.parts[near], received=received)
+        return replace(self, parts=self.parts[near.surface], received=received)
 
     @property
     def numbers(self) -> Numbers:
