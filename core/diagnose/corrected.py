@@ -29,10 +29,10 @@ FARTHEST = 3.0  # factor by which a prediction may correct
 
 def corrected(
     table: SampleTable, pixels: Pixels, model: Model, setting: Setting
-) -> Generator[float, None, SampleTable]:
-    """Samples (n,) → those (m ≤ n) that can be corrected; yields the fraction done. pixels: of the
-    samples (of_samples.py); model: with the effects, at its optimum; setting: that it was made for.
-    """
+) -> Generator[float, None, tuple[SampleTable, float]]:
+    """Samples (n,) → (those, m ≤ n, that can be corrected, the RMS of their radiance over what it
+    was before other light was subtracted); yields the fraction done. pixels: of the samples
+    (of_samples.py); model: with the effects, at its optimum; setting: that it was made for."""
     parts = []
     near = nearest(pixels, setting.pixels, setting.size)
     # of a photo that the diagnosis did not look at nothing is known
@@ -42,7 +42,10 @@ def corrected(
         rows = known[start : start + CHUNK]
         here = replace(setting, pixels=pixels.select(rows))
         parts.append(_corrected(table.select(rows), elsewhere(model, here, near.select(rows))))
-    return SampleTable.concatenate(parts) if parts else SampleTable.empty()
+    if not parts:
+        return SampleTable.empty(), 1.0
+    tables, left, whole = zip(*parts, strict=True)
+    return SampleTable.concatenate(tables), float(np.sqrt(sum(left) / max(sum(whole), 1e-30)))
 
 
 def elsewhere(model: Model, setting: Setting, near: Near) -> Model:
@@ -56,7 +59,8 @@ def elsewhere(model: Model, setting: Setting, near: Near) -> Model:
     return Model(setting.pixels, model.brdfs, tuple(effects), tuple(x))
 
 
-def _corrected(table: SampleTable, model: Model) -> SampleTable:
+def _corrected(table: SampleTable, model: Model) -> tuple[SampleTable, float, float]:
+    """(samples, sum of squares of their radiance, the same before light was subtracted)."""
     now = model.situation()
     lamps = model.lamps(now)
     reflected = model.reflected(lamps)
@@ -69,6 +73,7 @@ def _corrected(table: SampleTable, model: Model) -> SampleTable:
     with np.errstate(divide="ignore", invalid="ignore"):  # of what is not good
         arrived = entering + (table.radiance - recorded) / response
     radiance = arrived - (entering - reflected)
+    lamp, whole = radiance, arrived
     if len(lamps) > 1 or now.stretch is not None:
         point = model.brdfs.reflected(replace(now, stretch=None))
         ratio = point / np.maximum(reflected, 1e-30)
@@ -81,7 +86,8 @@ def _corrected(table: SampleTable, model: Model) -> SampleTable:
     irradiance = (now.irradiance * now.visible[:, None]).astype(np.float32)
     angles = half_difference(now.normal, now.light, table.view)
     rho = radiance / np.maximum(irradiance * np.maximum(cos_i, LEAST_COS)[:, None], 1e-30)
-    return replace(
+    rows = np.flatnonzero(good)
+    found = replace(
         table,
         theta_h=np.asarray(angles.theta_h, np.float32),
         theta_d=np.asarray(angles.theta_d, np.float32),
@@ -93,4 +99,5 @@ def _corrected(table: SampleTable, model: Model) -> SampleTable:
         irradiance=irradiance,
         normal=np.asarray(now.normal, np.float32),
         light=np.asarray(now.light, np.float32),
-    ).select(np.flatnonzero(good))
+    ).select(rows)
+    return found, float(np.sum(lamp[rows] ** 2)), float(np.sum(whole[rows] ** 2))

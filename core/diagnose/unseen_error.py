@@ -42,13 +42,12 @@ def unseen_error(fitted: Fitted, unseen: Unseen, expected: Array) -> UnseenError
 
 def _typical(fitted: Fitted, unseen: Unseen, unit: Array) -> float:
     """Error in a unit (n, 3) of each pixel; 1 where the errors are normal and that large."""
-    missed = np.abs(unseen.residual * fitted.deviation / unit)
-    missed = missed[np.isfinite(fitted.deviation)]
+    good = np.isfinite(fitted.deviation)
+    missed = np.abs(unseen.residual[good] * fitted.deviation[good] / unit[good])
     return float(np.median(missed)) / NORMAL if len(missed) else 0.0
 
 
 def _rms(fitted: Fitted, unseen: Unseen) -> float:
     observed = fitted.model.pixels.observed
-    missed = unseen.residual * fitted.deviation
-    good = np.isfinite(fitted.deviation)
-    return rms_change(observed, observed - np.where(good, missed, 0), fitted.deviation)
+    missed = unseen.residual * np.where(np.isfinite(fitted.deviation), fitted.deviation, 0)
+    return rms_change(observed, observed - missed, fitted.deviation)

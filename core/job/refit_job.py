@@ -30,7 +30,8 @@ MORE = 0.03  # ln of what errors of unseen photos may grow by
 @dataclass(frozen=True)
 class Again:
     """A material's second fit. material: None where it could not be fitted; light: RMS radiance of
-    its samples over what it was; warnings: what is to be said; applied: the effects."""
+    its samples over what it was before other light was subtracted; warnings: what is to be said;
+    applied: the effects."""
 
     material: MaterialResult | None
     light: float
@@ -102,27 +103,22 @@ class RefitJob(Job):
     def _again(
         self, index: int, material: MaterialResult, model: Model, start: float, share: float
     ) -> Generator[Step, None, Again]:
-        table = yield from self._corrected(index, material.name, model, Step(STAGE, start))
+        table, light = yield from self._corrected(index, material.name, model, Step(STAGE, start))
         if len(table) < FEWEST:
             raise PatinaError(f"too few samples can be corrected: {len(table)}")
         start, share = start + CORRECTING * share, (1 - CORRECTING) * share
         fitted = yield from self.checked.fit.fitted_again(index, table, material, start, share)
-        own = self.checked.fit.samples[material.name].radiance
-        return Again(fitted, _rms(table.radiance) / max(_rms(own), 1e-30), ())
+        return Again(fitted, light, ())
 
     def _corrected(
         self, index: int, name: str, model: Model, step: Step
-    ) -> Generator[Step, None, SampleTable]:
+    ) -> Generator[Step, None, tuple[SampleTable, float]]:
         before, setting = finished(self.checked.result), finished(self.checked.setting)
         table = self.checked.fit.samples[name]
         read = any(effect.of_photo for effect in model.effects)
         steps = pixels_of_samples(table, index, before.capture, before.scan, before.photos, read)
         pixels = yield from _quietly(steps, step)
         return (yield from _quietly(corrected(table, pixels, model, setting), step))
-
-
-def _rms(radiance: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(np.square(radiance, dtype=np.float64))))
 
 
 def _proposed(before: CaptureResult, again: Sequence[Again]) -> list[MaterialResult]:
@@ -136,7 +132,7 @@ def _worse(before: Sequence[MaterialResult], after: Sequence[Again]) -> str | No
     was fitted to by something that is not there. Errors are relative to the light; where light was
     taken away it is the light as it was."""
     known = [
-        (one.held_out.error, other.material.held_out.error * min(other.light, 1.0))
+        (one.held_out.error, other.material.held_out.error * other.light)
         for one, other in zip(before, after, strict=True)
         if other.material is not None
         and one.held_out is not None

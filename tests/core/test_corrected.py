@@ -63,11 +63,12 @@ def test_samples_rid_of_an_effect_show_the_brdf(kind):
     shown = model.predicted()
     setting = changed(setting, shown)
     model = replace(model, pixels=setting.pixels, footprint=None)
-    found = drained(corrected(table_of(setting), setting.pixels, model, setting))
+    found, light = drained(corrected(table_of(setting), setting.pixels, model, setting))
     assert len(found) > 0.85 * len(shown)
     truth = bare.evaluate(found.angles, np.zeros(len(found), np.int16))
     np.testing.assert_allclose(found.rho, truth, rtol=2e-3, atol=1e-5)
     assert np.all(found.cos_i > 0)
+    assert light == pytest.approx(1, abs=1e-3)  # none was subtracted
 
 
 def _brdf_of(setting: Setting):
@@ -82,7 +83,7 @@ def test_what_is_clipped_tells_nothing_and_is_dropped():
     effect = Clipping.of(setting)
     level = np.log(8.0) + np.log(effect.top / (0.3 * top))
     model = Model(setting.pixels, setting.brdfs).with_effect(effect, level)
-    found = drained(corrected(table_of(setting), setting.pixels, model, setting))
+    found, _ = drained(corrected(table_of(setting), setting.pixels, model, setting))
     on_plateau = (setting.pixels.observed > 0.29 * top).any(axis=1)
     assert len(found) < len(setting.pixels) - 0.5 * on_plateau.sum()
     assert found.radiance.max() < 0.45 * top

@@ -34,7 +34,7 @@ def test_what_is_better_or_alike_or_unknown_is_taken(after):
 def test_errors_are_of_the_light_as_it_was():
     """Light that is taken away leaves the same miss of less light."""
     assert _worse(with_errors(0.1), again(0.13, light=0.7)) is None
-    assert _worse(with_errors(0.1), again(0.13, light=1.5)) is not None
+    assert _worse(with_errors(0.1), again(0.13, light=0.9)) is not None
 
 
 def test_a_material_that_could_not_be_fitted_again_says_nothing():
