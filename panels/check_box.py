@@ -7,10 +7,9 @@ from typing import Any
 import bpy
 
 from ..scene.evidence import MISSED
-from .wrapped import wrapped
+from .wrapped import IN_BOX, wrapped
 
 MOST = 6
-MEASURES = (("Left-out parts", "held_out"), ("Left-out photos", "held_out_photos"))
 
 
 def draw_check(
@@ -22,12 +21,18 @@ def draw_check(
     named = [c for c in diagnosis["named"] if c != "none"]
     text = ", ".join(n.replace("_", " ") for n in named) or "Nothing that can be named"
     layout.label(text=text, icon="ERROR" if named else "CHECKMARK")
-    before, after = diagnosis["baseline"], diagnosis["extended"]
-    for label, key in MEASURES:
-        if before[key] is not None and after[key] is not None:
+    told = [
+        ("Left-out parts", diagnosis["baseline"]["held_out"], diagnosis["extended"]["held_out"])
+    ]
+    for one in diagnosis["materials"]:
+        told.append(
+            (f"{one['name']}: unseen photos", one["held_out_before"], one["held_out_after"])
+        )
+    for label, before, after in told:
+        if before is not None and after is not None:
             row = layout.row()
             row.label(text=label)
-            row.label(text=f"{100 * before[key]:.1f} → {100 * after[key]:.1f} %")
+            row.label(text=f"{100 * before:.1f} → {100 * after:.1f} %")
     show = layout.operator("patina.show_evidence", text="What is Missed", icon="OVERLAY")
     show.cause = MISSED
     ranked = diagnosis["causes"]
@@ -42,7 +47,7 @@ def draw_check(
         row.progress(text=name, factor=min(max(_sure(cause) / max(most, 1e-9), 0), 1), type="BAR")
         if cause["accepted"]:
             row.operator("patina.show_evidence", text="", icon="HIDE_OFF").cause = cause["cause"]
-            wrapped(box, cause["sentence"], "BLANK1")
+            wrapped(box, cause["sentence"], "BLANK1", IN_BOX)
     if len(causes):
         used = {cause.name for cause in causes if cause.use}
         changed = used != set(diagnosis["applied"])

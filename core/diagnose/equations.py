@@ -107,7 +107,7 @@ class Equations:
         m, _, k = model.brdfs.coefficients.shape
         usual = fitted.joined(lambda n: n.deviation)
         own = self.own + np.diag(1 / usual**2)
-        right = self.own_pull - fitted.numbers / usual**2
+        right = self.own_pull - fitted.told / usual**2
         pull = self.pull - (model.brdfs.coefficients / variance).ravel()
         eliminated = []
         for index, block in enumerate(self.blocks.reshape(-1, k, k)):
@@ -140,9 +140,7 @@ class Equations:
         full[:size, size:], full[size:, :size] = self.coupling, self.coupling.T
         full[size:, size:] = self.own + np.diag(1 / usual**2)
         coefficients = (model.brdfs.coefficients / model.brdfs.variance).ravel()
-        right = np.concatenate(
-            [self.pull - coefficients, self.own_pull - fitted.numbers / usual**2]
-        )
+        right = np.concatenate([self.pull - coefficients, self.own_pull - fitted.told / usual**2])
         side = np.concatenate([self.local_coupling, self.local_own])  # (M + p, P · e)
         pull = self.local_pull.ravel() - y / numbers.deviation**2
         held = ((y <= numbers.low) & (pull <= 0)) | ((y >= numbers.high) & (pull >= 0))

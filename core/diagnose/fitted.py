@@ -48,12 +48,20 @@ class Fitted:
         return np.concatenate([*(self.model.x[k] for k in self.model.everywhere), np.zeros(0)])
 
     @property
+    def told(self) -> Vector:
+        """(p,) the same without what the BRDF could as well have, which no prior speaks of: the
+        gain of a photo that is left out is what all gains have in common."""
+        model = self.model
+        each = [model.effects[k].told(model.x[k]) for k in model.everywhere]
+        return np.concatenate([*each, np.zeros(0)])
+
+    @property
     def whole(self) -> float:
         """The cost with the prior's."""
         brdfs = self.model.brdfs
         prior = float(np.sum(brdfs.coefficients**2 / brdfs.variance))
         for effect, x in zip(self.model.effects, self.model.x, strict=True):
-            prior += float(np.sum((x / effect.numbers.deviation) ** 2))
+            prior += float(np.sum((effect.told(x) / effect.numbers.deviation) ** 2))
         return self.cost + 0.5 * prior
 
 
