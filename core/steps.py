@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from typing import Any, TypeVar
 
+Step = TypeVar("Step")
+Other = TypeVar("Other")
 Result = TypeVar("Result")
+
+
+def relayed(
+    steps: Generator[Step, None, Result], said: Callable[[Step], Other]
+) -> Generator[Other, None, Result]:
+    """The same work, which yields what ``said`` makes of each step."""
+    while True:
+        try:
+            step = next(steps)
+        except StopIteration as end:
+            return end.value
+        yield said(step)
 
 
 def drained(steps: Generator[Any, None, Result]) -> Result:

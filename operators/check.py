@@ -5,16 +5,15 @@ from __future__ import annotations
 import bpy
 
 from ..core.diagnose.chosen import can_be_applied
-from ..core.job import CaptureResult, Job
+from ..core.job import CaptureResult
 from ..core.job.check_job import CheckJob
 from ..core.job.refit_job import RefitJob
 from ..core.report.diagnosis_json import describe
-from ..scene.apply import apply_result
 from ..scene.checked import keep, kept
 from ..scene.evidence import paint_evidence, show_evidence
 from ..scene.properties import DIAGNOSIS, capture_path, store_result
 from ..scene.running import tell
-from .fit import can_fit, fit_job
+from .fit import can_fit, fit_job, show_result
 from .stepped import Stepped
 
 
@@ -48,7 +47,7 @@ explain, name the cause, and fit again with it in the model"""
         for trial in can_be_applied(found):
             cause = scene.patina.causes.add()
             cause.name, cause.use = trial.effect.cause, trial.effect.cause in applied
-        _show(self, scene, after, self._job)
+        _show(self, scene, after)
         store_result(str(before.capture.file), describe(found, before, after), DIAGNOSIS)
         mesh, vertices = scene.patina.mesh, setting.rays.mesh.vertices
         if mesh is not None and not paint_evidence(mesh, vertices, setting.pixels, found):
@@ -84,17 +83,14 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
         if after is None or scene is None or checked.result is None or checked.found is None:
             self.report({"WARNING"}, "The scene is gone; the materials were not applied")
             return
-        _show(self, scene, after, self._job)
+        _show(self, scene, after)
         told = describe(checked.found, checked.result, after)
         store_result(str(after.capture.file), told, DIAGNOSIS)
 
 
-def _show(
-    operator: bpy.types.Operator, scene: bpy.types.Scene, result: CaptureResult, job: Job
-) -> None:
-    """The materials onto the mesh, what should be known about them to the user."""
-    for note in apply_result(scene, result, job.stages):
-        operator.report({"WARNING"}, note)
+def _show(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> None:
+    """The materials onto the mesh, and with which causes they were fitted."""
+    show_result(operator, scene, result)
     used = ", ".join(effect.cause for effect in result.effects)
     told = f"with {used} in the model" if used else "as the capture says"
     operator.report({"INFO"}, f"{len(result.materials)} materials fitted {told}")

@@ -8,7 +8,7 @@ import bpy
 
 from ..core.capture import read_capture
 from ..core.errors import InputError
-from ..core.job import FitJob
+from ..core.job import CaptureResult, FitJob
 from ..scene.apply import apply_result
 from ..scene.face_slots import with_painted_slots
 from ..scene.lights import with_dragged_lamps
@@ -38,6 +38,16 @@ def fit_job(operator: bpy.types.Operator, scene: bpy.types.Scene) -> FitJob:
     return FitJob(capture, prepare=prepare)
 
 
+def show_result(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> None:
+    """The materials onto the mesh, and what should be known about them to the user."""
+    notes = apply_result(scene, result, operator._job.stages)
+    for material in result.materials:
+        for warning in material.warnings:
+            operator.report({"WARNING"}, f"{material.name}: {warning}")
+    for note in notes:
+        operator.report({"WARNING"}, note)
+
+
 class PATINA_OT_fit(Stepped, bpy.types.Operator):
     """Measure the materials: sample every lit photo and fit a BRDF to each material"""
 
@@ -61,12 +71,7 @@ class PATINA_OT_fit(Stepped, bpy.types.Operator):
         if scene is None:
             self.report({"WARNING"}, "The scene is gone; the materials were not applied")
             return
-        notes = apply_result(scene, result, self._job.stages)
-        for material in result.materials:
-            for warning in material.warnings:
-                self.report({"WARNING"}, f"{material.name}: {warning}")
-        for note in notes:
-            self.report({"WARNING"}, note)
+        show_result(self, scene, result)
         self.report({"INFO"}, f"{len(result.materials)} materials measured")
 
 

@@ -26,7 +26,7 @@ from ..light import Light
 from ..samples.reservoir import sample_hash
 from ..samples.take import light_surface
 from ..scan import Scan
-from .image_cells import cell_numbers
+from .image_cells import cell_numbers, from_centre
 from .pixels import Pixels
 
 Array = NDArray[np.float32]
@@ -119,15 +119,14 @@ def _of_band(
     incidence = lighting.incidence.select(rows)
     n, camera = len(rows), lines.camera
     pixel = view.pixel.take(rows)
-    row, column = np.divmod(pixel, camera.width)
-    half = 0.5 * np.hypot(camera.width, camera.height)
+    x, y = from_centre(pixel, camera.width, camera.height)
     none = np.zeros((n, 3), np.float32)
     return Pixels(
         photo=np.full(n, place, np.int16),
         material=material[rows],
         pixel=pixel,
-        x=((column + 0.5 - camera.width / 2) / half).astype(np.float32),
-        y=((row + 0.5 - camera.height / 2) / half).astype(np.float32),
+        x=x,
+        y=y,
         point=view.point[rows],
         normal=np.asarray(view.normal[rows], np.float32),
         view=np.asarray(view.view[rows], np.float32),

@@ -8,6 +8,17 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating]
 
 
+def from_centre(
+    pixel: NDArray[np.integer], width: int, height: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """((n,), (n,)) x and y of flat places (n,) in a photo, from its centre, 1 at half the
+    diagonal."""
+    row, column = np.divmod(pixel, width)
+    half = 0.5 * np.hypot(width, height)
+    x, y = (column + 0.5 - width / 2) / half, (row + 0.5 - height / 2) / half
+    return x.astype(np.float32), y.astype(np.float32)
+
+
 def cell_places(photo: NDArray, x: Array, y: Array, across: int) -> tuple[Array, Array]:
     """((n,), (n,)) columns and rows as numbers from 0 to ``across``, which is the longer side of
     what a photo shows. photo: (n,); x, y: (n,) any unit."""

@@ -54,6 +54,17 @@ class Model:
             x[self.patchy] = np.zeros(0)
         return replace(self, effects=tuple(effects), x=tuple(x))
 
+    def place_of(self, cause: str) -> int:
+        """Of the effect in the model, whether its numbers are searched for or not."""
+        effects = [e.inner if isinstance(e, Fixed) else e for e in self.effects]
+        return [e.cause for e in effects].index(cause)
+
+    def numbers_of(self, cause: str) -> Vector:
+        """(p,) of the effect."""
+        place = self.place_of(cause)
+        effect = self.effects[place]
+        return effect.x if isinstance(effect, Fixed) else self.x[place]
+
     @property
     def everywhere(self) -> list[int]:
         """Places of the effects with few numbers."""

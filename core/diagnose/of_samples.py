@@ -15,6 +15,7 @@ from ..samples import SampleTable
 from ..scan import Scan
 from .choose import REACH, photo_slopes, photo_veil
 from .effect import Near
+from .image_cells import from_centre
 from .pixels import Pixels
 
 APART = 1e3  # half diagonals between two photos
@@ -36,10 +37,7 @@ def pixels_of_samples(
         rows = np.flatnonzero(table.photo == place)
         camera = inputs.camera_of(capture, scan, place)
         pixel = table.pixel[rows]
-        row, column = np.divmod(pixel, camera.width)
-        half = 0.5 * np.hypot(camera.width, camera.height)
-        x[rows] = (column + 0.5 - camera.width / 2) / half
-        y[rows] = (row + 0.5 - camera.height / 2) / half
+        x[rows], y[rows] = from_centre(pixel, camera.width, camera.height)
         if read:
             radiance = photos.read(place).radiance
             slope[rows] = photo_slopes(radiance, pixel)

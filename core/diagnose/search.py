@@ -19,7 +19,6 @@ from .deviation import as_found
 from .effect import Effect
 from .effects.outside_basis import OutsideBasis
 from .fitted import Fitted
-from .fixed import Fixed
 from .held_out import Unseen, by_square, error_of_sum, predict_unseen, squares, variances
 from .leftover import Leftover, leftover
 from .model import Model
@@ -93,25 +92,12 @@ class Trial:
 
     def changed(self) -> Array:
         """(n, 3) radiance that the effect adds to what the photos show, the BRDF the same."""
-        model = self.fitted.model
-        return (
-            self.fitted.shown - without_last(model)
-            if len(model.x[-1])
-            else 0 * model.pixels.observed
-        )
-
-    @property
-    def place(self) -> int:
-        """Of the effect in the model."""
-        effects = self.fitted.model.effects
-        same = [e is self.effect or getattr(e, "inner", None) is self.effect for e in effects]
-        return same.index(True)
+        return self.fitted.shown - without_last(self.fitted.model)
 
     @property
     def x(self) -> Vector:
         """The effect's numbers."""
-        known = self.fitted.model.effects[self.place]
-        return known.x if isinstance(known, Fixed) else self.fitted.model.x[self.place]
+        return self.fitted.model.numbers_of(self.effect.cause)
 
     @property
     def told(self) -> Vector:
@@ -121,7 +107,8 @@ class Trial:
     @property
     def deviation(self) -> Vector:
         """Of the numbers as they are told."""
-        return np.sqrt(np.maximum(self.unseen.variance[self.place], 0.0))
+        place = self.fitted.model.place_of(self.effect.cause)
+        return np.sqrt(np.maximum(self.unseen.variance[place], 0.0))
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,8 +16,11 @@ from ..diagnose.effects import made_for
 from ..diagnose.model import Model
 from ..diagnose.search import Found, search
 from ..fit.measured_result import MeasuredResult
+from ..steps import relayed
 from .fit_job import CaptureResult, FitJob
 from .job import Job, Step, finished
+
+Result = TypeVar("Result")
 
 UNSAID = 1.0  # degrees: what a scan's normals are off by where the fit does not say it
 SHARE = 0.5  # of the job, the fit
@@ -86,11 +90,9 @@ def normal_deviation(result: CaptureResult) -> float:
     return max(said, default=UNSAID)
 
 
-def _stepped(steps, stage: str, begin: float, end: float):  # type: ignore[no-untyped-def]
+def _stepped(
+    steps: Generator[float, None, Result], stage: str, begin: float, end: float
+) -> Generator[Step, None, Result]:
     """Steps of a part of the diagnosis."""
-    while True:
-        try:
-            done = next(steps)
-        except StopIteration as last:
-            return last.value
-        yield Step(stage, SHARE + (1 - SHARE) * (begin + (end - begin) * done))
+    span = (1 - SHARE) * (end - begin)
+    return relayed(steps, lambda done: Step(stage, SHARE + (1 - SHARE) * begin + span * done))

@@ -9,12 +9,12 @@ import numpy as np
 
 from ..diagnose.chosen import can_be_applied, with_causes
 from ..diagnose.corrected import corrected
-from ..diagnose.fixed import Fixed
 from ..diagnose.model import Model
 from ..diagnose.of_samples import pixels_of_samples
 from ..diagnose.search import Found, Trial
 from ..errors import PatinaError
 from ..samples import SampleTable
+from ..steps import relayed
 from .applied import Applied
 from .beside import beside
 from .diagnose_job import DiagnoseJob
@@ -30,13 +30,12 @@ MORE = 0.03  # ln of what errors of unseen photos may grow by
 @dataclass(frozen=True)
 class Again:
     """A material's second fit. material: None where it could not be fitted; light: RMS radiance of
-    its samples over what it was before other light was subtracted; warnings: what is to be said;
-    applied: the effects."""
+    its samples over what it was before other light was subtracted; warnings: what is to be said.
+    """
 
     material: MaterialResult | None
     light: float
     warnings: tuple[str, ...]
-    applied: tuple[Applied, ...] = ()
 
 
 class RefitJob(Job):
@@ -63,16 +62,15 @@ class RefitJob(Job):
         dropped: list[str] = []
         attempt = 0.5
         while chosen:
-            again = yield from self._with(before, found, chosen, 1 - 2 * attempt)
+            again, applied = yield from self._with(before, found, chosen, 1 - 2 * attempt)
             worse = None if self.exactly else _worse(before.materials, again)
             if worse is None:
-                fitted = [a.material is not None for a in again]
                 materials = [
                     replace(m, warnings=(*m.warnings, *a.warnings, *dropped))
                     for m, a in zip(_proposed(before, again), again, strict=True)
                 ]
-                applied = again[0].applied if any(fitted) else ()
-                self.result = replace(before, materials=tuple(materials), effects=applied)
+                used = applied if any(a.material is not None for a in again) else ()
+                self.result = replace(before, materials=tuple(materials), effects=used)
                 return
             dropped.append(f"{chosen.pop().effect.cause} is not taken into account: {worse}")
             attempt /= 2
@@ -81,7 +79,7 @@ class RefitJob(Job):
 
     def _with(
         self, before: CaptureResult, found: Found, chosen: Sequence[Trial], done: float
-    ) -> Generator[Step, None, list[Again]]:
+    ) -> Generator[Step, None, tuple[list[Again], tuple[Applied, ...]]]:
         """One material after the other; done: of the job, of which this takes half the rest."""
         causes = [trial.effect.cause for trial in chosen]
         step = Step(STAGE, done)
@@ -93,12 +91,11 @@ class RefitJob(Job):
         for index, material in enumerate(before.materials):
             start = done + index * share
             try:
-                one = yield from self._again(index, material, fitted.model, start, share)
-                out.append(replace(one, applied=applied))
+                out.append((yield from self._again(index, material, fitted.model, start, share)))
             except PatinaError as error:
                 said = f"fitted without {', '.join(causes)}: {error}"
-                out.append(Again(None, 1.0, (said,), applied))
-        return out
+                out.append(Again(None, 1.0, (said,)))
+        return out, applied
 
     def _again(
         self, index: int, material: MaterialResult, model: Model, start: float, share: float
@@ -117,8 +114,8 @@ class RefitJob(Job):
         table = self.checked.fit.samples[name]
         read = any(effect.of_photo for effect in model.effects)
         steps = pixels_of_samples(table, index, before.capture, before.scan, before.photos, read)
-        pixels = yield from _quietly(steps, step)
-        return (yield from _quietly(corrected(table, pixels, model, setting), step))
+        pixels = yield from relayed(steps, lambda _: step)
+        return (yield from relayed(corrected(table, pixels, model, setting), lambda _: step))
 
 
 def _proposed(before: CaptureResult, again: Sequence[Again]) -> list[MaterialResult]:
@@ -149,10 +146,7 @@ def _worse(before: Sequence[MaterialResult], after: Sequence[Again]) -> str | No
 
 def _applied(trial: Trial, model: Model) -> Applied:
     """With the numbers that it has in a model."""
-    effects = [e.inner if isinstance(e, Fixed) else e for e in model.effects]
-    place = [e.cause for e in effects].index(trial.effect.cause)
-    one = model.effects[place]
-    x = trial.effect.told(one.x if isinstance(one, Fixed) else model.x[place])
+    x = trial.effect.told(model.numbers_of(trial.effect.cause))
     numbers = trial.effect.numbers
     return Applied(
         trial.effect.cause,
@@ -162,13 +156,3 @@ def _applied(trial: Trial, model: Model) -> Applied:
         tuple(x.tolist()),
         tuple(trial.deviation.tolist()),
     )
-
-
-def _quietly(steps, step: Step):  # type: ignore[no-untyped-def]
-    """The result of steps, whose fractions are nobody's."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as last:
-            return last.value
-        yield step

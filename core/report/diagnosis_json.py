@@ -9,7 +9,7 @@ from ..diagnose.search import Found, Trial
 from ..diagnose.unseen_error import UnseenError
 from ..job import CaptureResult
 from .diagnosis import evidence_file
-from .result_json import program_version, write_json
+from .result_json import parameters, program_version, write_json
 
 FORMAT = 2
 
@@ -76,10 +76,5 @@ def _cause(trial: Trial, accepted: bool) -> dict[str, Any]:
         "p_value": trial.chance,
         "rms_change": trial.change,
         "evidence": f"report/{evidence_file(trial.effect.cause)}" if drawn else None,
-        "parameters": {
-            name: {"value": float(v), "standard_error": float(d), "unit": unit}
-            for name, unit, v, d in zip(
-                numbers.names, numbers.units, trial.told, trial.deviation, strict=True
-            )
-        },
+        "parameters": parameters(numbers.names, numbers.units, trial.told, trial.deviation),
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -97,14 +97,21 @@ def _light(result: CaptureResult, light: Light) -> dict[str, Any]:
 
 def _effect(effect: Applied) -> dict[str, Any]:
     """What a diagnosis named and the materials take into account."""
-    told = zip(effect.names, effect.units, effect.numbers, effect.errors, strict=True)
     return {
         "cause": effect.cause,
         "sentence": effect.sentence,
-        "parameters": {
-            name: {"value": value, "standard_error": error, "unit": unit}
-            for name, unit, value, error in told
-        },
+        "parameters": parameters(effect.names, effect.units, effect.numbers, effect.errors),
+    }
+
+
+def parameters(
+    names: Sequence[str], units: Sequence[str], values: Iterable[float], errors: Iterable[float]
+) -> dict[str, Any]:
+    """An effect's numbers by their names."""
+    told = zip(names, units, values, errors, strict=True)
+    return {
+        name: {"value": float(value), "standard_error": float(error), "unit": unit}
+        for name, unit, value, error in told
     }
 
 

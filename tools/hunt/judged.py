@@ -118,10 +118,10 @@ def _brdf_error(result: CaptureResult, truth: Truth) -> float:
     assert basis.training is not None
     rows = basis.training[3 * truth.material : 3 * truth.material + 3]
     angles = directions(basis.grid)
-    weight = mapping.cos_map(angles)[:, None]
-    true, ours = (
-        np.log(np.maximum(brdf.evaluate(angles) * weight, 0) + mapping.EPSILON)
-        for brdf in (PrincipalBRDF(basis, rows), result.materials[0].fit.brdf)
+    weight = mapping.cos_map(angles)
+    ours, true = (
+        mapping.log_weighted(brdf.evaluate(angles), weight)
+        for brdf in (result.materials[0].fit.brdf, PrincipalBRDF(basis, rows))
     )
     return float(np.sqrt(np.mean((ours - true) ** 2)))
 

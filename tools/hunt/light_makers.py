@@ -33,11 +33,12 @@ def intensity(scene: Scene) -> Hidden:
 def _told(scene: Scene, told, start: float, name: str) -> Hidden:  # type: ignore[no-untyped-def]
     """The capture says something else than what was photographed; told(scene, size): its shots."""
 
-    def change(scene: Scene, size: float) -> float:
-        return rms(scene.photographed(told(scene, size)), scene.plain)
+    def photos(scene: Scene, size: float) -> list[Array]:
+        return scene.photographed(told(scene, size))
 
-    size = sought(lambda s: change(scene.small, s), start, scene.strength)
-    return Hidden(scene.plain, {name: size}, change(scene, size), told=told(scene, size))
+    size = scene.sought(photos, start)
+    changed = rms(photos(scene, size), scene.plain)
+    return Hidden(scene.plain, {name: size}, changed, told=told(scene, size))
 
 
 def direction(scene: Scene) -> Hidden:
@@ -80,11 +81,10 @@ def near(scene: Scene) -> Hidden:
         out = []
         for shot in scene.shots:
             scene.studio.near(shot.light / max(nearness, 1e-3), IRRADIANCE, np.zeros(3))
-            out.append(scene.studio.photo(shot.camera, scene.quick))
+            out.append(scene.studio.photo(shot.camera))
         return out
 
-    small = scene.small
-    size = sought(lambda s: rms(lit(small, s), small.plain), 0.1, scene.strength, most=NEAREST)
+    size = scene.sought(lit, 0.1, most=NEAREST)
     photos = lit(scene, size)
     return Hidden(photos, {"1 / distance": size}, rms(photos, scene.plain))
 
@@ -96,10 +96,7 @@ def area(scene: Scene) -> Hidden:
         scene.studio.lamp.data.angle = size
         return scene.photographed()
 
-    def change(size: float) -> float:
-        return rms(lit(scene.small, size), scene.small.plain)
-
-    size = sought(change, np.radians(8.0), scene.strength, 1.5, WIDEST)
+    size = scene.sought(lit, np.radians(8.0), 1.5, WIDEST)
     scene.studio.noise_free(100)
     photos = lit(scene, size)
     return Hidden(photos, {"angular diameter": size}, rms(photos, scene.plain))
@@ -146,7 +143,6 @@ def shadow(scene: Scene) -> Hidden:
         again = scene.photographed(scene.shots[pair : pair + 2])
         return [*scene.plain[:pair], *again, *scene.plain[pair + 2 :]]
 
-    small = scene.small
-    size = sought(lambda s: rms(photos(small, s), small.plain), 0.1, scene.strength, most=1.0)
+    size = scene.sought(photos, 0.1, most=1.0)
     found = photos(scene, size)
     return Hidden(found, {"radius": size}, rms(found, scene.plain))

@@ -44,8 +44,7 @@ class Shot:
 
 @dataclass(frozen=True)
 class Scene:
-    """plain: the photos without an effect; strength: the wanted RMS change of them. quick: with a
-    third of the samples a pixel."""
+    """plain: the photos without an effect; strength: the wanted RMS change of them."""
 
     studio: HuntStudio
     surface: Surface
@@ -54,23 +53,35 @@ class Scene:
     plain: list[Array]
     strength: float
     rng: np.random.Generator
-    quick: bool = False
 
     def photographed(self, shots: list[Shot] | None = None) -> list[Array]:
         """Photos of the studio as it is."""
         out = []
         for shot in self.shots if shots is None else shots:
             self.studio.light(shot.light, IRRADIANCE)
-            out.append(self.studio.photo(shot.camera, self.quick))
+            out.append(self.studio.photo(shot.camera))
         return out
 
     @cached_property
     def small(self) -> Scene:
         """The same in photos of half the size, where the strength of an effect is searched for."""
-        plain = [
-            0.25 * (p[::2, ::2] + p[1::2, ::2] + p[::2, 1::2] + p[1::2, 1::2]) for p in self.plain
-        ]
-        return replace(self, shots=[shot.small for shot in self.shots], plain=plain)
+        shots = [shot.small for shot in self.shots]
+        return replace(self, shots=shots, plain=[_halved(p) for p in self.plain])
+
+    def sought(
+        self,
+        photos: Callable[[Scene, float], list[Array]],
+        start: float,
+        power: float = 1.0,
+        most: float = np.inf,
+    ) -> float:
+        """The size at which small photos (scene, size) change by the wanted strength."""
+        small = self.small
+
+        def change(size: float) -> float:
+            return rms(photos(small, size), small.plain)
+
+        return sought(change, start, self.strength, power, most)
 
     def in_part(self, whole: list[Array], name: str, most: float) -> Hidden:
         """Of light that adds up, as much as changes the photos by the wanted RMS."""

@@ -158,12 +158,8 @@ class HuntStudio(Studio):
         """More samples, for light that Cycles draws at random."""
         self.scene.cycles.samples = samples
 
-    def photo(self, camera: Camera, quick: bool = False) -> Array:
-        """(h, w, 3) linear radiance, 0 beside the object; quick: a third of the samples."""
+    def photo(self, camera: Camera) -> Array:
+        """(h, w, 3) linear radiance, 0 beside the object."""
         bpy.context.view_layer.update()  # lamps are read from their evaluated places
         update_lamps(self.scene)
-        samples = self.scene.cycles.samples
-        self.scene.cycles.samples = samples // 3 if quick else samples
-        seen = self.photograph(camera)[..., :3]
-        self.scene.cycles.samples = samples
-        return seen
+        return self.photograph(camera)[..., :3]

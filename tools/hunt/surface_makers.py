@@ -27,10 +27,7 @@ def normals(scene: Scene) -> Hidden:
         scene.studio.dress(scene.studio.measured(scene.brdf))
         return scene.photographed()
 
-    def change(size: float) -> float:
-        return rms(photos(scene.small, size), scene.small.plain)
-
-    size = sought(change, 0.002, scene.strength, most=LARGEST_BUMP)
+    size = scene.sought(photos, 0.002, most=LARGEST_BUMP)
     found = photos(scene, size)
     strength = rms(found, scene.plain)
     if rough:
@@ -96,8 +93,7 @@ def outside(scene: Scene) -> Hidden:
         scene.studio.dress(scene.studio.measured(_with_lobe(scene.brdf, ring, middle, size)))
         return scene.photographed()
 
-    small = scene.small
-    size = sought(lambda s: rms(photos(small, s), small.plain), 0.2, scene.strength, most=2.5)
+    size = scene.sought(photos, 0.2, most=2.5)
     found = photos(scene, size)
     return Hidden(found, {"ring" if ring else "angle": size}, rms(found, scene.plain))
 
