@@ -47,7 +47,8 @@ def lit_ball(seed: int = 0) -> Setting:
                 visible=np.ones(n, np.float32),
                 edge=np.full(n, 8, np.float32), curvature=np.zeros(n, np.float32),
                 observed=vector, noise=vector, slope=np.zeros((n, 2, 3), np.float32),
-                veil=vector, turn=np.zeros((n, 2, 3), np.float32), usable=np.ones(n, bool),
+                veil=np.zeros((n, 2, 3), np.float32), turn=np.zeros((n, 2, 3), np.float32),
+                usable=np.ones(n, bool),
                 block=(36 * photo + 6 * (x > 0) + 3 * (y > 0)
                        + np.digitize(np.hypot(x, y), (0.15, 0.28))).astype(np.int32),
             )
@@ -59,7 +60,7 @@ def lit_ball(seed: int = 0) -> Setting:
     noisy = radiance * (1 + NOISE * rng.standard_normal(radiance.shape))
     pixels = replace(
         pixels, observed=noisy.astype(np.float32), noise=np.square(NOISE * radiance),
-        veil=np.broadcast_to(radiance.mean(axis=0), radiance.shape),
+        veil=np.broadcast_to(radiance.mean(axis=0), (len(radiance), 2, 3)),
     )  # fmt: skip
     triangle = Mesh(np.eye(3) * 1e-3, np.array([[0, 1, 2]], np.int32))
     return Setting(

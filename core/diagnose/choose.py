@@ -138,7 +138,7 @@ def _of_band(
         observed=none,
         noise=none,
         slope=np.zeros((n, 2, 3), np.float32),
-        veil=none,
+        veil=np.zeros((n, 2, 3), np.float32),
         turn=_turns(view)[rows],
         usable=photo.usable.ravel().take(pixel),
         block=np.zeros(n, np.int32),
@@ -206,7 +206,7 @@ def photo_slopes(radiance: Array, pixel: NDArray[np.int32]) -> Array:
 
 
 def photo_veil(radiance: Array, pixel: NDArray[np.int32]) -> Array:
-    """(n, 3) a photo (h, w, 3) blurred widely, at flat places (n,)."""
+    """(n, 2, 3) a photo (h, w, 3) blurred widely, at flat places (n,), and its mean."""
     height, width = radiance.shape[:2]
     step = max(1, max(height, width) // 128)
     small = np.stack([_shrunk(radiance[..., c], step) for c in range(3)], axis=-1)
@@ -216,7 +216,8 @@ def photo_veil(radiance: Array, pixel: NDArray[np.int32]) -> Array:
     )
     row, column = np.divmod(pixel, width)
     at = np.minimum(row // step, len(small) - 1), np.minimum(column // step, small.shape[1] - 1)
-    return np.asarray(small[at], np.float32)
+    even = np.broadcast_to(radiance.mean(axis=(0, 1)), (len(pixel), 3))
+    return np.stack([small[at], even], axis=1).astype(np.float32)
 
 
 def _shrunk(channel: Array, step: int) -> Array:

@@ -40,7 +40,7 @@ def corrected(
     for start in range(0, len(known), CHUNK):
         yield start / len(known)
         rows = known[start : start + CHUNK]
-        here = replace(setting, pixels=pixels.select(rows))
+        here = replace(setting, pixels=pixels.select(rows), brdfs=model.brdfs)
         parts.append(_corrected(table.select(rows), elsewhere(model, here, near.select(rows))))
     if not parts:
         return SampleTable.empty(), 1.0

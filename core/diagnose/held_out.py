@@ -8,7 +8,9 @@ pixels.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,8 @@ from .slopes import Slopes, slopes_of
 Array = NDArray[np.floating]
 
 FOLDS = 5
+MOST_GROUPS = 12  # of photos, left out one after the other
+STILL_KNOWN = 25.0  # times the variance of a number where a part of the photos is left out
 FINE = 18  # small squares along a photo's longer side
 
 
@@ -80,8 +84,8 @@ def _unseen(fitted: Fitted, of: NDArray[np.int32]) -> Unseen:
     for part, mine in zip(parts, rows, strict=True):
         change = whole.plus(part, -1.0).solved(fitted)
         residual[mine] -= _moved(fitted, slopes, mine, change)
-        others.append(change.x)
-    variance = _by_effect(fitted, whole.solved(fitted), np.stack(others))
+        others.append(change)
+    variance = _by_effect(fitted, whole.solved(fitted), others)
     return Unseen(residual, robust(residual).sum(axis=1), variance)
 
 
@@ -89,7 +93,23 @@ def variances(fitted: Fitted) -> tuple[Array, ...]:
     """Of the numbers of each effect, at an optimum."""
     everything = np.arange(len(fitted.residual))
     change = Equations.of(fitted, slopes_of(fitted), everything).solved(fitted)
-    return _by_effect(fitted, change, np.zeros((FOLDS, len(change.x))))
+    return _by_effect(fitted, change, [change])
+
+
+def variances_by_photos(fitted: Fitted, before: tuple[Array, ...]) -> tuple[Array, ...]:
+    """Of the numbers of each effect, but no less than what they move by when photos are left out:
+    what a photo's camera pose or exposure is off by errs alike all over it. before: as they are
+    otherwise known to be."""
+    photos, place = np.unique(fitted.model.pixels.photo, return_inverse=True)
+    if len(photos) < 3:
+        return before
+    of = place.ravel() % MOST_GROUPS
+    slopes = slopes_of(fitted)
+    parts = [Equations.of(fitted, slopes, np.flatnonzero(of == g)) for g in range(of.max() + 1)]
+    whole = reduce(Equations.plus, parts)
+    others = [whole.plus(part, -1.0).solved(fitted) for part in parts]
+    found = _by_effect(fitted, whole.solved(fitted), others)
+    return tuple(np.maximum(a, b) for a, b in zip(found, before, strict=True))
 
 
 def by_square(square: NDArray[np.int32], values: Array) -> NDArray[np.float64]:
@@ -103,10 +123,11 @@ def error_of_sum(sums: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.sum((sums - sums.mean()) ** 2)))
 
 
-def _by_effect(fitted: Fitted, change: Change, others: Array) -> tuple[Array, ...]:
+def _by_effect(fitted: Fitted, change: Change, others: Sequence[Change]) -> tuple[Array, ...]:
     """As the curvature says, but no less than what the numbers move by when parts of the photos are
-    left out, others: (f, p) (a jackknife of as many groups, Shao and Wu 1989, together over an
-    effect's numbers): what neighbouring pixels err by is alike, which the curvature does not know.
+    left out, others: (a jackknife of as many groups, Shao and Wu 1989, together over an effect's
+    numbers): what neighbouring pixels err by is alike, which the curvature does not know. A part
+    without which a number is hardly known says nothing about it.
     """
     model, variance, at = fitted.model, [], 0
     for place, effect in enumerate(model.effects):
@@ -117,8 +138,12 @@ def _by_effect(fitted: Fitted, change: Change, others: Array) -> tuple[Array, ..
         mine = slice(at, at + count)
         anchor = np.eye(count) if effect.anchor is None else effect.anchor
         plain = np.diag(anchor @ change.covariance[mine, mine] @ anchor.T)
-        moved = others[:, mine] @ anchor.T
-        jackknife = (len(others) - 1) * np.mean((moved - moved.mean(axis=0)) ** 2, axis=0)
+        moved = np.stack([other.x[mine] for other in others]) @ anchor.T
+        spread = [np.diag(anchor @ o.covariance[mine, mine] @ anchor.T) for o in others]
+        told = np.stack(spread) < STILL_KNOWN * plain
+        middle = np.sum(told * moved, axis=0) / np.maximum(told.sum(axis=0), 1)
+        away = told * (moved - middle)
+        jackknife = (len(others) - 1) * np.mean(away**2, axis=0)
         known = plain > 0
         more = float(np.mean(jackknife[known] / plain[known])) if known.any() else 1.0
         variance.append(plain * max(more, 1.0))

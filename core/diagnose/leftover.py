@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 
 from .change import rms_change
 from .fitted import Fitted, robust
-from .held_out import FINE, by_square, error_of_sum, squares
-from .image_cells import cell_places
+from .held_out import by_square, error_of_sum
+from .image_cells import cell_numbers, cell_places
 
 Array = NDArray[np.floating]
 
@@ -19,7 +19,8 @@ REACH = 1.5  # small squares about a pixel that are looked at
 NEIGHBOURS = 48
 SURE = 3.0  # standard errors over squares
 LEAST = 0.012  # RMS of the photos that the structure amounts to,
-PLAIN = 0.02  # nats a pixel and channel, unless it gains this much
+PLAIN = 0.007  # nats a pixel and channel, unless it gains this much
+ACROSS = (18, 40)  # small squares along a photo's longer side: coarse structure, and fine
 SHRINK = 4.0  # neighbours' worth of doubt
 
 
@@ -52,10 +53,15 @@ class Leftover:
 
 
 def leftover(fitted: Fitted) -> Leftover:
-    """What neighbours in a photo, of other small squares than a pixel's own, say about it."""
+    """What neighbours in a photo, of other small squares than a pixel's own, say about it: at the
+    scale where they say most."""
+    return max((_leftover(fitted, across) for across in ACROSS), key=lambda found: found.gain)
+
+
+def _leftover(fitted: Fitted, across: int) -> Leftover:
     pixels = fitted.model.pixels
-    column, row = cell_places(pixels.photo, pixels.x, pixels.y, FINE)
-    cell = squares(fitted, fine=True)
+    column, row = cell_places(pixels.photo, pixels.x, pixels.y, across)
+    cell = cell_numbers(pixels.photo, pixels.x, pixels.y, across)
     place = np.stack([column, row, 1e3 * pixels.photo], axis=1)
     counted = np.flatnonzero(np.isfinite(fitted.deviation).all(axis=1))
     near, which = cKDTree(place[counted]).query(

@@ -30,7 +30,7 @@ def pixels_of_samples(
     Raises InputError for a photo that is no longer there."""
     n = len(table)
     x, y = np.zeros(n, np.float32), np.zeros(n, np.float32)
-    slope, veil = np.zeros((n, 2, 3), np.float32), np.zeros((n, 3), np.float32)
+    slope, veil = np.zeros((n, 2, 3), np.float32), np.zeros((n, 2, 3), np.float32)
     numbers = np.unique(table.photo)
     for done, place in enumerate(numbers.tolist()):
         yield done / len(numbers)

@@ -19,9 +19,9 @@ class Pixels:
     (n,) 1 where the mesh lets the light through, 0 in its cast shadow. edge: (n,) pixels to the
     next edge of a shadow, at most REACH. curvature: (n,) 1/pixel, NaN unknown. observed: (n, 3)
     radiance; noise: (n, 3) its variance by the photo's own noise. slope: (n, 2, 3) what the photo
-    shows more a pixel to the right and a pixel down; veil: (n, 3) the photo blurred widely. turn:
-    (n, 2, 3) what the normal is more a pixel to the right and a pixel down. usable: (n,) not
-    clipped. block: (n,) int32 the part of its photo each is in.
+    shows more a pixel to the right and a pixel down; veil: (n, 2, 3) the photo blurred widely, and
+    its mean. turn: (n, 2, 3) what the normal is more a pixel to the right and a pixel down. usable:
+    (n,) not clipped. block: (n,) int32 the part of its photo each is in.
     """
 
     photo: NDArray[np.int16]

@@ -16,10 +16,18 @@ from numpy.typing import NDArray
 from .chance import Asked, asked
 from .change import rms_change
 from .deviation import as_found
-from .effect import Effect
+from .effect import Effect, Setting
 from .effects.outside_basis import OutsideBasis
 from .fitted import Fitted
-from .held_out import Unseen, by_square, error_of_sum, predict_unseen, squares, variances
+from .held_out import (
+    Unseen,
+    by_square,
+    error_of_sum,
+    predict_unseen,
+    squares,
+    variances,
+    variances_by_photos,
+)
 from .leftover import Leftover, leftover
 from .model import Model
 from .solve import fit
@@ -31,7 +39,6 @@ Vector = NDArray[np.float64]
 CHANCE = 0.02  # of a false alarm, over all effects that are tried
 LEAST_CHANGE = 0.005  # RMS of the photos: less is not worth a word,
 PLAIN = 0.05  # nats a pixel and channel, unless it gains this much
-OUTSIDE = 0.008  # RMS of the photos that the slack beside the basis has to explain to be named
 MOST_EFFECTS = 4
 SURE = 3.0  # standard errors over squares that a gain is above 0
 NEARLY = 0.93  # of the best gain
@@ -151,9 +158,9 @@ class Found:
 
 
 def search(
-    model: Model, deviation: Array, effects: Sequence[Effect]
+    model: Model, deviation: Array, effects: Sequence[Effect], setting: Setting
 ) -> Generator[float, None, Found]:
-    """Yields the fraction done."""
+    """Yields the fraction done. setting: that the effects were made for."""
     now = fit(model, deviation)
     expected = deviation
     deviation = as_found(deviation, now.residual, now.shown, model.pixels)
@@ -181,11 +188,13 @@ def search(
         gained = sum(t.gain for t in accepted)
         if best is None or not best.convincing or best.gain < MINOR * gained:
             break
+        if best.effect.of_brdf:
+            best = replace(_remade(now, costs, best, setting), ties=best.ties)
         accepted.append(best)
         now = best.fitted
         left = [e for e in left if e.cause != best.effect.cause]
     now, kept = _missed(before, now, accepted)
-    kept = (*kept, *_outside(now))
+    kept = (*map(_by_photos, kept), *_outside(now, kept))
     unseen = predict_unseen(before), predict_unseen(now)
     return Found(
         kept, tuple(rounds), before, now, *unseen,
@@ -248,6 +257,14 @@ def _try(now: Fitted, costs: dict[bool, Array], one: Asked) -> Trial:
     return Trial(effect, fitted, unseen, gained, change, one.chance)
 
 
+def _by_photos(trial: Trial) -> Trial:
+    """With deviations that know what whole photos err by, and the effect's own sums."""
+    variance = list(variances_by_photos(trial.fitted, trial.unseen.variance))
+    place = trial.fitted.model.place_of(trial.effect.cause)
+    variance[place] = variance[place] + np.square(trial.effect.accuracy * trial.told)
+    return replace(trial, unseen=replace(trial.unseen, variance=tuple(variance)))
+
+
 def without_last(model: Model) -> Array:
     """(n, 3) what the model shows without its last effect, the BRDF the same: another BRDF would
     take much of it, as it takes the light that glare takes from all that is bright."""
@@ -255,12 +272,20 @@ def without_last(model: Model) -> Array:
     return replace(model, x=(*model.x[:-1], x - effect.told(x))).predicted()
 
 
+def _remade(now: Fitted, costs: dict[bool, Array], best: Trial, setting: Setting) -> Trial:
+    """With the BRDFs that are found when the effect is in the model: those without it hold a part
+    of it."""
+    effect = best.effect.of(replace(setting, brdfs=best.fitted.model.brdfs))
+    assert effect is not None
+    return _try(now, costs, Asked(effect, best.gain, best.chance))
+
+
 def _costs(now: Fitted) -> dict[bool, Array]:
     """(n,) of the model as it is, where large squares are left out (False) and small ones."""
     return {fine: predict_unseen(now, fine).cost for fine in (False, True)}
 
 
-def _outside(now: Fitted) -> list[Trial]:
+def _outside(now: Fitted, kept: Sequence[Trial]) -> list[Trial]:
     """What the slack beside the basis gains: much of it means that no mixture of the measured
     materials reflects so."""
     model = now.model
@@ -275,7 +300,8 @@ def _outside(now: Fitted) -> list[Trial]:
     said = replace(now, model=replace(model, effects=effects, x=x))
     unseen = replace(unseen, variance=(*unseen.variance, np.zeros(0)))
     trial = Trial(effect, said, unseen, by_square(squares(now), gains), change, 0.0)
-    return [trial] if trial.convincing and change > OUTSIDE else []
+    gained = sum(t.gain for t in kept)
+    return [trial] if trial.convincing and trial.gain > MINOR * gained else []
 
 
 def _missed_where_bright(now: Fitted) -> Array:

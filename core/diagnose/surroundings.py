@@ -25,6 +25,7 @@ Array = NDArray[np.floating]
 
 EACH = 20  # directions of either kind
 ALPHA = 0.15  # of the lobe that the second half is drawn from
+ACCURACY = 0.02  # of what such sums say of the light about an object
 CHUNK = 8192  # pixels at a time
 
 

@@ -55,7 +55,7 @@ class DiagnoseJob(Job):
         model = Model(self.setting.pixels, self.setting.brdfs)
         effects = made_for(self.setting)
         self.found = yield from _stepped(
-            search(model, deviation, effects), "trying what may be wrong", 0.1, 1.0
+            search(model, deviation, effects, self.setting), "trying what may be wrong", 0.1, 1.0
         )
 
 

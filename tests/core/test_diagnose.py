@@ -33,7 +33,8 @@ def searched(setting: Setting, kinds=(LightDirection, LightIntensity, NearLight,
                                       Vignetting)) -> searching.Found:  # fmt: skip
     deviation = pixel_deviation(setting.pixels, setting.brdfs, np.radians(0.2))
     effects = [kind.of(setting) for kind in kinds]
-    return drained(searching.search(Model(setting.pixels, setting.brdfs), deviation, effects))
+    model = Model(setting.pixels, setting.brdfs)
+    return drained(searching.search(model, deviation, effects, setting))
 
 
 def test_nothing_is_named_where_nothing_is_wrong():

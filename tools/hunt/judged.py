@@ -30,8 +30,8 @@ class Row:
     """cause, seed, wanted: of the capture; strength: RMS change as it came out. named: causes, best
     first; ties: those declared of the first. gain: of the first, in standard errors. brdf: error of
     the second fit over that of a fit to photos without the effect, None where the material is
-    another one. over_floor: of left-out parts, after. inside, told: how many of the numbers that
-    the truth says lie in their 95 % interval, and of how many. seconds: making, diagnosing."""
+    another one. over_floor: of left-out parts, after. off: what numbers that the truth says are off
+    by, in standard errors. seconds: making, diagnosing."""
 
     cause: str
     wanted: float
@@ -42,8 +42,7 @@ class Row:
     gain: float
     brdf: float | None
     over_floor: float
-    inside: int
-    told: int
+    off: tuple[float, ...]
     seconds: tuple[float, float]
 
     @property
@@ -52,6 +51,11 @@ class Row:
         if self.cause == "none":
             return set()
         return {"unknown"} if self.cause in OUTSIDERS else set(self.cause.split("+"))
+
+    @property
+    def inside(self) -> int:
+        """Of these, how many lie in their 95 % interval."""
+        return sum(abs(each) < SURE for each in self.off)
 
     @property
     def right(self) -> bool:
@@ -84,11 +88,11 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
         assert found is not None and after is not None and job.checked.setting is not None
         first = found.accepted[0] if found.accepted else None
         of = {trial.effect.cause: trial for trial in found.accepted}
-        hits = [
-            hit
+        off = [
+            each
             for name in cause.split("+")
             if name in of
-            for hit in _hits(of[name], truth.numbers, job.checked.setting)
+            for each in _off(of[name], truth.numbers, job.checked.setting)
         ]
         error = None
         if not set(cause.split("+")) & set(OWN_BRDF):
@@ -106,8 +110,7 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
         gain=0.0 if first is None else first.gain / max(first.error, 1e-9),
         brdf=error,
         over_floor=found.error_after.over_floor,
-        inside=sum(hits),
-        told=len(hits),
+        off=tuple(off),
         seconds=(made - since, done - made),
     )
 
@@ -126,8 +129,8 @@ def _brdf_error(result: CaptureResult, truth: Truth) -> float:
     return float(np.sqrt(np.mean((ours - true) ** 2)))
 
 
-def _hits(trial: Trial, truth: Mapping[str, float], setting: Setting) -> list[bool]:
-    """Whether numbers that the truth says are within their intervals; none where it says others."""
+def _off(trial: Trial, truth: Mapping[str, float], setting: Setting) -> list[float]:
+    """What numbers that the truth says are off by, in standard errors."""
     x, deviation = trial.told, trial.deviation
     cause = trial.effect.cause
     if cause == "light_intensity":
@@ -146,7 +149,7 @@ def _hits(trial: Trial, truth: Mapping[str, float], setting: Setting) -> list[bo
     elif cause == "area_light":
         wanted = np.array([truth["angular diameter"]])
     elif cause == "veiling_glare":
-        wanted = np.array([truth["part"]])
+        x, deviation, wanted = x[:1], deviation[:1], np.array([truth["part"]])
     else:
         return []
-    return [bool(hit) for hit in np.abs(x - wanted) < SURE * deviation]
+    return [round(float(e), 2) for e in (x - wanted) / np.maximum(deviation, 1e-12)]

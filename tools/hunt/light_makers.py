@@ -36,8 +36,7 @@ def _told(scene: Scene, told, start: float, name: str) -> Hidden:  # type: ignor
     def photos(scene: Scene, size: float) -> list[Array]:
         return scene.photographed(told(scene, size))
 
-    size = scene.sought(photos, start)
-    changed = rms(photos(scene, size), scene.plain)
+    size, _, changed = scene.made(photos, start)
     return Hidden(scene.plain, {name: size}, changed, told=told(scene, size))
 
 
@@ -84,9 +83,8 @@ def near(scene: Scene) -> Hidden:
             out.append(scene.studio.photo(shot.camera))
         return out
 
-    size = scene.sought(lit, 0.1, most=NEAREST)
-    photos = lit(scene, size)
-    return Hidden(photos, {"1 / distance": size}, rms(photos, scene.plain))
+    size, photos, changed = scene.made(lit, 0.1, most=NEAREST)
+    return Hidden(photos, {"1 / distance": size}, changed)
 
 
 def area(scene: Scene) -> Hidden:
@@ -96,10 +94,9 @@ def area(scene: Scene) -> Hidden:
         scene.studio.lamp.data.angle = size
         return scene.photographed()
 
-    size = scene.sought(lit, np.radians(8.0), 1.5, WIDEST)
-    scene.studio.noise_free(100)
-    photos = lit(scene, size)
-    return Hidden(photos, {"angular diameter": size}, rms(photos, scene.plain))
+    scene.studio.noise_free(64)
+    size, photos, changed = scene.made(lit, np.radians(8.0), 1.5, WIDEST)
+    return Hidden(photos, {"angular diameter": size}, changed)
 
 
 def room(scene: Scene) -> Hidden:
@@ -134,8 +131,9 @@ def shadow(scene: Scene) -> Hidden:
     pair = int(scene.rng.integers(2)) * 2  # a light whose lit side the photos see
     light = scene.shots[pair].light
     reach = scene.surface.points @ light
-    foremost = scene.surface.points[reach > np.quantile(reach, 0.9)]
-    at = foremost[scene.rng.integers(len(foremost))] + 1.5 * light
+    low, high = np.quantile(reach, [0.4, 0.9])  # in front are highlights: a spot would be enough
+    front = scene.surface.points[(reach > low) & (reach < high)]
+    at = front[scene.rng.integers(len(front))] + 1.5 * light
     stretch = scene.rng.uniform(0.5, 2.0)
 
     def photos(scene: Scene, size: float) -> list[Array]:
@@ -143,6 +141,5 @@ def shadow(scene: Scene) -> Hidden:
         again = scene.photographed(scene.shots[pair : pair + 2])
         return [*scene.plain[:pair], *again, *scene.plain[pair + 2 :]]
 
-    size = scene.sought(photos, 0.1, most=1.0)
-    found = photos(scene, size)
-    return Hidden(found, {"radius": size}, rms(found, scene.plain))
+    size, found, changed = scene.made(photos, 0.1, most=1.0)
+    return Hidden(found, {"radius": size}, changed)

@@ -20,6 +20,7 @@ Array = np.ndarray
 IRRADIANCE = float(np.pi)
 TOLERANCE = 0.08  # of the wanted strength
 TRIES = 6
+OFF = 0.15  # of the wanted strength, beyond which whole photos are made anew
 WHITE = 99.5  # percentile of a photo, black about the object included
 
 
@@ -82,6 +83,27 @@ class Scene:
             return rms(photos(small, size), small.plain)
 
         return sought(change, start, self.strength, power, most)
+
+    def made(
+        self,
+        photos: Callable[[Scene, float], list[Array]],
+        start: float,
+        power: float = 1.0,
+        most: float = np.inf,
+    ) -> tuple[float, list[Array], float]:
+        """(size, photos, their change) of the wanted strength. Outlines and edges of shadows, which
+        do not count, are a larger part of small photos: where whole ones change otherwise, the size
+        is sought once more."""
+        size = self.sought(photos, start, power, most)
+        found = photos(self, size)
+        changed = rms(found, self.plain)
+        off = changed / self.strength
+        if abs(off - 1) < OFF or (size >= most and off < 1):
+            return size, found, changed
+        aside = replace(self, strength=self.strength / off)
+        size = aside.sought(photos, size / off ** (1 / power), power, most)
+        found = photos(self, size)
+        return size, found, rms(found, self.plain)
 
     def in_part(self, whole: list[Array], name: str, most: float) -> Hidden:
         """Of light that adds up, as much as changes the photos by the wanted RMS."""

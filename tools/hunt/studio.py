@@ -15,7 +15,7 @@ from ..demo_render import Array, Camera, Studio
 from ..demo_shape import Surface
 
 BOUNCES = 4
-SAMPLES = 36
+SAMPLES = 16
 
 
 class HuntStudio(Studio):
@@ -24,6 +24,7 @@ class HuntStudio(Studio):
     def __init__(self, samples: int = SAMPLES) -> None:
         super().__init__(samples)
         self.scene.cycles.shading_system = True
+        self.scene.render.use_persistent_data = True
         self.point: bpy.types.Object | None = None
         self.disc: bpy.types.Object | None = None
 
@@ -136,6 +137,9 @@ class HuntStudio(Studio):
         self._world(spot, radiance)
 
     def _world(self, made, radiance: float) -> None:  # type: ignore[no-untyped-def]
+        # a measured material sends a part of the sky's light through portals: Cycles takes what
+        # these see for the background, and a transparent film would lose it
+        self.scene.render.film_transparent = False
         tree = self.scene.world.node_tree
         tree.nodes.clear()
         background = tree.nodes.new("ShaderNodeBackground")
@@ -162,4 +166,23 @@ class HuntStudio(Studio):
         """(h, w, 3) linear radiance, 0 beside the object."""
         bpy.context.view_layer.update()  # lamps are read from their evaluated places
         update_lamps(self.scene)
-        return self.photograph(camera)[..., :3]
+        if self.scene.render.film_transparent:
+            return self.photograph(camera)[..., :3]
+        sky = (1 - self._cover(camera)) * self._sky(camera)
+        return self.photograph(camera)[..., :3] - sky
+
+    def _sky(self, camera: Camera) -> Array:
+        """(h, w, 3) without the object."""
+        self.body.hide_render = True
+        sky = self.photograph(camera)[..., :3]
+        self.body.hide_render = False
+        return sky
+
+    def _cover(self, camera: Camera) -> Array:
+        """(h, w, 1) how much of a pixel shows the object."""
+        self.scene.render.film_transparent, layer = True, bpy.context.view_layer
+        layer.material_override = self.matte(np.zeros(3))
+        cover = self.photograph(camera)[..., 3:]
+        bpy.data.materials.remove(layer.material_override)
+        self.scene.render.film_transparent = False
+        return cover

@@ -27,9 +27,7 @@ def normals(scene: Scene) -> Hidden:
         scene.studio.dress(scene.studio.measured(scene.brdf))
         return scene.photographed()
 
-    size = scene.sought(photos, 0.002, most=LARGEST_BUMP)
-    found = photos(scene, size)
-    strength = rms(found, scene.plain)
+    size, found, strength = scene.made(photos, 0.002, most=LARGEST_BUMP)
     if rough:
         told = bumpy(scene.surface, size, wave, seed)
         return Hidden(scene.plain, {"bumps": size}, strength, surface=told)
@@ -93,9 +91,8 @@ def outside(scene: Scene) -> Hidden:
         scene.studio.dress(scene.studio.measured(_with_lobe(scene.brdf, ring, middle, size)))
         return scene.photographed()
 
-    size = scene.sought(photos, 0.2, most=2.5)
-    found = photos(scene, size)
-    return Hidden(found, {"ring" if ring else "angle": size}, rms(found, scene.plain))
+    size, found, changed = scene.made(photos, 0.2, most=2.5)
+    return Hidden(found, {"ring" if ring else "angle": size}, changed)
 
 
 def _with_lobe(brdf: PrincipalBRDF, ring: bool, middle: float, size: float) -> PrincipalBRDF:

@@ -77,7 +77,7 @@ def read_rows(path: Path | None) -> list[Row]:
     found = []
     for line in path.read_text("utf-8").splitlines():
         values = json.loads(line)
-        for key in ("named", "ties", "seconds"):
+        for key in ("named", "ties", "off", "seconds"):
             values[key] = tuple(values[key])
         found.append(Row(**values))
     return found
@@ -95,7 +95,7 @@ def table(rows: Sequence[Row]) -> str:
         if row.ties:
             named += f" (or {', '.join(row.ties)})"
         brdf = "–" if row.brdf is None else f"{row.brdf:.2f}"
-        inside = f"{row.inside} of {row.told}" if row.told else "–"
+        inside = f"{row.inside} of {len(row.off)}" if row.off else "–"
         made, took = row.seconds
         lines.append(
             f"| {row.cause} | {100 * row.strength:.1f} % | {row.seed} | "
@@ -121,7 +121,7 @@ def _sums(rows: Sequence[Row]) -> list[str]:
     for group, mine in sorted(groups.items()):
         right, wrong = sum(r.right for r in mine), sum(r.wrong_name for r in mine)
         lines.append(f"| {group} | {right} of {len(mine)} | {wrong} |")
-    told = sum(row.told for row in rows)
+    told = sum(len(row.off) for row in rows)
     if told:
         inside = sum(row.inside for row in rows)
         lines.append(f"| numbers within their 95 % interval | {inside} of {told} | |")

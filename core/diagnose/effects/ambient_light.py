@@ -9,6 +9,7 @@ import numpy as np
 from ..brdfs import BRDFs
 from ..effect import Array, Effect, Numbers, Setting
 from ..situation import Situation
+from ..surroundings import ACCURACY
 
 
 @dataclass(frozen=True)
@@ -18,6 +19,8 @@ class AmbientLight(Effect):
 
     reflected: Array
     cause = "ambient_light"
+    of_brdf = True
+    accuracy = ACCURACY
     proof = "one photo with the lamp off"
 
     @classmethod

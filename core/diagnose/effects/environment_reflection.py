@@ -9,6 +9,7 @@ import numpy as np
 from ..brdfs import BRDFs
 from ..effect import Array, Effect, Numbers, Setting
 from ..situation import Situation
+from ..surroundings import ACCURACY
 
 LOBES = 16  # directions that the surroundings are described by
 SHARP = 5.0  # of each: a bright spot about 25° wide
@@ -22,6 +23,8 @@ class EnvironmentReflection(Effect):
     directions: Array
     reflected: Array
     cause = "environment_reflection"
+    of_brdf = True
+    accuracy = ACCURACY
     proof = "one photo with the lamp off"
 
     @classmethod

@@ -10,6 +10,7 @@ import numpy as np
 from ..brdfs import BRDFs
 from ..effect import Array, Effect, Near, Numbers, Setting
 from ..situation import Situation
+from ..surroundings import ACCURACY
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,8 @@ class Interreflection(Effect):
     reflected: Array
     glow: dict[int, Array]
     cause = "interreflection"
+    of_brdf = True
+    accuracy = ACCURACY
     proof = "one photo with a black cloth over the parts that face the bright ones"
 
     @classmethod

@@ -12,6 +12,7 @@ from ..patch_effect import PatchEffect
 from ..patches import median_of, surface_patches
 from ..situation import Situation
 
+ACROSS = 10  # patches over the object's size: small ones are predicted by few others
 USUAL = (0.1, 0.05, 0.05, 0.05)
 LIT = 0.2  # of the lamp's light, from which a pixel says what a patch reflects
 OTHER = 0.03  # more, or albedo more, than the rest: a patch of another material
@@ -31,7 +32,7 @@ class SecondMaterial(PatchEffect):
 
     @classmethod
     def of(cls, setting: Setting) -> SecondMaterial | None:
-        parts = surface_patches(setting)
+        parts = surface_patches(setting, ACROSS)
         if not (parts >= 0).any():
             return None
         return cls(parts, USUAL, Situation.of(setting.pixels).received)

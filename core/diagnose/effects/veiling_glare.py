@@ -12,8 +12,9 @@ from ..situation import Situation
 
 @dataclass(frozen=True)
 class VeilingGlare(Effect):
-    """numbers: the part of the light that scatters; it lands where the photo, blurred widely, is
-    bright. veil: (n, 3) that blurred photo."""
+    """numbers: the part of the light that scatters, and how much more of it stays about where the
+    photo is bright than goes all over it (1: all of it, −1: none). veil: (n, 2, 3) the photo
+    blurred widely, and its mean."""
 
     veil: Array
     cause = "veiling_glare"
@@ -26,10 +27,19 @@ class VeilingGlare(Effect):
 
     @property
     def numbers(self) -> Numbers:
-        return Numbers.alike(["part"], "", 0.1, 0.0, 0.6)
+        return Numbers(
+            ("part", "nearness"), ("", ""), np.array([0.1, 0.5]), np.array([0.0, -1.0]),
+            np.array([0.6, 1.0]), np.array([1e-3, 1e-2]),
+        )  # fmt: skip
+
+    @property
+    def freedom(self) -> int:
+        return 1
 
     def after(self, radiance: Array, now: Situation, x: np.ndarray) -> Array:
-        return (1 - x[0]) * radiance + x[0] * self.veil
+        about, even = 0.5 * (1 + x[1]), 0.5 * (1 - x[1])
+        veil = about * self.veil[:, 0] + even * self.veil[:, 1]
+        return (1 - x[0]) * radiance + x[0] * veil
 
     def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
         return (
