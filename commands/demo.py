@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..core.errors import PatinaError
 from ..core.report.relit import add_to_report
-from .fit import fit_to_folder
+from .diagnose import MATERIALS, diagnose_to_folder
 from .render import render_to_folder
 
 HELP = "the whole job on the capture that comes with Patina"
@@ -22,14 +22,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     out = arguments.out
-    fit_to_folder(CAPTURE, out)
+    diagnose_to_folder(CAPTURE, out)
     _show_under_other_light(out)
-    print(f"Open {out / 'report' / 'index.html'} to see what was measured.")
+    page = out / MATERIALS / "index.html"
+    print(f"Open {page} to see what was measured, the page above for what is wrong with it.")
 
 
 def _show_under_other_light(out: Path) -> None:
     """Pictures under a world that Blender ships, where it ships any."""
-    report = out / "report"
+    report = out / MATERIALS
     try:
         found = render_to_folder(out, report / RELIT, WORLDS, SIZE, SAMPLES, TURNS)
     except PatinaError as error:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from pathlib import Path
 
 from ..core.capture import read_capture
 from ..core.diagnose.effects import EFFECTS
@@ -16,6 +18,7 @@ from .progress import Progress
 from .solve import check_threads
 from .staging import check_out, staged_folder
 
+MATERIALS = "report/materials"  # the second fit's own report
 HELP = "fit a capture, say what is wrong with it, and fit it again with that in the model"
 
 
@@ -33,9 +36,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     check_threads(arguments.threads)
-    out = check_out(arguments.out)
-    fit = FitJob(read_capture(arguments.capture), threads=arguments.threads)
-    job = CheckJob(fit, without=arguments.without)
+    diagnose_to_folder(arguments.capture, arguments.out, arguments.threads, arguments.without)
+
+
+def diagnose_to_folder(
+    capture_file: Path, out: Path, threads: int | None = None, without: Sequence[str] = ()
+) -> None:
+    """Check a capture and leave diagnosis.json and report/ in ``out``, and what a fit leaves, its
+    report in report/materials."""
+    out = check_out(out)
+    job = CheckJob(FitJob(read_capture(capture_file), threads=threads), without=without)
     progress = Progress(share=0.9)
     job.drain(progress)
     progress.share = 1.0
@@ -45,7 +55,7 @@ def run(arguments: argparse.Namespace) -> None:
         report = folder / "report"
         diagnosis.write_pages(report, found, finished(checked.setting), before, after)
         diagnosis_json.write(folder / "diagnosis.json", found, before, after)
-        write_results(folder, out, after, job.stages, progress, "report/materials")
+        write_results(folder, out, after, job.stages, progress, MATERIALS)
     _tell_causes(found)
     tell(out, after)
     print(f"      {out / 'diagnosis.json'}")

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from .drawn import FOCAL
-from .scene import IRRADIANCE, Hidden, Scene, Shot, moved, rms, sought
+from .scene import IRRADIANCE, Hidden, Scene, Shot, mixed, moved, rms, sought
 from .studio import BOUNCES
 
 Array = np.ndarray
@@ -127,7 +127,8 @@ def bounced(scene: Scene) -> Hidden:
 
 
 def shadow(scene: Scene) -> Hidden:
-    """Something stands between one light and the object, out of the photos."""
+    """Something stands between one light and the object, out of the photos, and lets a part of the
+    light through."""
     pair = int(scene.rng.integers(2)) * 2  # a light whose lit side the photos see
     light = scene.shots[pair].light
     reach = scene.surface.points @ light
@@ -136,10 +137,12 @@ def shadow(scene: Scene) -> Hidden:
     at = front[scene.rng.integers(len(front))] + 1.5 * light
     stretch = scene.rng.uniform(0.5, 2.0)
 
+    dark = scene.rng.uniform(0.4, 0.8)
+
     def photos(scene: Scene, size: float) -> list[Array]:
         scene.studio.occluder(at, light, size, size * stretch)
         again = scene.photographed(scene.shots[pair : pair + 2])
-        return [*scene.plain[:pair], *again, *scene.plain[pair + 2 :]]
+        return mixed(scene.plain, [*scene.plain[:pair], *again, *scene.plain[pair + 2 :]], dark)
 
     size, found, changed = scene.made(photos, 0.1, most=1.0)
-    return Hidden(found, {"radius": size}, changed)
+    return Hidden(found, {"radius": size, "darkness": dark}, changed)

@@ -11,17 +11,26 @@ from ..effect import Array, Effect, Near, Numbers, Setting, felt_by
 from ..situation import Situation
 
 USUAL = 1.0  # pixels
+BESIDE = 2.0  # pixels from the edge of a shadow, where light changes, not the normal alone
 
 
 @dataclass(frozen=True)
 class CameraPose(Effect):
     """numbers: for each photo a shift to the right and down, and a turn, in pixels (of the turn:
-    at half the diagonal). slope: (n, 2, 3) of what the photo shows; x, y: (n,) in half diagonals.
+    at half the diagonal). turn: (n, 2, 3) of the normal, slope: (n, 2, 3) of what the photo shows,
+    a pixel to the right and down. beside: (n,) whether the edge of a shadow is near. x, y: (n,) in
+    half diagonals.
+
+    A pixel shows the surface beside the one that it should. Over a few pixels normals turn evenly,
+    but what they reflect does not change so (a highlight has a top); beside the edge of a shadow
+    it is light that changes.
     """
 
     photos: tuple[int, ...]
     photo: NDArray[np.intp]
+    turn: Array
     slope: Array
+    beside: NDArray[np.bool_]
     x: Array
     y: Array
     cause = "camera_pose"
@@ -32,13 +41,18 @@ class CameraPose(Effect):
     def of(cls, setting: Setting) -> CameraPose:
         pixels = setting.pixels
         photos, place = np.unique(pixels.photo, return_inverse=True)
-        return cls(tuple(photos.tolist()), place.ravel(), pixels.slope, pixels.x, pixels.y)
+        beside = pixels.edge < BESIDE
+        return cls(
+            tuple(photos.tolist()), place.ravel(), pixels.turn, pixels.slope, beside,
+            pixels.x, pixels.y,
+        )  # fmt: skip
 
     def elsewhere(self, setting: Setting, near: Near) -> CameraPose:
         pixels = setting.pixels
         return replace(
-            self, photo=self.photo[near.photo], slope=pixels.slope, x=pixels.x, y=pixels.y
-        )
+            self, photo=self.photo[near.photo], turn=self.turn[near.photo], slope=pixels.slope,
+            beside=pixels.edge < BESIDE, x=pixels.x, y=pixels.y,
+        )  # fmt: skip
 
     @property
     def numbers(self) -> Numbers:
@@ -49,10 +63,22 @@ class CameraPose(Effect):
     def feels(self) -> NDArray[np.intp]:
         return felt_by(self.photo, 3)
 
+    def before(self, now: Situation, x: np.ndarray) -> Situation:
+        if not x.any():
+            return now
+        normal = now.normal + np.where(self.beside[:, None], 0, self._moved(self.turn, x))
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        return replace(now, normal=normal)
+
     def after(self, radiance: Array, now: Situation, x: np.ndarray) -> Array:
+        return radiance + np.where(self.beside[:, None], self._moved(self.slope, x), 0)
+
+    def _moved(self, slope: Array, x: np.ndarray) -> Array:
+        """(n, 3) what a quantity of these slopes (n, 2, 3) is more at the place that is shown."""
         right, down, turn = (x[k::3][self.photo] for k in range(3))
-        along = (right - turn * self.y)[:, None] * self.slope[:, 0]
-        return radiance + along + (down + turn * self.x)[:, None] * self.slope[:, 1]
+        along = (right - turn * self.y)[:, None] * slope[:, 0]
+        along += (down + turn * self.x)[:, None] * slope[:, 1]
+        return np.asarray(along, np.float32)
 
     def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
         far = np.hypot(x[0::3], x[1::3])

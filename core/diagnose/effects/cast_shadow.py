@@ -60,7 +60,7 @@ class CastShadow(PatchEffect):
 
     def lost(self, x: np.ndarray) -> Array:
         """(n,) part of the light that does not arrive."""
-        return -x[self.parts]
+        return -self.felt(x)[:, 0]
 
     def before(self, now: Situation, x: np.ndarray) -> Situation:
         return replace(now, visible=now.visible * (1 - self.lost(x)).astype(np.float32))
