@@ -69,5 +69,12 @@ def lit_ball(seed: int = 0) -> Setting:
     )  # fmt: skip
 
 
+def shadowed(setting: Setting, photo: int, reach: float, lost: float) -> Setting:
+    """A part of the light is lost in a round spot of one photo."""
+    pixels = setting.pixels
+    spot = (pixels.photo == photo) & (np.hypot(pixels.x - 0.1, pixels.y) < reach)
+    return changed(setting, np.where(spot[:, None], 1 - lost, 1) * pixels.observed)
+
+
 def changed(setting: Setting, observed: np.ndarray) -> Setting:
     return replace(setting, pixels=replace(setting.pixels, observed=observed.astype(np.float32)))

@@ -43,14 +43,10 @@ def asked(now: Fitted, effects: Sequence[Effect]) -> list[Asked]:
     signs = np.random.default_rng(1).choice([-1.0, 1.0], (DRAWS, int(of.max()) + 1))
     found, drawn = [], []
     for effect in effects:
-        if not len(effect.numbers):
+        if not len(effect.numbers) or effect.fine:  # signs of squares tell nothing of single pixels
             found.append(Asked(effect, np.inf, 0.0))
             continue
         pulls, metric = _scores(now, effect, of)
-        if effect.fine:  # signs of squares tell nothing of what lies within one
-            value = float(_length(pulls.sum(axis=0)[None], metric)[0])
-            found.append(Asked(effect, (value - len(effect.numbers)) / 2, 0.0))
-            continue
         drawn.append(_length(signs @ pulls, metric))
         value = float(_length(pulls.sum(axis=0)[None], metric)[0])
         promised = (value - float(drawn[-1].mean())) / 2  # beyond what chance gives

@@ -139,8 +139,7 @@ class Effect(ABC):
 
     cause: str
     proof: str  # the photo that would tell it from others
-    fine = False  # judged on small squares of the photos: only what is beside a place tells of it
-    credit = 1.0  # of its gain, where effects are compared
+    fine = False  # judged on single pixels of the photos: only those beside one tell of it
     of_photo = False  # whether it needs what the photo shows about a pixel
     accuracy = 0.0  # what its own sums may be off by, of its numbers
     of_brdf = False  # whether it is made of the BRDFs, and made anew when they are known better

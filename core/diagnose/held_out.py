@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from .equations import Change, Equations
 from .fitted import Fitted, robust
-from .image_cells import cell_numbers
 from .slopes import Slopes, slopes_of
 
 Array = NDArray[np.floating]
@@ -25,7 +24,6 @@ Array = NDArray[np.floating]
 FOLDS = 5
 MOST_GROUPS = 12  # of photos, left out one after the other
 STILL_KNOWN = 25.0  # times the variance of a number where a part of the photos is left out
-FINE = 18  # small squares along a photo's longer side
 
 
 @dataclass(frozen=True)
@@ -44,21 +42,20 @@ class Unseen:
 
 
 def folds(fitted: Fitted, fine: bool = False) -> NDArray[np.int32]:
-    """(n,) fold of every pixel: squares at random, or fine ones, so that every photo is in every
-    fold."""
+    """(n,) fold of every pixel: squares at random, or pixels, so that every photo is in every fold."""
     _, place = np.unique(squares(fitted, fine), return_inverse=True)
     shuffled = np.random.default_rng(0).permutation(int(place.max()) + 1 if len(place) else 0)
     return (shuffled[place.ravel()] % FOLDS).astype(np.int32)
 
 
 def squares(fitted: Fitted, fine: bool = False) -> NDArray[np.int32]:
-    """(n,) square of every pixel."""
-    pixels = fitted.model.pixels
-    return cell_numbers(pixels.photo, pixels.x, pixels.y, FINE) if fine else pixels.block
+    """(n,) square of every pixel; fine: each is one of its own."""
+    block = fitted.model.pixels.block
+    return np.arange(len(block), dtype=np.int32) if fine else block
 
 
 def predict_unseen(fitted: Fitted, fine: bool = False) -> Unseen:
-    """At an optimum; fine: small squares are left out, whose neighbours stay."""
+    """At an optimum; fine: single pixels are left out, whose neighbours stay."""
     return _unseen(fitted, folds(fitted, fine))
 
 

@@ -43,7 +43,7 @@ MOST_EFFECTS = 4
 SURE = 3.0  # standard errors over squares that a gain is above 0
 NEARLY = 0.93  # of the best gain
 TRIED, PROMISING = 4, 0.25  # so many are fitted at least; and all that promise this of the best
-WORTH, UNLIKELY = 50.0, 0.05  # nats (of shadows), chance of effects of patches that are fitted
+UNLIKELY = 0.05  # chance of effects of patches that are fitted
 DIM = 0.02  # of the photos' bright pixels: darker ones give no ratio
 MINOR = 0.05  # of what accepted effects gained: less is more likely what their model lacks
 EXPECTATIONS = 1  # rounds in which patches say what is usual among them
@@ -210,8 +210,7 @@ def _promising(found: Sequence[Asked]) -> list[Asked]:
     chosen = []
     for one in found:
         if one.effect.patch is not None:
-            # outliers promise little, however surely they are there
-            worth = one.chance < UNLIKELY and (one.gain > WORTH or not one.effect.fine)
+            worth = one.chance < UNLIKELY
         else:
             worth = one.gain >= PROMISING * most or any(one is f for f in few[:TRIED])
         chosen += [one] if worth else []
@@ -223,8 +222,8 @@ def _simplest(trials: Sequence[Trial]) -> Trial | None:
     spots of light can stand for an even room, which is one thing."""
     if not trials:
         return None
-    worth = [t.gain * t.effect.credit for t in trials]
-    enough = [t for t, w in zip(trials, worth, strict=True) if w > NEARLY * max(worth)]
+    most = max(t.gain for t in trials)
+    enough = [t for t in trials if t.gain > NEARLY * most]
     best = min(enough, key=lambda t: t.effect.freedom)
     same = [
         t.effect
@@ -249,7 +248,7 @@ def _try(now: Fitted, costs: dict[bool, Array], one: Asked) -> Trial:
         model = now.model.with_effect(effect)
         fitted = fit(replace(model, brdfs=fitted.model.brdfs, x=fitted.model.x), now.deviation)
     unseen = predict_unseen(fitted, fine)
-    # what is confined to a few large squares could never be sure
+    # what is confined to a few squares could never be sure
     gained = by_square(squares(now, fine), costs[fine] - unseen.cost)
     own = effect.patch is None and len(effect.numbers) > 0
     without = without_last(fitted.model) if own else now.shown

@@ -25,7 +25,7 @@ from patina.core.diagnose.model import Model
 from patina.core.diagnose.of_samples import nearest
 from patina.core.samples import SampleTable
 from patina.core.steps import drained
-from tests.make_lit_ball import changed, lit_ball
+from tests.make_lit_ball import changed, lit_ball, shadowed
 
 
 def table_of(setting: Setting) -> SampleTable:
@@ -97,28 +97,32 @@ def test_the_same_numbers_speak_of_other_pixels():
     one = replace(setting, pixels=setting.pixels.select(np.sort(order[: len(order) // 2])))
     near = nearest(setting.pixels, one.pixels, setting.size)
     assert (one.pixels.photo[near.photo] == setting.pixels.photo).all()
-    for kind in (*EXAMPLES, CastShadow):
+    for kind, numbers in EXAMPLES.items():
         whole, half = kind.of(setting), kind.of(one)
-        if kind is CastShadow:
-            x = -rng.uniform(0, 0.5, len(half.numbers))
-        else:
-            x = EXAMPLES[kind]
-        told = Model(one.pixels, one.brdfs).with_effect(half, x)
+        told = Model(one.pixels, one.brdfs).with_effect(half, numbers)
         moved = elsewhere(told, setting, near).predicted()
-        if kind is CastShadow:  # of half of the pixels, squares are other ones
-            same = np.flatnonzero(np.isin(np.arange(len(near.photo)), order[: len(order) // 2]))
-            np.testing.assert_allclose(moved[same], told.predicted(), rtol=1e-5)
-        else:
-            if kind is CameraResponse:  # what is grey was said when the numbers were found
-                whole = half
-            x = whole.told(x)
-            plain = Model(setting.pixels, setting.brdfs).with_effect(whole, x).predicted()
-            np.testing.assert_allclose(moved, plain, rtol=1e-5, atol=1e-7)
+        if kind is CameraResponse:  # what is grey was said when the numbers were found
+            whole = half
+        x = whole.told(numbers)
+        plain = Model(setting.pixels, setting.brdfs).with_effect(whole, x).predicted()
+        np.testing.assert_allclose(moved, plain, rtol=1e-5, atol=1e-7)
+
+
+def test_a_shadow_is_where_its_photo_was_looked_at():
+    setting = shadowed(lit_ball(5), 2, 0.15, 0.6)
+    effect = CastShadow.of(setting)
+    rows = np.flatnonzero(np.arange(len(setting.pixels)) % 2)
+    here = replace(setting, pixels=setting.pixels.select(rows))
+    moved = effect.elsewhere(here, nearest(here.pixels, setting.pixels, setting.size))
+    np.testing.assert_array_equal(moved.parts, effect.parts[rows])
+    assert set(setting.pixels.photo[effect.parts >= 0]) == {2}
 
 
 @pytest.mark.parametrize("kind", EFFECTS, ids=lambda k: k.cause)
 def test_every_effect_can_be_moved(kind):
     setting = lit_ball(6)
+    if kind is CastShadow:
+        setting = shadowed(setting, 1, 0.15, 0.6)
     effect = kind.of(setting)
     if effect is None:
         pytest.skip("cannot be there on a ball alone")

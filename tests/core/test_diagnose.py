@@ -15,6 +15,7 @@ from patina.core.diagnose.deviation import as_found, pixel_deviation
 from patina.core.diagnose.effect import Setting, felt_by
 from patina.core.diagnose.effects import EFFECTS
 from patina.core.diagnose.effects.camera_response import CameraResponse
+from patina.core.diagnose.effects.cast_shadow import CastShadow
 from patina.core.diagnose.effects.light_direction import LightDirection
 from patina.core.diagnose.effects.light_intensity import LightIntensity
 from patina.core.diagnose.effects.near_light import NearLight
@@ -26,7 +27,7 @@ from patina.core.diagnose.situation import Situation
 from patina.core.diagnose.slopes import slopes_of
 from patina.core.diagnose.solve import fit
 from patina.core.steps import drained
-from tests.make_lit_ball import NOISE, SIZE, changed, lit_ball
+from tests.make_lit_ball import NOISE, SIZE, changed, lit_ball, shadowed
 
 
 def searched(setting: Setting, kinds=(LightDirection, LightIntensity, NearLight, CameraResponse,
@@ -102,6 +103,8 @@ def test_slopes_are_those_of_finite_differences():
 def test_no_effect_is_no_change(kind):
     """All numbers 0: the model as it was; and every effect has something to say."""
     setting = lit_ball()
+    if kind is CastShadow:
+        setting = shadowed(setting, 1, 0.15, 0.6)
     effect = kind.of(setting)
     if effect is None:
         pytest.skip("cannot be there on a ball alone")
@@ -111,6 +114,24 @@ def test_no_effect_is_no_change(kind):
     np.testing.assert_allclose(with_it.predicted(), plain.predicted(), rtol=2e-3, atol=1e-6)
     small = effect.numbers.step
     assert len(effect.sentence(np.clip(small, effect.numbers.low, effect.numbers.high), small)) > 20
+
+
+def test_a_spot_without_light_is_a_shadow():
+    """One spot of one photo: named, with the light that is lost there."""
+    setting = shadowed(lit_ball(8), 3, 0.12, 0.6)
+    found = searched(setting, (LightDirection, LightIntensity, CastShadow))
+    assert found.causes == ("cast_shadow",)
+    trial = found.accepted[0]
+    np.testing.assert_allclose(trial.told, -0.6, atol=0.03)
+    assert (np.abs(trial.told + 0.6) < 3 * trial.deviation).all()
+
+
+def test_single_dark_pixels_are_no_shadow():
+    """As much light is lost, in as many pixels, here and there."""
+    setting = lit_ball(8)
+    spot = np.random.default_rng(2).random(len(setting.pixels)) < 0.02
+    dusty = changed(setting, np.where(spot[:, None], 0.4, 1) * setting.pixels.observed)
+    assert CastShadow.of(dusty) is None
 
 
 def test_what_is_not_understood_is_no_proof():

@@ -146,6 +146,8 @@ def _off(trial: Trial, truth: Mapping[str, float], setting: Setting) -> list[flo
         wanted = np.full(len(x), truth["angle"])
     elif cause == "ambient_light":
         wanted = np.full(3, truth["radiance"] * np.pi / setting.level)
+    elif cause == "cast_shadow":
+        wanted = np.full(len(x), -truth["darkness"])
     elif cause == "area_light":
         wanted = np.array([truth["angular diameter"]])
     elif cause == "veiling_glare":

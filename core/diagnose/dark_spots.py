@@ -1,0 +1,56 @@
+"""Spots of a photo that are darker than the model says: what a shadow would do."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from .image_cells import cell_numbers
+from .pixels import Pixels
+
+Array = NDArray[np.floating]
+
+DARKER = 0.3  # of what is predicted, missed
+DIM = 0.02  # of the bright pixels: darker ones are not looked at
+BESIDE = 2.0  # pixels from the edge of a shadow of the object's own, whose place is not so exact
+AROUND, MOST = 8, 6  # pixels nearest in the photo, itself included; so many of them dark
+FEWEST = 12  # pixels of a spot
+ACROSS = 5  # squares along a photo's longer side that a large spot is cut by
+APART = 1e3  # between photos
+
+
+def dark_spots(pixels: Pixels, shown: Array) -> NDArray[np.intp]:
+    """(n,) number of the spot that each pixel is in, −1 none. shown: (n, 3) prediction.
+
+    A pixel belongs to a spot where nearly all pixels about it are too dark as well: single ones are
+    noise, dust, or a fold that the mesh does not have.
+    """
+    level, seen = shown.sum(axis=1), pixels.observed.sum(axis=1)
+    lit = (level > DIM * np.percentile(level, 90)) & (pixels.visible > 0) & pixels.usable
+    rows = np.flatnonzero(lit & (pixels.edge > BESIDE))
+    out = np.full(len(level), -1, np.intp)
+    if len(rows) < AROUND:
+        return out
+    dark = seen[rows] < (1 - DARKER) * level[rows]
+    half = np.ptp(pixels.x) + np.ptp(pixels.y) + 1.0
+    place = np.stack([pixels.x, pixels.y, half * APART * pixels.photo], axis=1)[rows]
+    near = cKDTree(place).query(place[dark], AROUND)[1]
+    core = np.flatnonzero(dark[near].sum(axis=1) >= MOST)
+    if not len(core):
+        return out
+    mine = np.flatnonzero(dark)[core]
+    joined = [(mine[:, None] + 0 * near[core]).ravel(), near[core].ravel()]
+    both = dark[joined[1]]
+    graph = coo_array((both[both], (joined[0][both], joined[1][both])), (len(rows), len(rows)))
+    spot = connected_components(graph, directed=False)[1]
+    cell = cell_numbers(pixels.photo, pixels.x, pixels.y, ACROSS)[rows]
+    touched = np.zeros(len(rows), bool)
+    touched[mine] = touched[joined[1][both]] = True
+    spot = np.unique(np.stack([spot, cell]), axis=1, return_inverse=True)[1].ravel()
+    count = np.bincount(spot, touched)
+    kept = touched & (count[spot] >= FEWEST)
+    out[rows[kept]] = np.unique(spot[kept], return_inverse=True)[1].ravel()
+    return out
