@@ -42,7 +42,7 @@ class Unseen:
 
 
 def folds(fitted: Fitted, fine: bool = False) -> NDArray[np.int32]:
-    """(n,) fold of every pixel: squares at random, or pixels, so that every photo is in every fold."""
+    """(n,) fold of every pixel: squares at random, or pixels; every photo is in every fold."""
     _, place = np.unique(squares(fitted, fine), return_inverse=True)
     shuffled = np.random.default_rng(0).permutation(int(place.max()) + 1 if len(place) else 0)
     return (shuffled[place.ravel()] % FOLDS).astype(np.int32)
@@ -124,7 +124,7 @@ def _by_effect(fitted: Fitted, change: Change, others: Sequence[Change]) -> tupl
     """As the curvature says, but no less than what the numbers move by when parts of the photos are
     left out, others: (a jackknife of as many groups, Shao and Wu 1989, together over an effect's
     numbers): what neighbouring pixels err by is alike, which the curvature does not know. A part
-    without which a number is hardly known says nothing about it.
+    without which one of the numbers is hardly known says nothing about them.
     """
     model, variance, at = fitted.model, [], 0
     for place, effect in enumerate(model.effects):
@@ -137,10 +137,9 @@ def _by_effect(fitted: Fitted, change: Change, others: Sequence[Change]) -> tupl
         plain = np.diag(anchor @ change.covariance[mine, mine] @ anchor.T)
         moved = np.stack([other.x[mine] for other in others]) @ anchor.T
         spread = [np.diag(anchor @ o.covariance[mine, mine] @ anchor.T) for o in others]
-        told = np.stack(spread) < STILL_KNOWN * plain
-        middle = np.sum(told * moved, axis=0) / np.maximum(told.sum(axis=0), 1)
-        away = told * (moved - middle)
-        jackknife = (len(others) - 1) * np.mean(away**2, axis=0)
+        told = moved[(np.stack(spread) <= STILL_KNOWN * plain).all(axis=1)]
+        away = told - told.mean(axis=0) if len(told) else np.zeros((1, count))
+        jackknife = (len(away) - 1) * np.mean(away**2, axis=0)
         known = plain > 0
         more = float(np.mean(jackknife[known] / plain[known])) if known.any() else 1.0
         variance.append(plain * max(more, 1.0))

@@ -18,6 +18,7 @@ class CheckJob(Job):
 
     def __init__(self, fit: FitJob, without: Collection[str] = ()) -> None:
         super().__init__()
+        fit.portable = False  # of the second fit's materials only
         self.checked = DiagnoseJob(fit)
         self.without = frozenset(without)
         self.result: CaptureResult | None = None

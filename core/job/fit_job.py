@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..appearance.lobe_fit import LobeStackFit, fit_lobe_stack
-from ..appearance.principled_fit import PrincipledFit, fit_principled
+from ..appearance.lobe_fit import LobeStackFit
+from ..appearance.principled_fit import PrincipledFit
 from ..basis import Basis
 from ..capture import Capture, LightEntry
 from ..errors import FitError
@@ -25,11 +25,11 @@ from ..samples.level import at_typical_level
 from ..scan import Scan
 from . import inputs
 from .applied import Applied
-from .beside import beside
 from .estimators import Estimate, estimate
 from .job import Job, Step, finished
 from .lights import Lights, find_lights, refined
 from .photos import LitPhotos
+from .portable import Portable, fit_portable
 from .sampling import Taken, take_samples
 from .warnings import black_photos, material_warnings, trust_warnings
 
@@ -41,6 +41,7 @@ class MaterialResult:
     """One fitted material. fit: by the capture's method; samples: number taken from the photos;
     used: those that the fit was given, all unless there are too many; per_photo: taken of every
     photo; scale: what the photos' reflectance was multiplied by, 1 where the irradiance is known.
+    portable: as others show it, None until somebody asks.
     """
 
     name: str
@@ -50,11 +51,20 @@ class MaterialResult:
     per_photo: tuple[int, ...]
     held_out: HeldOut | None
     spread: Spread
-    principled: PrincipledFit
-    lobes: LobeStackFit
+    portable: Portable | None
     scale: float
     irradiance_known: bool
     warnings: tuple[str, ...]
+
+    @property
+    def principled(self) -> PrincipledFit:
+        """The Principled BSDF nearest to it."""
+        return finished(self.portable).principled
+
+    @property
+    def lobes(self) -> LobeStackFit:
+        """The stack of lobes nearest to it."""
+        return finished(self.portable).lobes
 
 
 @dataclass(frozen=True)
@@ -75,6 +85,19 @@ class CaptureResult:
     effects: tuple[Applied, ...] = ()
 
 
+def with_portable(
+    material: MaterialResult, start: float, share: float
+) -> Generator[Step, None, MaterialResult]:
+    """With its portable form, unless it has it; takes the part ``share`` of a job."""
+    if material.portable is not None:
+        return material
+    found = yield from fit_portable(material.fit.brdf, material.name, start, share)
+    warnings = material.warnings
+    if found.principled.clipped:
+        warnings += ("brighter than any base colour: the Principled material is too dark",)
+    return replace(material, portable=found, warnings=warnings)
+
+
 def _way(entry: LightEntry) -> str:
     """The key that says where a light is."""
     ways = ("sphere", "sun", "position", "mounted")
@@ -86,7 +109,8 @@ class FitJob(Job):
 
     prepare: what is done to the scan once it is read (face attributes that no file has). threads:
     how many look at the photos (None: one a core); the result does not depend on it. keep: whether
-    ``samples`` holds those that each material was fitted to, by its name.
+    ``samples`` holds those that each material was fitted to, by its name. portable: whether the
+    materials' portable forms are fitted too.
     """
 
     def __init__(
@@ -96,10 +120,12 @@ class FitJob(Job):
         prepare: Callable[[Scan], Scan] | None = None,
         threads: int | None = None,
         keep: bool = False,
+        portable: bool = True,
     ) -> None:
         super().__init__()
         self.threads = threads
         self.keep = keep
+        self.portable = portable
         self.samples: dict[str, SampleTable] = {}
         self.capture = capture
         self.basis = basis
@@ -215,18 +241,10 @@ class FitJob(Job):
         capture, name = self.capture, self.capture.materials[index].name
         known, scale = unit
         found = yield from self._estimate(index, table, basis, start, 0.8 * share)
-        step = Step(f"Principled material of {name}", start + 0.8 * share)
-        yield step
-        principled = yield from beside(lambda: fit_principled(found.fit.brdf.evaluate), step)
-        step = Step(f"lobe stack of {name}", start + 0.9 * share)
-        yield step
-        lobes = yield from beside(lambda: fit_lobe_stack(found.fit.brdf.evaluate), step)
         warnings = material_warnings(table, found.fit, known)
         warnings += trust_warnings(found, capture)
         warnings += black_photos(table, capture) + found.notes
-        if principled.clipped:
-            warnings += ("brighter than any base colour: the Principled material is too dark",)
-        return MaterialResult(
+        material = MaterialResult(
             name=name,
             fit=found.fit,
             samples=int(counts.sum()),
@@ -234,12 +252,14 @@ class FitJob(Job):
             per_photo=tuple(counts.tolist()),
             held_out=found.held_out,
             spread=found.spread,
-            principled=principled,
-            lobes=lobes,
+            portable=None,
             scale=scale,
             irradiance_known=known,
             warnings=warnings,
         )
+        if not self.portable:
+            return material
+        return (yield from with_portable(material, start + 0.8 * share, 0.2 * share))
 
     def _estimate(
         self, index: int, table: SampleTable, basis: Basis, start: float, share: float

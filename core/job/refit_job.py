@@ -18,7 +18,7 @@ from ..steps import relayed
 from .applied import Applied
 from .beside import beside
 from .diagnose_job import DiagnoseJob
-from .fit_job import CaptureResult, MaterialResult
+from .fit_job import CaptureResult, MaterialResult, with_portable
 from .job import Job, Step, finished
 
 STAGE = "fitting with what was found"
@@ -70,12 +70,22 @@ class RefitJob(Job):
                     for m, a in zip(_proposed(before, again), again, strict=True)
                 ]
                 used = applied if any(a.material is not None for a in again) else ()
-                self.result = replace(before, materials=tuple(materials), effects=used)
+                yield from self._finish(replace(before, effects=used), materials, 1 - attempt)
                 return
             dropped.append(f"{chosen.pop().effect.cause} is not taken into account: {worse}")
             attempt /= 2
         materials = [replace(m, warnings=(*m.warnings, *dropped)) for m in before.materials]
-        self.result = replace(before, materials=tuple(materials))
+        yield from self._finish(before, materials, 1 - 2 * attempt)
+
+    def _finish(
+        self, result: CaptureResult, materials: Sequence[MaterialResult], start: float
+    ) -> Iterator[Step]:
+        """With the portable forms of those materials that have none, from ``start`` of the job."""
+        done = []
+        share = (1 - start) / len(materials)
+        for index, material in enumerate(materials):
+            done.append((yield from with_portable(material, start + index * share, share)))
+        self.result = replace(result, materials=tuple(done))
 
     def _with(
         self, before: CaptureResult, found: Found, chosen: Sequence[Trial], done: float

@@ -96,7 +96,9 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
         ]
         error = None
         if not set(cause.split("+")) & set(OWN_BRDF):
-            again = FitJob(read_capture(plain / "hunt.capture.toml"), threads=threads)
+            again = FitJob(
+                read_capture(plain / "hunt.capture.toml"), threads=threads, portable=False
+            )
             again.drain()
             assert again.result is not None
             error = _brdf_error(after, truth) / _brdf_error(again.result, truth)
