@@ -18,7 +18,7 @@ DIM = 0.02  # of the bright pixels: darker ones are not looked at
 BESIDE = 2.0  # pixels from the edge of a shadow of the object's own, whose place is not so exact
 AROUND, MOST = 8, 6  # pixels nearest in the photo, itself included; so many of them dark
 FEWEST = 12  # pixels of a spot
-ACROSS = 5  # squares along a photo's longer side that a large spot is cut by
+ACROSS = 5  # squares along a photo's longer side that a spot is cut by: it may be of two shadows
 APART = 1e3  # between photos
 
 
@@ -41,16 +41,14 @@ def dark_spots(pixels: Pixels, shown: Array) -> NDArray[np.intp]:
     core = np.flatnonzero(dark[near].sum(axis=1) >= MOST)
     if not len(core):
         return out
-    mine = np.flatnonzero(dark)[core]
-    joined = [(mine[:, None] + 0 * near[core]).ravel(), near[core].ravel()]
-    both = dark[joined[1]]
-    graph = coo_array((both[both], (joined[0][both], joined[1][both])), (len(rows), len(rows)))
+    one, other = np.repeat(np.flatnonzero(dark)[core], AROUND), near[core].ravel()
+    one, other = one[dark[other]], other[dark[other]]
+    graph = coo_array((np.ones(len(one)), (one, other)), (len(rows), len(rows)))
     spot = connected_components(graph, directed=False)[1]
+    inside = np.zeros(len(rows), bool)
+    inside[one] = inside[other] = True
+    kept = inside & (np.bincount(spot, inside)[spot] >= FEWEST)
     cell = cell_numbers(pixels.photo, pixels.x, pixels.y, ACROSS)[rows]
-    touched = np.zeros(len(rows), bool)
-    touched[mine] = touched[joined[1][both]] = True
-    spot = np.unique(np.stack([spot, cell]), axis=1, return_inverse=True)[1].ravel()
-    count = np.bincount(spot, touched)
-    kept = touched & (count[spot] >= FEWEST)
-    out[rows[kept]] = np.unique(spot[kept], return_inverse=True)[1].ravel()
+    part = np.stack([spot[kept], cell[kept]])
+    out[rows[kept]] = np.unique(part, axis=1, return_inverse=True)[1].ravel()
     return out

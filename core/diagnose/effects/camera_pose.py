@@ -34,7 +34,6 @@ class CameraPose(Effect):
     x: Array
     y: Array
     cause = "camera_pose"
-    of_photo = True
     proof = "the same photos aligned again, with more landmarks"
 
     @classmethod
