@@ -39,6 +39,7 @@ Vector = NDArray[np.float64]
 CHANCE = 0.02  # of a false alarm, over all effects that are tried
 LEAST_CHANGE = 0.005  # RMS of the photos: less is not worth a word,
 PLAIN = 0.05  # nats a pixel and channel, unless it gains this much
+OUTSIDE = 0.002  # RMS of the photos that the slack beside the basis has to explain to be named
 MOST_EFFECTS = 4
 SURE = 3.0  # standard errors over squares that a gain is above 0
 NEARLY = 0.93  # of the best gain
@@ -300,7 +301,8 @@ def _outside(now: Fitted, kept: Sequence[Trial]) -> list[Trial]:
     unseen = replace(unseen, variance=(*unseen.variance, np.zeros(0)))
     trial = Trial(effect, said, unseen, by_square(squares(now), gains), change, 0.0)
     gained = sum(t.gain for t in kept)
-    return [trial] if trial.convincing and trial.gain > MINOR * gained else []
+    sure = trial.gain > max(SURE * trial.error, MINOR * gained)
+    return [trial] if sure and change > OUTSIDE else []
 
 
 def _missed_where_bright(now: Fitted) -> Array:

@@ -27,6 +27,7 @@ class CastShadow(PatchEffect):
     cause = "cast_shadow"
     proof = "a photo of everything that stands about the object, from the lamp"
     fine = True
+    accuracy = 0.01  # pixels at the edge of a spot lose less
 
     @classmethod
     def of(cls, setting: Setting) -> CastShadow | None:
