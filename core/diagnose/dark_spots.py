@@ -8,6 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..angles import half_difference
 from .image_cells import cell_numbers
 from .pixels import Pixels
 
@@ -15,7 +16,9 @@ Array = NDArray[np.floating]
 
 DARKER = 0.3  # of what is predicted, missed
 DIM = 0.02  # of the bright pixels: darker ones are not looked at
+HIGHLIGHT = np.radians(12.0)  # θh, within which nothing is looked for
 BESIDE = 2.0  # pixels from the edge of a shadow of the object's own, whose place is not so exact
+APART_FROM = 6.0  # pixels from that edge that a spot keeps
 AROUND, MOST = 8, 6  # pixels nearest in the photo, itself included; so many of them dark
 FEWEST = 12  # pixels of a spot
 ACROSS = 5  # squares along a photo's longer side that a spot is cut by: it may be of two shadows
@@ -26,11 +29,14 @@ def dark_spots(pixels: Pixels, shown: Array) -> NDArray[np.intp]:
     """(n,) number of the spot that each pixel is in, −1 none. shown: (n, 3) prediction.
 
     A pixel belongs to a spot where nearly all pixels about it are too dark as well: single ones are
-    noise, dust, or a fold that the mesh does not have.
+    noise, dust, or a fold that the mesh does not have. A spot that the object's own shadow touches
+    is more likely that shadow, a little larger than the mesh makes it; and a highlight that is not
+    where it should be is the normals' doing.
     """
     level, seen = shown.sum(axis=1), pixels.observed.sum(axis=1)
     lit = (level > DIM * np.percentile(level, 90)) & (pixels.visible > 0) & pixels.usable
-    rows = np.flatnonzero(lit & (pixels.edge > BESIDE))
+    theta_h = half_difference(pixels.normal, pixels.light, pixels.view).theta_h
+    rows = np.flatnonzero(lit & (pixels.edge > BESIDE) & (theta_h > HIGHLIGHT))
     out = np.full(len(level), -1, np.intp)
     if len(rows) < AROUND:
         return out
@@ -47,7 +53,9 @@ def dark_spots(pixels: Pixels, shown: Array) -> NDArray[np.intp]:
     spot = connected_components(graph, directed=False)[1]
     inside = np.zeros(len(rows), bool)
     inside[one] = inside[other] = True
-    kept = inside & (np.bincount(spot, inside)[spot] >= FEWEST)
+    beside = np.bincount(spot, inside & (pixels.edge[rows] < APART_FROM))
+    count = np.bincount(spot, inside)
+    kept = inside & (count[spot] >= FEWEST) & (beside[spot] == 0)
     cell = cell_numbers(pixels.photo, pixels.x, pixels.y, ACROSS)[rows]
     part = np.stack([spot[kept], cell[kept]])
     out[rows[kept]] = np.unique(part, axis=1, return_inverse=True)[1].ravel()
