@@ -9,20 +9,19 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..angles import half_difference
-from .image_cells import cell_numbers
+from .image_cells import cell_numbers, places_apart
 from .pixels import Pixels
 
 Array = NDArray[np.floating]
 
 DARKER = 0.3  # of what is predicted, missed
-DIM = 0.02  # of the bright pixels: darker ones are not looked at
+DIM = 0.02  # of the photos' bright pixels: darker ones give no ratio
 HIGHLIGHT = np.radians(12.0)  # θh, within which nothing is looked for
 BESIDE = 2.0  # pixels from the edge of a shadow of the object's own, whose place is not so exact
 APART_FROM = 6.0  # pixels from that edge that a spot keeps
 AROUND, MOST = 8, 6  # pixels nearest in the photo, itself included; so many of them dark
 FEWEST = 12  # pixels of a spot
 ACROSS = 5  # squares along a photo's longer side that a spot is cut by: it may be of two shadows
-APART = 1e3  # between photos
 
 
 def dark_spots(pixels: Pixels, shown: Array) -> NDArray[np.intp]:
@@ -41,8 +40,7 @@ def dark_spots(pixels: Pixels, shown: Array) -> NDArray[np.intp]:
     if len(rows) < AROUND:
         return out
     dark = seen[rows] < (1 - DARKER) * level[rows]
-    half = np.ptp(pixels.x) + np.ptp(pixels.y) + 1.0
-    place = np.stack([pixels.x, pixels.y, half * APART * pixels.photo], axis=1)[rows]
+    place = places_apart(pixels.photo, pixels.x, pixels.y)[rows]
     near = cKDTree(place).query(place[dark], AROUND)[1]
     core = np.flatnonzero(dark[near].sum(axis=1) >= MOST)
     if not len(core):

@@ -22,7 +22,7 @@ from .slopes import Slopes, slopes_of
 Array = NDArray[np.floating]
 
 FOLDS = 5
-MOST_GROUPS = 12  # of photos, left out one after the other
+FEWEST_GROUPS, MOST_GROUPS = 3, 12  # of photos, left out one after the other
 STILL_KNOWN = 25.0  # times the variance of a number where a part of the photos is left out
 
 
@@ -62,28 +62,35 @@ def predict_unseen(fitted: Fitted, fine: bool = False) -> Unseen:
 def predict_unseen_photos(fitted: Fitted) -> Unseen | None:
     """At an optimum, whole photos left out, a fifth of them at a time; numbers that are a photo's
     own are then not known. None where there is one photo only."""
-    photos, place = np.unique(fitted.model.pixels.photo, return_inverse=True)
-    if len(photos) < 2:
-        return None
-    return _unseen(fitted, (place.ravel() % min(FOLDS, len(photos))).astype(np.int32))
+    of = _photos(fitted, FOLDS)
+    return _unseen(fitted, of) if of.max() > 0 else None
+
+
+def _photos(fitted: Fitted, most: int) -> NDArray[np.int32]:
+    """(n,) group of each pixel's photo, one a photo unless there are more than ``most``."""
+    place = np.unique(fitted.model.pixels.photo, return_inverse=True)[1]
+    return (place.ravel() % most).astype(np.int32)
 
 
 def _unseen(fitted: Fitted, of: NDArray[np.int32]) -> Unseen:
     """of: (n,) fold of every pixel."""
     slopes = slopes_of(fitted)
-    rows = [np.flatnonzero(of == f) for f in range(int(of.max()) + 1)]
-    parts = [Equations.of(fitted, slopes, r) for r in rows]
-    whole = parts[0]
-    for part in parts[1:]:
-        whole = whole.plus(part)
+    whole, others = _left_out(fitted, slopes, of)
     residual = np.array(fitted.residual, np.float64)
-    others = []
-    for part, mine in zip(parts, rows, strict=True):
-        change = whole.plus(part, -1.0).solved(fitted)
+    for fold, change in enumerate(others):
+        mine = np.flatnonzero(of == fold)
         residual[mine] -= _moved(fitted, slopes, mine, change)
-        others.append(change)
-    variance = _by_effect(fitted, whole.solved(fitted), others)
+    variance = _by_effect(fitted, whole, others)
     return Unseen(residual, robust(residual).sum(axis=1), variance)
+
+
+def _left_out(fitted: Fitted, slopes: Slopes, of: NDArray[np.int32]) -> tuple[Change, list[Change]]:
+    """The steps that all pixels ask for, and that they do without each of the parts (n,)."""
+    parts = [
+        Equations.of(fitted, slopes, np.flatnonzero(of == part)) for part in range(of.max() + 1)
+    ]
+    whole = reduce(Equations.plus, parts)
+    return whole.solved(fitted), [whole.plus(part, -1.0).solved(fitted) for part in parts]
 
 
 def variances(fitted: Fitted) -> tuple[Array, ...]:
@@ -97,15 +104,10 @@ def variances_by_photos(fitted: Fitted, before: tuple[Array, ...]) -> tuple[Arra
     """Of the numbers of each effect, but no less than what they move by when photos are left out:
     what a photo's camera pose or exposure is off by errs alike all over it. before: as they are
     otherwise known to be."""
-    photos, place = np.unique(fitted.model.pixels.photo, return_inverse=True)
-    if len(photos) < 3:
+    of = _photos(fitted, MOST_GROUPS)
+    if of.max() < FEWEST_GROUPS - 1:
         return before
-    of = place.ravel() % MOST_GROUPS
-    slopes = slopes_of(fitted)
-    parts = [Equations.of(fitted, slopes, np.flatnonzero(of == g)) for g in range(of.max() + 1)]
-    whole = reduce(Equations.plus, parts)
-    others = [whole.plus(part, -1.0).solved(fitted) for part in parts]
-    found = _by_effect(fitted, whole.solved(fitted), others)
+    found = _by_effect(fitted, *_left_out(fitted, slopes_of(fitted), of))
     return tuple(np.maximum(a, b) for a, b in zip(found, before, strict=True))
 
 

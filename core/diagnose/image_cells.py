@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.floating]
 
+APART = 1e3  # between two photos, in the unit of x and y
+
 
 def from_centre(
     pixel: NDArray[np.integer], width: int, height: int
@@ -17,6 +19,11 @@ def from_centre(
     half = 0.5 * np.hypot(width, height)
     x, y = (column + 0.5 - width / 2) / half, (row + 0.5 - height / 2) / half
     return x.astype(np.float32), y.astype(np.float32)
+
+
+def places_apart(photo: NDArray, x: Array, y: Array) -> NDArray[np.float64]:
+    """(n, 3) places in which no pixel of another photo is near."""
+    return np.stack([x, y, APART * photo.astype(np.float64)], axis=1)
 
 
 def cell_places(photo: NDArray, x: Array, y: Array, across: int) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from .change import rms_change
 from .fitted import Fitted, robust
 from .held_out import by_square, error_of_sum
-from .image_cells import cell_numbers, cell_places
+from .image_cells import cell_numbers, cell_places, places_apart
 
 Array = NDArray[np.floating]
 
@@ -62,7 +62,7 @@ def _leftover(fitted: Fitted, across: int) -> Leftover:
     pixels = fitted.model.pixels
     column, row = cell_places(pixels.photo, pixels.x, pixels.y, across)
     cell = cell_numbers(pixels.photo, pixels.x, pixels.y, across)
-    place = np.stack([column, row, 1e3 * pixels.photo], axis=1)
+    place = places_apart(pixels.photo, column, row)
     counted = np.flatnonzero(np.isfinite(fitted.deviation).all(axis=1))
     near, which = cKDTree(place[counted]).query(
         place, min(NEIGHBOURS, len(counted)), distance_upper_bound=REACH

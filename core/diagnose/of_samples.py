@@ -15,10 +15,9 @@ from ..samples import SampleTable
 from ..scan import Scan
 from .choose import REACH, photo_slopes, photo_veil
 from .effect import Near
-from .image_cells import from_centre
+from .image_cells import from_centre, places_apart
 from .pixels import Pixels
 
-APART = 1e3  # half diagonals between two photos
 SIDE = 0.02  # of the object's size, that surfaces at right angles count as farther apart
 
 
@@ -57,15 +56,13 @@ def nearest(pixels: Pixels, looked_at: Pixels, size: float) -> Near:
     """Of each pixel (n,) those of the others that are nearest in the same photo (where it has none,
     in another one) and on the surface, the two sides of a thin wall apart; size: of the object."""
     return Near(
-        np.asarray(cKDTree(_in_photos(looked_at)).query(_in_photos(pixels))[1], np.intp),
-        np.asarray(
-            cKDTree(_on_surface(looked_at, size)).query(_on_surface(pixels, size))[1], np.intp
-        ),
+        _nearest(*(places_apart(p.photo, p.x, p.y) for p in (looked_at, pixels))),
+        _nearest(*(_on_surface(p, size) for p in (looked_at, pixels))),
     )
 
 
-def _in_photos(pixels: Pixels) -> NDArray[np.float64]:
-    return np.stack([pixels.x, pixels.y, APART * pixels.photo.astype(np.float64)], axis=1)
+def _nearest(places: NDArray[np.floating], of: NDArray[np.floating]) -> NDArray[np.intp]:
+    return np.asarray(cKDTree(places).query(of)[1], np.intp)
 
 
 def _on_surface(pixels: Pixels, size: float) -> NDArray[np.float64]:

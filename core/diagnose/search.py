@@ -7,14 +7,16 @@ effect has to be missed if it is taken out again.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .chance import Asked, asked
 from .change import rms_change
+from .dark_spots import DIM
 from .deviation import as_found
 from .effect import Effect, Setting
 from .effects.outside_basis import OutsideBasis
@@ -35,6 +37,7 @@ from .unseen_error import UnseenError, unseen_error
 
 Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
+Costs = Callable[[bool], Array]
 
 CHANCE = 0.02  # of a false alarm, over all effects that are tried
 LEAST_CHANGE = 0.005  # RMS of the photos: less is not worth a word,
@@ -45,7 +48,6 @@ SURE = 3.0  # standard errors over squares that a gain is above 0
 NEARLY = 0.93  # of the best gain
 TRIED, PROMISING = 4, 0.25  # so many are fitted at least; and all that promise this of the best
 UNLIKELY = 0.05  # chance of effects of patches that are fitted
-DIM = 0.02  # of the photos' bright pixels: darker ones give no ratio
 MINOR = 0.05  # of what accepted effects gained: less is more likely what their model lacks
 EXPECTATIONS = 1  # rounds in which patches say what is usual among them
 ALIKE = 2.0  # standard errors by which gains differ that the photos cannot tell apart
@@ -237,8 +239,8 @@ def _simplest(trials: Sequence[Trial]) -> Trial | None:
     return replace(best, ties=tuple(same))
 
 
-def _try(now: Fitted, costs: dict[bool, Array], one: Asked) -> Trial:
-    """costs: _costs(now)."""
+def _try(now: Fitted, costs: Costs, one: Asked) -> Trial:
+    """costs: _costs(now): where large squares are left out (False), or single pixels."""
     effect, fine = one.effect, one.effect.fine
     fitted = fit(
         now.model.with_effect(effect, effect.guess(_missed_where_bright(now), now.shown)),
@@ -250,7 +252,7 @@ def _try(now: Fitted, costs: dict[bool, Array], one: Asked) -> Trial:
         fitted = fit(replace(model, brdfs=fitted.model.brdfs, x=fitted.model.x), now.deviation)
     unseen = predict_unseen(fitted, fine)
     # what is confined to a few squares could never be sure
-    gained = by_square(squares(now, fine), costs[fine] - unseen.cost)
+    gained = by_square(squares(now, fine), costs(fine) - unseen.cost)
     own = effect.patch is None and len(effect.numbers) > 0
     without = without_last(fitted.model) if own else now.shown
     change = rms_change(fitted.shown, without, now.deviation)
@@ -272,7 +274,7 @@ def without_last(model: Model) -> Array:
     return replace(model, x=(*model.x[:-1], x - effect.told(x))).predicted()
 
 
-def _remade(now: Fitted, costs: dict[bool, Array], best: Trial, setting: Setting) -> Trial:
+def _remade(now: Fitted, costs: Costs, best: Trial, setting: Setting) -> Trial:
     """With the BRDFs that are found when the effect is in the model: those without it hold a part
     of it."""
     effect = best.effect.of(replace(setting, brdfs=best.fitted.model.brdfs))
@@ -280,9 +282,9 @@ def _remade(now: Fitted, costs: dict[bool, Array], best: Trial, setting: Setting
     return _try(now, costs, Asked(effect, best.gain, best.chance))
 
 
-def _costs(now: Fitted) -> dict[bool, Array]:
-    """(n,) of the model as it is, where large squares are left out (False) and small ones."""
-    return {fine: predict_unseen(now, fine).cost for fine in (False, True)}
+def _costs(now: Fitted) -> Costs:
+    """(n,) of the model as it is, found when they are asked for, and once."""
+    return cache(lambda fine: predict_unseen(now, fine).cost)
 
 
 def _outside(now: Fitted, kept: Sequence[Trial]) -> list[Trial]:

@@ -69,21 +69,6 @@ class Scene:
         shots = [shot.small for shot in self.shots]
         return replace(self, shots=shots, plain=[_halved(p) for p in self.plain])
 
-    def sought(
-        self,
-        photos: Callable[[Scene, float], list[Array]],
-        start: float,
-        power: float = 1.0,
-        most: float = np.inf,
-    ) -> float:
-        """The size at which small photos (scene, size) change by the wanted strength."""
-        small = self.small
-
-        def change(size: float) -> float:
-            return rms(photos(small, size), small.plain)
-
-        return sought(change, start, self.strength, power, most)
-
     def made(
         self,
         photos: Callable[[Scene, float], list[Array]],
@@ -91,17 +76,21 @@ class Scene:
         power: float = 1.0,
         most: float = np.inf,
     ) -> tuple[float, list[Array], float]:
-        """(size, photos, their change) of the wanted strength. Outlines and edges of shadows, which
-        do not count, are a larger part of small photos: where whole ones change otherwise, the size
-        is sought once more."""
-        size = self.sought(photos, start, power, most)
+        """(size, photos of (scene, size), their change) of the wanted strength, sought in small
+        photos. Outlines and edges of shadows, which do not count, are a larger part of these: where
+        whole ones change otherwise, the size is sought once more."""
+        small = self.small
+
+        def change(size: float) -> float:
+            return rms(photos(small, size), small.plain)
+
+        size = sought(change, start, self.strength, power, most)
         found = photos(self, size)
         changed = rms(found, self.plain)
         off = changed / self.strength
         if abs(off - 1) < OFF or (size >= most and off < 1):
             return size, found, changed
-        aside = replace(self, strength=self.strength / off)
-        size = aside.sought(photos, size / off ** (1 / power), power, most)
+        size = sought(change, size / off ** (1 / power), self.strength / off, power, most)
         found = photos(self, size)
         return size, found, rms(found, self.plain)
 
