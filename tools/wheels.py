@@ -28,6 +28,7 @@ PINS = {
     "scipy": "1.15.3",
     "defusedxml": "0.7.1",
     "sunposition": "1.2.1",
+    "threadpoolctl": "3.8.0",
 }
 
 OPTIONAL = {"rawpy": "0.28.0"}
@@ -44,6 +45,7 @@ TAGS = {
     "scipy": ("manylinux_2_17_x86_64.manylinux2014_x86_64", "win_amd64", "macosx_12_0_arm64"),
     "defusedxml": None,
     "sunposition": None,
+    "threadpoolctl": None,
     "rawpy": ("manylinux_2_27_x86_64.manylinux_2_28_x86_64", "win_amd64", "macosx_11_0_arm64"),
 }
 """Per library the platform part of its wheels' names, in the order of PLATFORMS; None: pure Python.

@@ -65,9 +65,18 @@ class BRDFs:
 
     def slope(self, now: Situation) -> Array:
         """(n, 3) ∂ radiance/∂ ln(ρ·cosMap + ε)."""
-        rho = self.evaluate(now.angles, now.pixels.material)
-        return (rho + mapping.EPSILON / mapping.cos_map(now.angles)[:, None]) * now.received
+        return self.reflected(now) + _offset(now)
+
+    def lit(self, now: Situation) -> Array:
+        """(n, 6) both."""
+        reflected = self.reflected(now)
+        return np.concatenate([reflected, reflected + _offset(now)], axis=1)
 
     def rows(self, angles: Angles) -> Array:
         """Q̂ (n, k): ∂ρ/∂c = (ρ + ε / cosMap) Q̂."""
         return self.basis.rows(angles, self.coefficients.shape[2])[1]
+
+
+def _offset(now: Situation) -> Array:
+    """(n, 3) radiance of a BRDF ε / cosMap: what the mapping adds before it takes the logarithm."""
+    return (mapping.EPSILON / mapping.cos_map(now.angles))[:, None] * now.received

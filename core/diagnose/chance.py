@@ -10,12 +10,14 @@ likely.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import gamma
 
+from ..job.in_order import in_order
 from .effect import Effect
 from .fitted import Fitted
 from .scores import scores
@@ -37,20 +39,24 @@ class Asked:
     chance: float
 
 
-def asked(now: Fitted, effects: Sequence[Effect]) -> list[Asked]:
-    """Of the model without any of them, best first."""
+def asked(
+    now: Fitted, effects: Sequence[Effect], pool: ThreadPoolExecutor | None = None
+) -> list[Asked]:
+    """Of the model without any of them, best first. pool: threads that ask side by side."""
     _, of = np.unique(now.model.pixels.block, return_inverse=True)
     signs = np.random.default_rng(1).choice([-1.0, 1.0], (DRAWS, int(of.max()) + 1))
-    found, drawn = [], []
-    for effect in effects:
+
+    def ask(effect: Effect) -> tuple[Asked, Vector | None]:
         if not len(effect.numbers) or effect.fine:  # signs of squares tell nothing of single pixels
-            found.append(Asked(effect, np.inf, 0.0))
-            continue
+            return Asked(effect, np.inf, 0.0), None
         pulls, metric = _scores(now, effect, of)
-        drawn.append(_length(signs @ pulls, metric))
+        draws = _length(signs @ pulls, metric)
         value = float(_length(pulls.sum(axis=0)[None], metric)[0])
-        promised = (value - float(drawn[-1].mean())) / 2  # beyond what chance gives
-        found.append(Asked(effect, promised, float(_tail(drawn[-1], np.array([value]))[0])))
+        promised = (value - float(draws.mean())) / 2  # beyond what chance gives
+        return Asked(effect, promised, float(_tail(draws, np.array([value]))[0])), draws
+
+    answers = list(in_order(pool, ask, effects, ahead=len(effects)))
+    found, drawn = [a for a, _ in answers], [d for _, d in answers if d is not None]
     if drawn:
         # each effect's own distribution makes effects of different freedom comparable
         luckiest = np.sort(np.min([_tail(d, d) for d in drawn], axis=0))

@@ -8,6 +8,7 @@ choice looks at geometry alone, never at what a pixel shows, so it does not bias
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from ..capture import Capture
 from ..errors import FitError
 from ..geometry import PixelRays, RayScene, SurfaceView, Window, bands, edges, view_window
 from ..job import inputs
+from ..job.in_order import in_order
 from ..job.lights import Lights
 from ..job.photos import LitPhoto, LitPhotos
 from ..light import Light
@@ -32,6 +34,7 @@ from .pixels import Pixels
 Array = NDArray[np.float32]
 
 COUNT = 24_000  # pixels of all photos
+AHEAD = 2  # photos in memory beside the one that is waited for
 REACH = 8  # pixels from the edge of a shadow that are told apart
 HIGHLIGHT = np.radians(15.0)  # θh
 BLOCKS = 6  # parts of a photo along the longer side of what it shows of the object
@@ -48,16 +51,21 @@ def choose_pixels(
     rays: RayScene,
     photos: LitPhotos,
     lights: Lights,
+    pool: ThreadPoolExecutor | None,
     count: int = COUNT,
 ) -> Generator[float, None, Pixels]:
-    """Yields the fraction done. Raises InputError for photos and masks that cannot be read,
-    FitError where no photo shows a material."""
+    """Yields the fraction done. pool: threads that look at photos side by side. Raises InputError
+    for photos and masks that cannot be read, FitError where no photo shows a material."""
     each = max(200, count // max(len(capture.photos), 1))
+
+    def of_photo(place: int) -> Pixels | None:
+        return _of_photo(capture, scan, rays, photos, lights, place, each)
+
     found = []
-    for place in range(len(capture.photos)):
-        yield place / len(capture.photos)
-        part = _of_photo(capture, scan, rays, photos, lights, place, each)
+    places = range(len(capture.photos))
+    for place, part in enumerate(in_order(pool, of_photo, places, ahead=AHEAD)):
         found += [] if part is None else [part]
+        yield (place + 1) / len(places)
     if not found:
         raise FitError("no photo shows a material, in light or in shadow: expected one that does")
     return Pixels.join(found)

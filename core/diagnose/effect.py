@@ -207,6 +207,12 @@ class Effect(ABC):
             return None
         return felt_by(self.patch, len(self.numbers) // (int(self.patch.max()) + 1))
 
+    @property
+    def lights(self) -> bool:
+        """Whether it changes surface or lamp, and so what the surface reflects of the lamp."""
+        kind = type(self)
+        return kind.before is not Effect.before or kind.lamps is not Effect.lamps
+
     def before(self, now: Situation, x: NDArray[np.float64]) -> Situation:
         """Surface and light with the effect."""
         return now

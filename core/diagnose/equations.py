@@ -28,7 +28,7 @@ DENSE = 48  # numbers, up to which a full matrix is faster
 @dataclass(frozen=True)
 class Change:
     """A step: of the coefficients (m, 3, k), of the numbers (p,), of the patches' (P · e,); and the
-    covariance (p, p) of the numbers, the variances (P · e,) of the patches'."""
+    covariance (p, p) of the numbers, the variances (P · e,) of the patches', where asked for."""
 
     coefficients: Array
     x: Vector
@@ -98,10 +98,11 @@ class Equations:
         names = [f.name for f in fields(self)]
         return Equations(**{n: getattr(self, n) + times * getattr(other, n) for n in names})
 
-    def solved(self, fitted: Fitted) -> Change:
-        """The prior included; numbers that a bound holds stay."""
+    def solved(self, fitted: Fitted, spread: bool = False) -> Change:
+        """The prior included; numbers that a bound holds stay. spread: with the variances of the
+        patches' numbers, which take longest."""
         if len(self.local):
-            return self._solved_with_patches(fitted)
+            return self._solved_with_patches(fitted, spread)
         model = fitted.model
         variance = model.brdfs.variance
         m, _, k = model.brdfs.coefficients.shape
@@ -125,7 +126,7 @@ class Equations:
         none = np.zeros(0)
         return Change(change.reshape(m, 3, k), x, none, covariance, none)
 
-    def _solved_with_patches(self, fitted: Fitted) -> Change:
+    def _solved_with_patches(self, fitted: Fitted, spread: bool) -> Change:
         """Patches eliminated first: what is left is full, but small."""
         model = fitted.model
         assert model.patchy is not None
@@ -152,17 +153,19 @@ class Equations:
         right = right - lean @ pull
         stuck = np.concatenate([np.zeros(size, bool), _held(fitted, right[size:])])
         free = np.flatnonzero(~stuck)
-        covariance = np.zeros_like(full)
-        covariance[np.ix_(free, free)] = np.linalg.inv(full[np.ix_(free, free)])
-        z = covariance @ right
+        known = np.concatenate([right[:, None], np.eye(size + p)[:, size:]], axis=1)
+        solved = np.zeros((size + p, 1 + p))
+        solved[free] = np.linalg.solve(full[np.ix_(free, free)], known[free])
+        z, covariance = solved[:, 0], solved[size:, 1:]
         local = _blockwise(inverse, pull) - lean.T @ z
-        alone = np.einsum("pee->pe", inverse).ravel()
-        both = np.einsum("sy,st,ty->y", lean, covariance, lean, optimize=True)
-        spread = np.where(held, 0, alone + both)
+        variance = np.zeros(0)
+        if spread:
+            alone = np.einsum("pee->pe", inverse).ravel()
+            through = np.linalg.solve(full[np.ix_(free, free)], lean[free])
+            variance = np.where(held, 0, alone + np.einsum("sy,sy->y", lean[free], through))
         return Change(
-            z[:size].reshape(m, 3, k), z[size:], np.where(held, 0, local),
-            covariance[size:, size:], spread,
-        )  # fmt: skip
+            z[:size].reshape(m, 3, k), z[size:], np.where(held, 0, local), covariance, variance
+        )
 
     def _local(self, deviation: Vector, held: NDArray[np.bool_]) -> Array:
         """(P, e, e) with the prior; what is held touches nothing."""

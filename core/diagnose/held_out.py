@@ -90,13 +90,14 @@ def _left_out(fitted: Fitted, slopes: Slopes, of: NDArray[np.int32]) -> tuple[Ch
         Equations.of(fitted, slopes, np.flatnonzero(of == part)) for part in range(of.max() + 1)
     ]
     whole = reduce(Equations.plus, parts)
-    return whole.solved(fitted), [whole.plus(part, -1.0).solved(fitted) for part in parts]
+    others = [whole.plus(part, -1.0).solved(fitted) for part in parts]
+    return whole.solved(fitted, spread=True), others
 
 
 def variances(fitted: Fitted) -> tuple[Array, ...]:
     """Of the numbers of each effect, at an optimum."""
     everything = np.arange(len(fitted.residual))
-    change = Equations.of(fitted, slopes_of(fitted), everything).solved(fitted)
+    change = Equations.of(fitted, slopes_of(fitted), everything).solved(fitted, spread=True)
     return _by_effect(fitted, change, [change])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,16 @@ from .situation import Situation
 
 Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Lit:
+    """now: surface and light with all effects; reflected: (n, 3) radiance of the lamp's light;
+    slope: (n, 3) its ∂/∂ ln(ρ·cosMap + ε)."""
+
+    now: Situation
+    reflected: Array
+    slope: Array
 
 
 @dataclass(frozen=True)
@@ -110,7 +121,7 @@ class Model:
         return self.footprint.plain_rows(self.brdfs, now)
 
     def mean(self, lamps: Sequence[Situation], of: Callable[[Situation], Array]) -> Array:
-        """(n, 3) means over the lamp's parts and the pixel's."""
+        """(n, d) means of ``of`` over the lamp's parts and the pixel's."""
         if len(lamps) > 1:
             return np.asarray(sum(of(now) for now in lamps) / len(lamps))
         assert self.footprint is not None
@@ -121,6 +132,13 @@ class Model:
     def reflected(self, lamps: Sequence[Situation]) -> Array:
         """(n, 3) radiance of the lamp's light."""
         return self.mean(lamps, self.brdfs.reflected)
+
+    @cached_property
+    def lit(self) -> Lit:
+        """Of the model as it is."""
+        now = self.situation()
+        both = self.mean(self.lamps(now), self.brdfs.lit)
+        return Lit(now, both[:, :3], both[:, 3:])
 
     def entering(
         self, reflected: Array, now: Situation, x: Sequence[Vector] | None = None
@@ -141,6 +159,13 @@ class Model:
 
     def predicted(self, x: Sequence[Vector] | None = None) -> Array:
         """(n, 3) what the photos show."""
+        if x is None:
+            return self.shown(self.lit)
         now = self.situation(x)
         reflected = self.reflected(self.lamps(now, x))
         return self.recorded(self.entering(reflected, now, x), now, x)
+
+    def shown(self, lit: Lit, x: Sequence[Vector] | None = None) -> Array:
+        """(n, 3) what the photos show of light; x differs from its model's in numbers that change
+        neither surface nor lamp."""
+        return self.recorded(self.entering(lit.reflected, lit.now, x), lit.now, x)

@@ -8,12 +8,15 @@ effect has to be missed if it is taken out again.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..job.in_order import in_order
 from .chance import Asked, asked
 from .change import rms_change
 from .dark_spots import DIM
@@ -161,9 +164,14 @@ class Found:
 
 
 def search(
-    model: Model, deviation: Array, effects: Sequence[Effect], setting: Setting
+    model: Model,
+    deviation: Array,
+    effects: Sequence[Effect],
+    setting: Setting,
+    pool: ThreadPoolExecutor | None = None,
 ) -> Generator[float, None, Found]:
-    """Yields the fraction done. setting: that the effects were made for."""
+    """Yields the fraction done. setting: that the effects were made for. pool: threads that try
+    effects side by side."""
     now = fit(model, deviation)
     expected = deviation
     deviation = as_found(deviation, now.residual, now.shown, model.pixels)
@@ -177,12 +185,13 @@ def search(
         trials, costs = [], _costs(now)
         promising = [
             one
-            for one in _promising(asked(now, left))
+            for one in _promising(asked(now, left, pool))
             if one.gain > refused.get(one.effect.cause, -np.inf)
         ]
-        for place, one in enumerate(promising):
-            trials.append(_try(now, costs, one))
-            if trials[-1].gain < 0:  # once is enough, unless it promises more
+        tried = in_order(pool, partial(_try, now, costs), promising, ahead=len(promising))
+        for place, (one, trial) in enumerate(zip(promising, tried, strict=True)):
+            trials.append(trial)
+            if trial.gain < 0:  # once is enough, unless it promises more
                 refused[one.effect.cause] = one.gain
             yield (turn + (place + 1) / (len(promising) + 1)) / MOST_EFFECTS
         trials.sort(key=lambda t: -t.gain)
@@ -196,7 +205,7 @@ def search(
         accepted.append(best)
         now = best.fitted
         left = [e for e in left if e.cause != best.effect.cause]
-    now, kept = _missed(before, now, accepted)
+    now, kept = _missed(before, now, accepted, pool)
     kept = (*map(_by_photos, kept), *_outside(now, kept))
     unseen = predict_unseen(before), predict_unseen(now)
     return Found(
@@ -284,7 +293,17 @@ def _remade(now: Fitted, costs: Costs, best: Trial, setting: Setting) -> Trial:
 
 def _costs(now: Fitted) -> Costs:
     """(n,) of the model as it is, found when they are asked for, and once."""
-    return cache(lambda fine: predict_unseen(now, fine).cost)
+    one_at_a_time = Lock()
+
+    @cache
+    def costs(fine: bool) -> Array:
+        return predict_unseen(now, fine).cost
+
+    def locked(fine: bool) -> Array:
+        with one_at_a_time:
+            return costs(fine)
+
+    return locked
 
 
 def _outside(now: Fitted, kept: Sequence[Trial]) -> list[Trial]:
@@ -327,21 +346,23 @@ def _usual(fitted: Fitted) -> Vector:
 
 
 def _missed(
-    before: Fitted, now: Fitted, accepted: Sequence[Trial]
+    before: Fitted, now: Fitted, accepted: Sequence[Trial], pool: ThreadPoolExecutor | None
 ) -> tuple[Fitted, tuple[Trial, ...]]:
     """The model without those effects that it predicts as well without, and the trials of the rest:
     what each gains in the whole model."""
     kept = list(accepted)
+
+    def anew(trial: Trial) -> Trial:
+        others = before.model
+        for other in kept:
+            if other is not trial:
+                others = others.with_effect(other.effect, other.x)
+        without = fit(others, now.deviation)
+        found = _try(without, _costs(without), Asked(trial.effect, 0.0, trial.chance))
+        return replace(found, ties=trial.ties)
+
     while len(kept) > 1:
-        again = []
-        for trial in kept:
-            others = before.model
-            for other in kept:
-                if other is not trial:
-                    others = others.with_effect(other.effect, other.x)
-            without = fit(others, now.deviation)
-            found = _try(without, _costs(without), Asked(trial.effect, 0.0, trial.chance))
-            again.append(replace(found, ties=trial.ties))
+        again = list(in_order(pool, anew, kept, ahead=len(kept)))
         worst = min(range(len(kept)), key=lambda k: again[k].gain)
         if again[worst].convincing:
             return again[worst].fitted, tuple(again)

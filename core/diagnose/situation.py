@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +51,7 @@ class Situation:
         """(n,) never below 0."""
         return np.maximum(dot(self.normal, self.light), 0)
 
-    @property
+    @cached_property
     def angles(self) -> Angles:
         """Of every pixel, radians; below the horizon they mean nothing."""
         found = half_difference(self.normal, self.light, self.pixels.view)

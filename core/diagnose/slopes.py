@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from .fitted import Fitted
-from .model import Model
-from .situation import Situation
+from .model import Lit, Model
 
 Array = NDArray[np.floating]
 
@@ -59,14 +58,14 @@ class Slopes:
 def slopes_of(fitted: Fitted) -> Slopes:
     """At the model's present numbers."""
     model, deviation = fitted.model, fitted.deviation
-    now = model.situation()
-    reflected, per_log, q = _reflected(model, now)
-    entering = model.entering(reflected, now)
+    lit = model.lit
+    now, q = lit.now, _rows(model, lit)
+    entering = model.entering(lit.reflected, now)
     recorded = model.recorded(entering, now)
     grown = (1 + RISE) * entering
     camera = (model.recorded(grown, now) - recorded) / np.where(entering > 0, RISE * entering, 1)
     camera = np.where(entering > 0, camera, 1.0)
-    per_log = (per_log * camera / deviation).astype(np.float32)
+    per_log = (lit.slope * camera / deviation).astype(np.float32)
 
     def by_slot(place: int) -> list[Array]:
         effect = model.effects[place]
@@ -94,18 +93,16 @@ def slopes_of(fitted: Fitted) -> Slopes:
     return Slopes(per_log, q, joined, columns, first, local, patch, patches)
 
 
-def _reflected(model: Model, now: Situation) -> tuple[Array, Array, Array]:
-    """((n, 3) the lamp's light reflected, (n, 3) its ∂/∂ ln(ρ·cosMap + ε), Q̂ (n, k)): means over
-    the parts of lamp and pixel, of Q̂ over a few of them, as much as each shows."""
-    parts, brdfs = model.lamps(now), model.brdfs
-    reflected, per_log = model.reflected(parts), model.mean(parts, brdfs.slope)
+def _rows(model: Model, lit: Lit) -> Array:
+    """Q̂ (n, k): means over a few parts of the lamp, as much as each shows."""
+    parts, brdfs = model.lamps(lit.now), model.brdfs
     if len(parts) == 1:
-        return reflected, per_log, model.rows(now)
+        return model.rows(lit.now)
     q = shares = np.zeros((), np.float32)
     for part in parts[:: max(1, len(parts) // FEW)]:
         share = brdfs.slope(part).mean(axis=1, dtype=np.float32)[:, None] + np.float32(1e-12)
         shares, q = shares + share, q + share * model.rows(part)
-    return reflected, per_log, q / shares
+    return np.asarray(q / shares)
 
 
 def _moved(model: Model, place: int, numbers: NDArray[np.intp], step: float) -> Array:
@@ -113,4 +110,5 @@ def _moved(model: Model, place: int, numbers: NDArray[np.intp], step: float) -> 
     x = list(model.x)
     x[place] = x[place].copy()
     x[place][numbers] += step
-    return model.predicted(x)
+    lights = model.effects[place].lights
+    return model.predicted(x) if lights else model.shown(model.lit, x)

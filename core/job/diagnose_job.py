@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import TypeVar
 
@@ -17,6 +18,8 @@ from ..diagnose.model import Model
 from ..diagnose.search import Found, search
 from ..fit.measured_result import MeasuredResult
 from ..steps import relayed
+from .beside import stepped_beside
+from .crew import crew, crew_size
 from .fit_job import CaptureResult, FitJob
 from .job import Job, Step, finished
 
@@ -24,6 +27,7 @@ Result = TypeVar("Result")
 
 UNSAID = 1.0  # degrees: what a scan's normals are off by where the fit does not say it
 SHARE = 0.5  # of the job, the fit
+LOOKING, TRYING = "looking at the photos", "trying what may be wrong"
 
 
 class DiagnoseJob(Job):
@@ -47,23 +51,28 @@ class DiagnoseJob(Job):
         for step in self.fit.run():
             yield Step(step.stage, SHARE * step.fraction)
         result = finished(self.fit.result)
-        self.setting = yield from _stepped(setting_of(result), "looking at the photos", 0.0, 0.1)
-        yield Step("looking at the photos", SHARE + 0.1 * (1 - SHARE))
+        with crew(crew_size(self.fit.threads)) as pool:
+            steps = setting_of(result, pool)
+            self.setting = yield from _stepped(steps, LOOKING, 0.0, 0.1)
+            yield Step(LOOKING, SHARE + 0.1 * (1 - SHARE))
+            self.found = yield from _stepped(self._search(pool), TRYING, 0.1, 1.0)
+
+    def _search(self, pool: ThreadPoolExecutor | None) -> Generator[float, None, Found]:
+        result, setting = finished(self.result), finished(self.setting)
         deviation = pixel_deviation(
-            self.setting.pixels, self.setting.brdfs, np.radians(normal_deviation(result))
+            setting.pixels, setting.brdfs, np.radians(normal_deviation(result))
         )
-        model = Model(self.setting.pixels, self.setting.brdfs)
-        effects = made_for(self.setting)
-        self.found = yield from _stepped(
-            search(model, deviation, effects, self.setting), "trying what may be wrong", 0.1, 1.0
-        )
+        model, effects = Model(setting.pixels, setting.brdfs), made_for(setting)
+        return (yield from search(model, deviation, effects, setting, pool))
 
 
-def setting_of(result: CaptureResult) -> Generator[float, None, Setting]:
+def setting_of(
+    result: CaptureResult, pool: ThreadPoolExecutor | None = None
+) -> Generator[float, None, Setting]:
     """What a diagnosis looks at; yields the fraction done."""
     capture = result.capture
     pixels = yield from choose_pixels(
-        capture, result.scan, result.rays, result.photos, result.lights
+        capture, result.scan, result.rays, result.photos, result.lights, pool
     )
     scale = np.array([material.scale for material in result.materials], np.float32)
     level = float(np.median(pixels.irradiance))
@@ -95,4 +104,6 @@ def _stepped(
 ) -> Generator[Step, None, Result]:
     """Steps of a part of the diagnosis."""
     span = (1 - SHARE) * (end - begin)
-    return relayed(steps, lambda done: Step(stage, SHARE + (1 - SHARE) * begin + span * done))
+    return relayed(
+        stepped_beside(steps), lambda done: Step(stage, SHARE + (1 - SHARE) * begin + span * done)
+    )

@@ -86,12 +86,12 @@ class CaptureResult:
 
 
 def with_portable(
-    material: MaterialResult, start: float, share: float
+    material: MaterialResult, start: float, threads: int | None
 ) -> Generator[Step, None, MaterialResult]:
-    """With its portable form, unless it has it; takes the part ``share`` of a job."""
+    """With its portable form, unless it has it, ``start`` of the job done."""
     if material.portable is not None:
         return material
-    found = yield from fit_portable(material.fit.brdf, material.name, start, share)
+    found = yield from fit_portable(material.fit.brdf, material.name, start, threads)
     warnings = material.warnings
     if found.principled.clipped:
         warnings += ("brighter than any base colour: the Principled material is too dark",)
@@ -259,7 +259,7 @@ class FitJob(Job):
         )
         if not self.portable:
             return material
-        return (yield from with_portable(material, start + 0.8 * share, 0.2 * share))
+        return (yield from with_portable(material, start + 0.8 * share, self.threads))
 
     def _estimate(
         self, index: int, table: SampleTable, basis: Basis, start: float, share: float

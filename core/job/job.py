@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TypeVar
 
+from .crew import plain_blas
+
 R = TypeVar("R")
 
 
@@ -46,7 +48,7 @@ class Job(ABC):
     def step(self) -> bool:
         """Do one piece; False when the job is done. Errors of the work pass through."""
         if self._steps is None:
-            self._steps, self._since = self.run(), time.perf_counter()
+            self._steps, self._since = self._run(), time.perf_counter()
         following = next(self._steps, None)
         if following is None or following.stage != self.now.stage:
             self._close_stage()
@@ -57,6 +59,10 @@ class Job(ABC):
         """All of it at once."""
         while self.step():
             report(self.now)
+
+    def _run(self) -> Iterator[Step]:
+        with plain_blas():
+            yield from self.run()
 
     def _close_stage(self) -> None:
         moment = time.perf_counter()

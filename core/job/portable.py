@@ -9,6 +9,7 @@ from ..appearance.lobe_fit import LobeStackFit, fit_lobe_stack
 from ..appearance.principled_fit import PrincipledFit, fit_principled
 from ..basis import PrincipalBRDF
 from .beside import beside
+from .crew import crew, crew_size
 from .job import Step
 
 
@@ -21,13 +22,23 @@ class Portable:
 
 
 def fit_portable(
-    brdf: PrincipalBRDF, name: str, start: float, share: float
+    brdf: PrincipalBRDF, name: str, start: float, threads: int | None
 ) -> Generator[Step, None, Portable]:
-    """Of a material of that name; takes the part ``share`` of the job from ``start`` on."""
-    step = Step(f"Principled material of {name}", start)
+    """Of a material of that name, ``start`` of the job done; threads: None: one a core."""
+    step = Step(f"{name} in other renderers", start)
     yield step
-    principled = yield from beside(lambda: fit_principled(brdf.evaluate), step)
-    step = Step(f"lobe stack of {name}", start + 0.5 * share)
-    yield step
-    lobes = yield from beside(lambda: fit_lobe_stack(brdf.evaluate), step)
-    return Portable(principled, lobes)
+
+    def principled() -> PrincipledFit:
+        return fit_principled(brdf.evaluate)
+
+    def lobes() -> LobeStackFit:
+        return fit_lobe_stack(brdf.evaluate)
+
+    def both() -> Portable:
+        with crew(min(2, crew_size(threads))) as pool:
+            if pool is None:
+                return Portable(principled(), lobes())
+            stack = pool.submit(lobes)
+            return Portable(principled(), stack.result())
+
+    return (yield from beside(both, step))

@@ -84,7 +84,8 @@ class RefitJob(Job):
         done = []
         share = (1 - start) / len(materials)
         for index, material in enumerate(materials):
-            done.append((yield from with_portable(material, start + index * share, share)))
+            at = start + index * share
+            done.append((yield from with_portable(material, at, self.checked.fit.threads)))
         self.result = replace(result, materials=tuple(done))
 
     def _with(

@@ -7,7 +7,6 @@ by several threads; what comes out is handed on in their order, and is the same 
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -24,17 +23,12 @@ from ..samples.face_votes import FaceVotes
 from ..samples.take import halo, inner_pixels, light_surface, trusted_pixels
 from ..scan import Scan
 from . import inputs
+from .crew import crew, crew_size
 from .in_order import in_order
 from .lights import Lights
 from .photos import LitPhoto, LitPhotos
 
 MANY_CLIPPED = 1e-3  # of a photo's lit pixels
-MOST_THREADS = 4  # each holds some bands
-
-
-def usual_threads() -> int:
-    """How many threads are used where nobody says: one a core, within reason."""
-    return max(1, min(MOST_THREADS, os.cpu_count() or 1))
 
 
 @dataclass
@@ -100,8 +94,7 @@ def take_samples(
         lit=np.zeros(count, np.int64),
     )
     wanted = {name: (taken.kept[name], *((sinks or {}).get(name, ()))) for name in names}
-    workers = usual_threads() if threads is None else max(1, threads)
-    pool = ThreadPoolExecutor(workers, "patina") if workers > 1 else None
+    workers = crew_size(threads)
 
     def open_shot(place: int) -> _Shot:
         camera = inputs.camera_of(capture, scan, place)
@@ -110,14 +103,11 @@ def take_samples(
         light = lights.of(capture, place)
         return _Shot(capture, scan, rays, light, place, PixelRays.of(camera), photo, masks)
 
-    try:
+    with crew(workers) as pool:
         shots = in_order(pool, open_shot, range(count), ahead=1)
         for place in range(count):
             yield place / count
             yield from _take_photo(next(shots), taken, wanted, pool, workers)
-    finally:
-        if pool is not None:
-            pool.shutdown(wait=True, cancel_futures=True)
     return taken
 
 
