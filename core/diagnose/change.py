@@ -10,13 +10,16 @@ Array = NDArray[np.floating]
 WHITE = 90.0  # percentile of the pixels looked at, of which highlights are many
 
 
-def rms_change(shown: Array, other: Array, deviation: Array) -> float:
+def rms_change(shown: Array, other: Array, deviation: Array, highlights: bool = False) -> float:
     """RMS between predictions (n, 3), relative to the first, both up to what a photo would be
     exposed to white: a highlight, a thousand times as bright as all else, would be all that counts.
-    deviation: (n, 3), inf for pixels that do not count."""
+    highlights: where they are what counts. deviation: (n, 3), inf for pixels that do not."""
     counted = np.isfinite(deviation).all(axis=1)
     if not counted.any():
         return 0.0
-    white = max(float(np.percentile(shown[counted].max(axis=1), WHITE)), 1e-30)
+    if highlights:
+        white = max(float(shown[counted].max()), float(other[counted].max()), 1e-30)
+    else:
+        white = max(float(np.percentile(shown[counted].max(axis=1), WHITE)), 1e-30)
     a, b = np.minimum(shown[counted], white), np.minimum(other[counted], white)
     return float(np.sqrt(np.sum((a - b) ** 2) / max(float(np.sum(a**2)), 1e-30)))

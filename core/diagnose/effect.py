@@ -139,6 +139,7 @@ class Effect(ABC):
 
     cause: str
     proof: str  # the photo that would tell it from others
+    of_highlights = False  # whether it changes nothing else
     fine = False  # judged on single pixels of the photos: only those beside one tell of it
     of_photo = False  # whether it needs what the photo shows about a pixel
     accuracy = 0.0  # what its own sums may be off by, of its numbers

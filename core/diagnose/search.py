@@ -264,7 +264,7 @@ def _try(now: Fitted, costs: Costs, one: Asked) -> Trial:
     gained = by_square(squares(now, fine), costs(fine) - unseen.cost)
     own = effect.patch is None and len(effect.numbers) > 0
     without = without_last(fitted.model) if own else now.shown
-    change = rms_change(fitted.shown, without, now.deviation)
+    change = rms_change(fitted.shown, without, now.deviation, effect.of_highlights)
     return Trial(effect, fitted, unseen, gained, change, one.chance)
 
 

@@ -10,21 +10,25 @@ from ..effect import Array, Effect, Near, Numbers, Setting
 from ..situation import Situation
 
 SOFT = 0.01  # of the plateau, over which the end is rounded
+CROWD, BESIDE = 12, 0.03  # values that photos show so near, relative, to a plateau
 
 
 @dataclass(frozen=True)
 class Clipping(Effect):
     """numbers: how far the plateau lies below ``top``, the brightest that a channel shows, as a
-    logarithm, for each channel."""
+    logarithm, for each channel. observed: (n, 3)."""
 
     top: Array
+    observed: Array
     cause = "clipping"
     proof = "one photo of each view at a quarter of the exposure"
+    of_highlights = True
+    fine = True  # highlights lie in a few squares of the photos
 
     @classmethod
     def of(cls, setting: Setting) -> Clipping:
         seen = setting.pixels.observed
-        return cls(np.maximum(seen.max(axis=0), 1e-9).astype(np.float64))
+        return cls(np.maximum(seen.max(axis=0), 1e-9).astype(np.float64), seen)
 
     def elsewhere(self, setting: Setting, near: Near) -> Clipping:
         return self
@@ -39,6 +43,10 @@ class Clipping(Effect):
     def plateau(self, x: np.ndarray) -> Array:
         """(3,) radiance that no photo exceeds."""
         return self.top * 8.0 * np.exp(-x)
+
+    def worth(self, x: np.ndarray) -> bool:
+        near = np.abs(self.observed / self.plateau(x) - 1) < BESIDE
+        return bool((near.sum(axis=0) >= CROWD).any())
 
     def after(self, radiance: Array, now: Situation, x: np.ndarray) -> Array:
         plateau = self.plateau(x)
