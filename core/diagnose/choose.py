@@ -2,7 +2,8 @@
 
 Half of a photo's share is drawn evenly from everything that shows the object, shadows too; the
 other half where causes betray themselves: beside the edges of shadows and about the highlight. The
-choice looks at geometry alone, never at what a pixel shows, so it does not bias any fit.
+choice looks at geometry alone, never at what a pixel shows, so it does not bias any fit; only where
+the first fit misses light over a whole spot some more are chosen, since a shadow may be small.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ from ..light import Light
 from ..samples.reservoir import sample_hash
 from ..samples.take import light_surface
 from ..scan import Scan
+from .brdfs import BRDFs
+from .closer_look import about_dark_spots, grid_step, on_grid
 from .image_cells import cell_numbers, from_centre
 from .pixels import Pixels
 
@@ -37,6 +40,7 @@ COUNT = 24_000  # pixels of all photos
 AHEAD = 2  # photos in memory beside the one that is waited for
 REACH = 8  # pixels from the edge of a shadow that are told apart
 HIGHLIGHT = np.radians(15.0)  # θh
+MORE = 0.2  # of a photo's share, at most, about dark spots
 BLOCKS = 6  # parts of a photo along the longer side of what it shows of the object
 OUTLINE = 2  # pixels beside it that belong to no surface surely
 LEAST_COS_O = 0.15  # beyond 81° a pixel sees too much surface
@@ -51,15 +55,18 @@ def choose_pixels(
     rays: RayScene,
     photos: LitPhotos,
     lights: Lights,
+    brdfs: BRDFs,
+    scale: Array,
     pool: ThreadPoolExecutor | None,
     count: int = COUNT,
 ) -> Generator[float, None, Pixels]:
-    """Yields the fraction done. pool: threads that look at photos side by side. Raises InputError
-    for photos and masks that cannot be read, FitError where no photo shows a material."""
+    """Yields the fraction done. brdfs: of the first fit, scale: (m,) of its samples. pool: threads
+    that look at photos side by side. Raises InputError for photos and masks that cannot be read,
+    FitError where no photo shows a material."""
     each = max(200, count // max(len(capture.photos), 1))
 
     def of_photo(place: int) -> Pixels | None:
-        return _of_photo(capture, scan, rays, photos, lights, place, each)
+        return _of_photo(capture, scan, rays, photos, lights, brdfs, scale, place, each)
 
     found = []
     places = range(len(capture.photos))
@@ -77,6 +84,8 @@ def _of_photo(
     rays: RayScene,
     photos: LitPhotos,
     lights: Lights,
+    brdfs: BRDFs,
+    scale: Array,
     place: int,
     count: int,
 ) -> Pixels | None:
@@ -86,12 +95,23 @@ def _of_photo(
     photo = photos.read_with_noise(place)
     light = lights.of(capture, place)
     lines = PixelRays.of(camera)
-    parts = []
+    step = grid_step(camera.width, camera.height)
+    parts, grid = [], []
     for window in bands(camera, REACH + OUTLINE, rays.cover.columns(camera)):
         part = _of_band(capture, scan, rays, light, place, lines, photo, masks, window)
         parts.append(_thinned(part, count))
-    pixels = Pixels.join(parts) if parts else None
-    return _with_photo(_thinned(pixels, count), photo) if pixels else None
+        grid.append(part.select(on_grid(part.pixel, camera.width, step)))
+    if not parts:
+        return None
+    chosen, dense = _thinned(Pixels.join(parts), count), Pixels.join(grid)
+    all_over = replace(
+        dense,
+        observed=photo.radiance.reshape(-1, 3).take(dense.pixel, axis=0),
+        irradiance=dense.irradiance / scale[dense.material, None],
+    )
+    rows = about_dark_spots(all_over, brdfs, camera.width, step, int(MORE * count))
+    more = rows[~np.isin(dense.pixel[rows], chosen.pixel)]
+    return _with_photo(Pixels.join([chosen, dense.select(more)]), photo)
 
 
 def _of_band(

@@ -24,8 +24,9 @@ FEWEST = 12  # pixels of a spot
 ACROSS = 5  # squares along a photo's longer side that a spot is cut by: it may be of two shadows
 
 
-def dark_spots(pixels: Pixels, shown: Array) -> NDArray[np.intp]:
-    """(n,) number of the spot that each pixel is in, −1 none. shown: (n, 3) prediction.
+def dark_spots(pixels: Pixels, shown: Array, fewest: int = FEWEST) -> NDArray[np.intp]:
+    """(n,) number of the spot that each pixel is in, −1 none. shown: (n, 3) prediction; fewest:
+    pixels of a spot.
 
     A pixel belongs to a spot where nearly all pixels about it are too dark as well: single ones are
     noise, dust, or a fold that the mesh does not have. A spot that the object's own shadow touches
@@ -53,7 +54,7 @@ def dark_spots(pixels: Pixels, shown: Array) -> NDArray[np.intp]:
     inside[one] = inside[other] = True
     beside = np.bincount(spot, inside & (pixels.edge[rows] < APART_FROM))
     count = np.bincount(spot, inside)
-    kept = inside & (count[spot] >= FEWEST) & (beside[spot] == 0)
+    kept = inside & (count[spot] >= fewest) & (beside[spot] == 0)
     cell = cell_numbers(pixels.photo, pixels.x, pixels.y, ACROSS)[rows]
     part = np.stack([spot[kept], cell[kept]])
     out[rows[kept]] = np.unique(part, axis=1, return_inverse=True)[1].ravel()

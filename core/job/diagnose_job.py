@@ -71,17 +71,18 @@ def setting_of(
 ) -> Generator[float, None, Setting]:
     """What a diagnosis looks at; yields the fraction done."""
     capture = result.capture
-    pixels = yield from choose_pixels(
-        capture, result.scan, result.rays, result.photos, result.lights, pool
-    )
+    brdfs = BRDFs.of([m.fit.brdf for m in result.materials])
     scale = np.array([material.scale for material in result.materials], np.float32)
+    pixels = yield from choose_pixels(
+        capture, result.scan, result.rays, result.photos, result.lights, brdfs, scale, pool
+    )
     level = float(np.median(pixels.irradiance))
     pixels = replace(pixels, irradiance=pixels.irradiance / scale[pixels.material, None])
     names = [light.name for light in capture.lights]
     middle = pixels.point.mean(axis=0)
     return Setting(
         pixels=pixels,
-        brdfs=BRDFs.of([m.fit.brdf for m in result.materials]),
+        brdfs=brdfs,
         rays=result.rays,
         light=np.array([names.index(photo.light) for photo in capture.photos]),
         lights=tuple(names),
