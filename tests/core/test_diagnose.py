@@ -11,11 +11,13 @@ from patina.core.basis import Basis, PrincipalBRDF
 from patina.core.diagnose import chance
 from patina.core.diagnose import search as searching
 from patina.core.diagnose.brdfs import BRDFs
+from patina.core.diagnose.closer_look import about_dark_spots
 from patina.core.diagnose.deviation import as_found, pixel_deviation
 from patina.core.diagnose.effect import Setting, felt_by
 from patina.core.diagnose.effects import EFFECTS
 from patina.core.diagnose.effects.camera_response import CameraResponse
 from patina.core.diagnose.effects.cast_shadow import CastShadow
+from patina.core.diagnose.effects.clipping import Clipping
 from patina.core.diagnose.effects.light_direction import LightDirection
 from patina.core.diagnose.effects.light_intensity import LightIntensity
 from patina.core.diagnose.effects.near_light import NearLight
@@ -26,16 +28,17 @@ from patina.core.diagnose.model import Model
 from patina.core.diagnose.situation import Situation
 from patina.core.diagnose.slopes import slopes_of
 from patina.core.diagnose.solve import fit
+from patina.core.job.crew import crew
 from patina.core.steps import drained
 from tests.make_lit_ball import NOISE, SIZE, changed, lit_ball, shadowed
 
 
 def searched(setting: Setting, kinds=(LightDirection, LightIntensity, NearLight, CameraResponse,
-                                      Vignetting)) -> searching.Found:  # fmt: skip
+                                      Vignetting), pool=None) -> searching.Found:  # fmt: skip
     deviation = pixel_deviation(setting.pixels, setting.brdfs, np.radians(0.2))
     effects = [kind.of(setting) for kind in kinds]
     model = Model(setting.pixels, setting.brdfs)
-    return drained(searching.search(model, deviation, effects, setting))
+    return drained(searching.search(model, deviation, effects, setting, pool))
 
 
 def test_nothing_is_named_where_nothing_is_wrong():
@@ -124,6 +127,55 @@ def test_a_spot_without_light_is_a_shadow():
     trial = found.accepted[0]
     np.testing.assert_allclose(trial.told, -0.6, atol=0.03)
     assert (np.abs(trial.told + 0.6) < 3 * trial.deviation).all()
+
+
+def test_highlights_that_end_at_a_plateau_are_clipped():
+    """The brightest percent: named, with where it lies; on the ball as it is there is nothing."""
+    setting = lit_ball(9)
+    top = float(np.percentile(setting.pixels.observed, 99))
+    noise = 1 + NOISE * np.random.default_rng(3).standard_normal(setting.pixels.observed.shape)
+    flat = np.minimum(setting.pixels.observed, top * noise)
+    found = searched(changed(setting, flat), (LightDirection, LightIntensity, Clipping))
+    assert found.causes == ("clipping",)
+    trial = found.accepted[0]
+    assert isinstance(trial.effect, Clipping)
+    level = trial.effect.plateau(trial.x)
+    clipped = (setting.pixels.observed > 1.1 * top).sum(axis=0) > 12
+    assert clipped.any()
+    np.testing.assert_allclose(level[clipped], top, rtol=0.02)
+    assert searched(setting, (LightDirection, LightIntensity, Clipping)).causes == ()
+
+
+def test_side_by_side_nothing_else_is_found():
+    """On threads as on one."""
+    setting = lit_ball(1)
+    drift = np.exp([0.0, 0.08, -0.05, 0.03, 0.06, -0.12])[setting.pixels.photo]
+    setting = changed(setting, setting.pixels.observed * drift[:, None])
+    with crew(3) as pool:
+        one, several = searched(setting), searched(setting, pool=pool)
+    assert one.causes == several.causes == ("light_intensity",)
+    np.testing.assert_allclose(one.accepted[0].x, several.accepted[0].x, atol=1e-9)
+    gains = [[t.gain for t in f.rounds[0]] for f in (one, several)]
+    np.testing.assert_allclose(*gains, rtol=1e-6)
+
+
+def test_a_small_spot_is_looked_at_as_a_whole():
+    """All of its pixels, and those about it, but no more than there is room for; nothing where
+    there is none."""
+    setting = lit_ball(8)
+    width, step = 400, 12
+    pixels = setting.pixels.select(setting.pixels.photo == 3)
+    row, column = (np.round((v + 0.5) * width).astype(np.int32) for v in (pixels.y, pixels.x))
+    pixels = replace(pixels, pixel=row * width + column)
+    setting = replace(setting, pixels=pixels)
+    assert not len(about_dark_spots(pixels, setting.brdfs, width, step, 500))
+    dark = shadowed(setting, 3, 0.09, 0.6).pixels
+    spot = np.flatnonzero(dark.observed[:, 1] < 0.9 * pixels.observed[:, 1])
+    found = about_dark_spots(dark, setting.brdfs, width, step, 500)
+    assert len(spot) > 12 and np.isin(spot, found).mean() > 0.8
+    far = np.hypot(dark.x[found] - 0.1, dark.y[found])
+    assert 0.1 < far.max() < 0.09 + 4 * step / width
+    assert len(about_dark_spots(dark, setting.brdfs, width, step, 5)) == 5
 
 
 def test_single_dark_pixels_are_no_shadow():

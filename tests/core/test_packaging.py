@@ -22,6 +22,7 @@ ROOMS = ("core", "scene", "operators", "panels", "commands")
 LIBRARIES = {"numpy", "scipy", "pycolmap", "OpenImageIO", "embreex"} | {
     "defusedxml",
     "sunposition",
+    "threadpoolctl",
     "rawpy",  # where it is there
 }
 BLENDER = {
