@@ -1,4 +1,5 @@
-"""`run.py pictures`: docs/images/demo.jpg, from the embedded capture and nothing else.
+"""`run.py pictures`: docs/images/demo.jpg, from the embedded capture and nothing else, and
+diagnosis.jpg (hunt/picture.py).
 
 From left to right: a lit photo, the prediction of it, the signed difference, and the measured
 materials under a sky they were not photographed in (Cycles, OSL).
@@ -33,6 +34,8 @@ def main() -> int:
     from patina.core.job import inputs
     from patina.core.report import display
 
+    from .hunt.picture import make as diagnosis_picture
+
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "demo"
         result = fit_to_folder(CAPTURE, out)
@@ -49,6 +52,7 @@ def main() -> int:
     TARGET.parent.mkdir(parents=True, exist_ok=True)
     write(TARGET, np.concatenate(strip, axis=1))
     print(f"wrote {TARGET}: {TARGET.stat().st_size / 1000:.0f} kB")
+    diagnosis_picture()
     return 0
 
 

@@ -1,0 +1,74 @@
+"""`run.py pictures`: docs/images/diagnosis.jpg, three hidden effects and what is found of them.
+
+A row each, from left to right: a photo, what it shows more or less than the first prediction, the
+same after what was named is in the model, and what that cause changes.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from ..common import ROOT, say
+from ..make_pictures import GAP, write
+
+TARGET = ROOT / "docs" / "images" / "diagnosis.jpg"
+SHOWN = (("cast_shadow", 2), ("near_light", 2), ("vignetting", 2))  # and the capture's seed
+STRENGTH = 0.03
+HEIGHT = 220
+
+Array = np.ndarray
+
+
+def make() -> None:
+    """Hide, diagnose, compose."""
+    rows = []
+    for cause, seed in SHOWN:
+        with tempfile.TemporaryDirectory() as folder:
+            rows.append(_row(Path(folder), cause, seed))
+    width = max(row.shape[1] for row in rows)
+    filled = [
+        np.pad(r, ((0, 0), (0, width - r.shape[1]), (0, 0)), constant_values=255) for r in rows
+    ]
+    between = np.full((GAP, width, 3), 255, np.uint8)
+    write(TARGET, np.concatenate([x for row in filled for x in (row, between)][:-1], axis=0))
+    print(f"wrote {TARGET}: {TARGET.stat().st_size / 1000:.0f} kB")
+
+
+def _row(folder: Path, cause: str, seed: int) -> Array:
+    from patina.core.capture import read_capture
+    from patina.core.job import FitJob, finished
+    from patina.core.job.diagnose_job import DiagnoseJob
+    from patina.core.report import display
+    from patina.core.report.residual_picture import residual_picture
+
+    from .make import make as hide
+
+    hide(folder, cause, STRENGTH, seed)
+    job = DiagnoseJob(FitJob(read_capture(folder / "hunt.capture.toml"), portable=False))
+    job.drain()
+    found, result = finished(job.found), finished(job.result)
+    say(f"{cause}: {', '.join(found.causes) or 'none'}")
+    trial, pixels = found.accepted[0], finished(job.setting).pixels
+    changed = trial.changed() / found.before.deviation
+    strength = np.bincount(pixels.photo, np.sum(changed**2, axis=1))
+    photo = int(np.argmax(strength / np.bincount(pixels.photo)))
+    radiance = result.photos.read(photo).radiance
+    white = display.white_level(radiance)
+    box = display.crop_box(radiance.max(axis=2) > 0.002 * white, margin=2)
+    after = found.after.residual * (found.after.deviation / found.before.deviation)
+    cells = [
+        display.photo_picture(radiance[box], white),
+        *(residual_picture(pixels, r, photo) for r in (found.before.residual, after, -changed)),
+    ]
+    gap = np.full((HEIGHT, GAP, 3), 255, np.uint8)
+    return np.concatenate([x for cell in cells for x in (_sized(cell), gap)][:-1], axis=1)
+
+
+def _sized(cell: Array) -> Array:
+    """HEIGHT high, the nearest pixels."""
+    rows = (np.arange(HEIGHT) + 0.5) * len(cell) / HEIGHT
+    columns = np.arange(round(cell.shape[1] * HEIGHT / len(cell))) + 0.5
+    return cell[rows.astype(int)][:, (columns * len(cell) / HEIGHT).astype(int)]
