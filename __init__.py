@@ -8,6 +8,7 @@ from types import ModuleType
 # Every module that has something to register, in order; unregistered the other way round
 MODULES: tuple[str, ...] = (
     "scene.properties",
+    "scene.photo_list",
     "scene.osl_files",
     "scene.lamps",
     "scene.worlds",

@@ -23,6 +23,7 @@ explain, name the cause, and fit again with it in the model"""
 
     bl_idname = "patina.check"
     bl_label = "Check"
+    PANEL = "check"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
@@ -63,6 +64,7 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
 
     bl_idname = "patina.refit"
     bl_label = "Fit Again"
+    PANEL = "check"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod

@@ -53,6 +53,7 @@ class PATINA_OT_fit(Stepped, bpy.types.Operator):
 
     bl_idname = "patina.fit"
     bl_label = "Fit Materials"
+    PANEL = "fit"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod

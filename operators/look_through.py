@@ -4,17 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene import cameras, lights
-from ..scene.properties import CAPTURE, capture_path
-
-
-def lit_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """The cameras of the current capture's lit photos, in the capture's order."""
-    capture = capture_path(scene)
-    return sorted(
-        (o for o in scene.objects if o.type == "CAMERA" and o.get(CAPTURE) == capture),
-        key=lambda o: o.get("patina_place", 0),
-    )
+from ..scene.photo_list import lit_photos, look_at, looked_at
 
 
 class PATINA_OT_next_photo(bpy.types.Operator):
@@ -38,17 +28,18 @@ class PATINA_OT_next_photo(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if lit_cameras(context.scene):
+        if lit_photos(context.scene):
             return True
         cls.poll_message_set("No lit photos here yet: import a capture first")
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        found = lit_cameras(context.scene)
-        now = context.scene.camera
-        place = (found.index(now) + self.step) % len(found) if now in found else 0
-        cameras.look_through(context.scene, found[place])
-        lights.shine_only(context.scene, found[place])
+        scene = context.scene
+        found, now = lit_photos(scene), looked_at(scene)
+        places = [photo.place for photo in found]
+        at = (places.index(now.place) + self.step) % len(found) if now in found else 0
+        scene.patina_photos.active = list(scene.patina_photos.photos).index(found[at])
+        look_at(scene, found[at])
         for area in context.screen.areas if context.screen else ():
             if area.type == "VIEW_3D":
                 area.spaces.active.region_3d.view_perspective = "CAMERA"

@@ -28,6 +28,8 @@ from .stepped import Stepped
 class _OfCapture(Stepped):
     """Work on the capture in the scene. Subclasses say which job, and what then."""
 
+    PANEL = "masks"
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not context.scene.patina.capture:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import bpy
@@ -11,14 +12,18 @@ from ..core.job import Job
 from ..scene.running import Running, running, tell
 from .report_errors import refuse
 
+TOLD, SOON = 0.05, 2.0  # done, and seconds taken, before time left is told
+
 
 class Stepped:
     """Subclasses set self._job and self._scene in _start, and take the result in _finish."""
 
     TICK = 0.01
+    PANEL = ""  # the stage that shows how far it is
     CANCELLED = "Cancelled; nothing was changed"
 
     _timer: Any = None
+    _since = 0.0
     _job: Job | None = None
     _scene: str = ""  # by name: a reference does not survive undo
 
@@ -49,6 +54,7 @@ class Stepped:
         except PatinaError as error:
             self._stop(context)
             return refuse(self, error)
+        self._since = time.perf_counter()
         self._timer = context.window_manager.event_timer_add(self.TICK, window=context.window)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -63,7 +69,8 @@ class Stepped:
             return {"PASS_THROUGH"}
         try:
             if self._job.step():
-                tell(Running(self._scene, self._job.now.stage, self._job.now.fraction))
+                now = self._job.now
+                tell(Running(self._scene, self.PANEL, now.stage, now.fraction, self._left()))
                 return {"RUNNING_MODAL"}
             self._finish(context)
         except PatinaError as error:
@@ -85,7 +92,14 @@ class Stepped:
     def _finish(self, context: bpy.types.Context) -> None:
         raise NotImplementedError
 
+    def _left(self) -> float | None:
+        """Seconds, as what is done took; None where too little is."""
+        done, took = self._job.now.fraction, time.perf_counter() - self._since
+        return took * (1 - done) / done if done > TOLD and took > SOON else None
+
     def _stop(self, context: bpy.types.Context) -> None:
+        if self._job is not None:
+            self._job.close()
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
             self._timer = None

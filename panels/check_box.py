@@ -18,9 +18,6 @@ def draw_check(
     causes: bpy.types.bpy_prop_collection,
 ) -> None:
     """diagnosis: the content of diagnosis.json; causes: PatinaCause, what can be switched off."""
-    named = [c for c in diagnosis["named"] if c != "none"]
-    text = ", ".join(n.replace("_", " ") for n in named) or "Nothing that can be named"
-    layout.label(text=text, icon="ERROR" if named else "CHECKMARK")
     told = [
         ("Left-out parts", diagnosis["baseline"]["held_out"], diagnosis["extended"]["held_out"])
     ]

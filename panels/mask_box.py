@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import bpy
 
+from ..scene.photo_list import looked_at
 from ..scene.properties import capture_path
 from ..scene.shadow_images import shadow_images
 
 
 def draw_shadow(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
-    """Make the shadow masks; where they are there, say which image to paint on."""
+    """Where there are shadow masks, say which image to paint on."""
     there = shadow_images(capture_path(scene))
     if not there:
-        layout.operator("patina.shadow_masks", icon="IMAGE_ALPHA")
         return
-    image = there.get(scene.camera.get("patina_place", -1)) if scene.camera else None
+    photo = looked_at(scene)
+    image = there.get(photo.place) if photo is not None else None
     if image is not None:
         layout.label(text=f"Paint: {image.name}", icon="IMAGE_ALPHA")
     layout.operator("patina.shadow_masks", text="Shadow Masks Anew").replace = True

@@ -1,118 +1,92 @@
-"""The sidebar tab: Scan, Photos, Fit, Check, Material, in the order of the work."""
+"""The sidebar tab: Scan, Photos & Light, Materials & Masks, Fit, Check, Material, in the order of
+the work."""
 
 from __future__ import annotations
 
 import bpy
 
-from ..core.report.figures import either_side
-from ..operators.look_through import lit_cameras
 from ..scene.apply import measured_materials
 from ..scene.fallback import osl_hindrance
 from ..scene.materials import REASON_PROPERTY
+from ..scene.photo_list import looked_at
 from ..scene.properties import DIAGNOSIS, capture_path, stored_result
-from ..scene.running import running
 from .check_box import draw_check
 from .lamp_box import draw_lamp
 from .mask_box import draw_materials, draw_shadow
+from .measured_box import draw_measured
+from .photo_rows import PATINA_UL_photos, draw_photos
+from .stage import StagePanel
 from .wrapped import wrapped
 
 
-class _Stage:
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Patina"
-
-
-class PATINA_PT_scan(_Stage, bpy.types.Panel):
+class PATINA_PT_scan(StagePanel, bpy.types.Panel):
     bl_idname = "PATINA_PT_scan"
     bl_label = "Scan"
+    stage = "scan"
 
-    def draw(self, context: bpy.types.Context) -> None:
-        layout, mesh = self.layout, context.scene.patina.mesh
-        there = mesh is not None and mesh.name in context.scene.objects
-        if there:
-            layout.label(text=mesh.name, icon="MESH_DATA")
-        layout.operator("patina.import_capture", icon="IMPORT")
-        layout.operator("patina.solve_photos", icon="CAMERA_DATA")
-        if not there:
+    def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+        mesh = context.scene.patina.mesh
+        if mesh is None or mesh.name not in context.scene.objects:
+            layout.operator("patina.solve_photos", icon="CAMERA_DATA")
             layout.operator("patina.import_demo", icon="MONKEY")
+        else:
+            layout.operator("patina.import_capture", icon="IMPORT")
 
 
-class PATINA_PT_photos(_Stage, bpy.types.Panel):
+class PATINA_PT_photos(StagePanel, bpy.types.Panel):
     bl_idname = "PATINA_PT_photos"
     bl_label = "Photos & Light"
+    stage = "photos"
 
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        found = lit_cameras(context.scene)
-        if not found:
-            layout.label(text="No lit photos yet", icon="INFO")
-            return
-        camera = context.scene.camera
-        if camera in found:
-            place = f"{found.index(camera) + 1} of {len(found)}: {camera['patina_lit']}"
-            layout.label(text=place, icon="CAMERA_DATA")
-            draw_lamp(layout, context.scene, camera)
-        else:
-            layout.label(text=f"{len(found)} lit photos", icon="CAMERA_DATA")
-        row = layout.row(align=True)
-        row.operator("patina.next_photo", text="Previous", icon="TRIA_LEFT").step = -1
-        row.operator("patina.next_photo", text="Next", icon="TRIA_RIGHT").step = 1
+    def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+        draw_photos(layout, context.scene)
+        if looked_at(context.scene) is not None:
+            draw_lamp(layout, context.scene, context.scene.camera)
+
+
+class PATINA_PT_masks(StagePanel, bpy.types.Panel):
+    bl_idname = "PATINA_PT_masks"
+    bl_label = "Materials & Masks"
+    bl_options = {"DEFAULT_CLOSED"}
+    stage = "masks"
+
+    def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         draw_shadow(layout, context.scene)
+        draw_materials(layout, context.scene)
 
 
-class PATINA_PT_fit(_Stage, bpy.types.Panel):
+class PATINA_PT_fit(StagePanel, bpy.types.Panel):
     bl_idname = "PATINA_PT_fit"
     bl_label = "Fit"
+    stage = "fit"
 
-    def draw(self, context: bpy.types.Context) -> None:
-        layout, now = self.layout, running(context.scene)
-        if now is not None:
-            layout.progress(text=now.stage, factor=now.fraction, type="BAR")
-            layout.label(text="ESC cancels", icon="CANCEL")
-            return
-        draw_materials(layout, context.scene)
-        layout.operator("patina.fit", icon="SHADERFX")
+    def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         result = stored_result(capture_path(context.scene))
-        for material in (result or {}).get("materials", []):
-            box = layout.box()
-            box.label(text=material["name"], icon="MATERIAL")
-            held = material.get("held_out")
-            if held:
-                box.label(text=f"Predicts unseen photos to {100 * held['typical']:.0f} %")
-            if "interval_90" in material["uncertainty"]:
-                known = either_side(material["uncertainty"]["median"])
-                box.label(text=f"BRDF: {known} in half of directions")
-            box.label(text=f"{material['samples']['used']:,} samples")
-            for warning in material["warnings"]:
-                wrapped(box, warning, "ERROR")
+        if result is not None:
+            layout.operator("patina.fit", text="Fit Anew", icon="FILE_REFRESH")
+        draw_measured(layout, result)
 
 
-class PATINA_PT_check(_Stage, bpy.types.Panel):
+class PATINA_PT_check(StagePanel, bpy.types.Panel):
     bl_idname = "PATINA_PT_check"
     bl_label = "Check"
     bl_options = {"DEFAULT_CLOSED"}
+    stage = "check"
 
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        if running(context.scene) is not None:
-            layout.label(text="Something is running", icon="SORTTIME")
-            return
-        layout.operator("patina.check", icon="VIEWZOOM")
+    def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         diagnosis = stored_result(capture_path(context.scene), DIAGNOSIS)
         if diagnosis is not None:
+            layout.operator("patina.check", text="Check Anew", icon="FILE_REFRESH")
             draw_check(layout, diagnosis, context.scene.patina.causes)
 
 
-class PATINA_PT_material(_Stage, bpy.types.Panel):
+class PATINA_PT_material(StagePanel, bpy.types.Panel):
     bl_idname = "PATINA_PT_material"
     bl_label = "Material"
+    stage = "material"
 
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
+    def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         found = measured_materials()
-        if not found:
-            layout.label(text="Nothing measured yet", icon="INFO")
         reasons = {m[REASON_PROPERTY] for m in found if REASON_PROPERTY in m}
         hindrance = osl_hindrance(context.scene) if found else None
         for material in found:
@@ -124,7 +98,15 @@ class PATINA_PT_material(_Stage, bpy.types.Panel):
             wrapped(layout, f"Not the measurement itself: {reason}", "INFO")
 
 
-CLASSES = (PATINA_PT_scan, PATINA_PT_photos, PATINA_PT_fit, PATINA_PT_check, PATINA_PT_material)
+CLASSES = (
+    PATINA_UL_photos,
+    PATINA_PT_scan,
+    PATINA_PT_photos,
+    PATINA_PT_masks,
+    PATINA_PT_fit,
+    PATINA_PT_check,
+    PATINA_PT_material,
+)
 
 
 def register() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -55,12 +56,16 @@ def store_result(capture: str, description: dict[str, Any], kind: str = RESULT) 
 
 
 def stored_result(capture: str, kind: str = RESULT) -> dict[str, Any] | None:
-    """What the last fit (or check) of that capture in this .blend found, or None."""
+    """What the last fit (or check) of that capture in this .blend found, or None. Not to be
+    changed: who asks again is given the same."""
     text = _text(capture, kind)
-    if text is None:
-        return None
+    return None if text is None else _parsed(text.as_string())
+
+
+@lru_cache(maxsize=8)  # panels ask at every redraw
+def _parsed(text: str) -> dict[str, Any] | None:
     try:
-        found = json.loads(text.as_string())
+        found = json.loads(text)
     except ValueError:  # the artist typed into it
         return None
     return found if isinstance(found, dict) else None

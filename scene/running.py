@@ -1,4 +1,4 @@
-"""The fit that is running now, if any: not part of the .blend, which may be saved meanwhile."""
+"""The job that is running now, if any: not part of the .blend, which may be saved meanwhile."""
 
 from __future__ import annotations
 
@@ -9,11 +9,19 @@ import bpy
 
 @dataclass(frozen=True)
 class Running:
-    """scene: the name of the scene it works for; stage; fraction of the whole job done."""
+    """scene: the name of the scene it works for; panel: the stage that shows it; stage: of the job;
+    fraction of the whole job done; left: seconds that it will still take, None unknown."""
 
     scene: str
+    panel: str
     stage: str
     fraction: float
+    left: float | None = None
+
+    @property
+    def said(self) -> str:
+        """For the progress bar."""
+        return self.stage if self.left is None else f"{self.stage}, {_time(self.left)} left"
 
 
 _now: Running | None = None
@@ -32,3 +40,9 @@ def tell(state: Running | None) -> None:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 area.tag_redraw()
+
+
+def _time(seconds: float) -> str:
+    if seconds < 90:
+        return f"{max(5, 5 * round(seconds / 5))} s"
+    return f"{round(seconds / 60)} min"

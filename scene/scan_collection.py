@@ -19,6 +19,7 @@ from ..core.photo.image import image_size
 from ..core.scan import Camera, Reconstruction, Scan
 from . import cameras, lights, meshes, photos
 from .frame import frame_origin
+from .photo_list import LitPhoto, list_photos, mark_lit
 from .properties import CAPTURE
 
 log = logging.getLogger(__name__)
@@ -58,24 +59,24 @@ def create_scan_collection(
     top["patina_origin"] = origin.tolist()
     mesh = meshes.create_mesh_object(name, scan.mesh, origin, top)
     made = _cameras(scan.cameras, own, origin, centre, camera_room)
+    listed = []
     for place, (camera, shown, photo) in enumerate(lit):
-        label = camera.label
+        stood = made[camera.label]
         # a scaled copy of what was calibrated is rendered at its own size
-        made[label]["patina_resolution"] = (camera.width, camera.height)
-        cameras.put_photo_behind(made[label], shown)
-        made[label]["patina_lit"] = photo.file.name
-        made[label]["patina_place"] = place
-        made[label]["patina_light"] = photo.light
-        made[label][CAPTURE] = str(capture.file)
+        stood["patina_resolution"] = (camera.width, camera.height)
+        image = bpy.data.images.load(str(shown), check_existing=True)
+        if CAPTURE not in stood:  # of several photos from one place the list shows one at a time
+            cameras.put_photo_behind(stood, shown)
+            mark_lit(stood, photo.file.name, place, photo.light)
+        stood[CAPTURE] = str(capture.file)
+        listed.append(LitPhoto(stood, image, photo))
     lamps = {
         light.name: lights.create_lamp(light, origin, centre, scan.mesh.size, light_room)
         for light in found.by_name.values()
     }
     for lamp in lamps.values():
         lamp[CAPTURE] = str(capture.file)
-    first = made[lit[0][0].label]
-    cameras.look_through(scene, first)
-    lights.shine_only(scene, first)
+    list_photos(scene, listed)
     return ScanCollection(top, mesh, made, lamps)
 
 

@@ -22,14 +22,14 @@ def crew_size(threads: int | None) -> int:
 
 @contextmanager
 def crew(count: int) -> Iterator[ThreadPoolExecutor | None]:
-    """So many threads, None where one is enough: work is then done where it is asked for. What
-    waits is dropped in the end."""
+    """So many threads, None where one is enough: work is then done where it is asked for. In the
+    end what waits is dropped, and what is at work ends unheard."""
     pool = ThreadPoolExecutor(count, "patina") if count > 1 else None
     try:
         yield pool
     finally:
         if pool is not None:
-            pool.shutdown(wait=True, cancel_futures=True)
+            pool.shutdown(wait=False, cancel_futures=True)
 
 
 def plain_blas() -> AbstractContextManager[object]:

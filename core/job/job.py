@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -59,6 +59,12 @@ class Job(ABC):
         """All of it at once."""
         while self.step():
             report(self.now)
+
+    def close(self) -> None:
+        """Drop what is not done, and let go of everything it holds."""
+        steps, self._steps = self._steps, iter(())
+        if isinstance(steps, Generator):
+            steps.close()
 
     def _run(self) -> Iterator[Step]:
         with plain_blas():

@@ -338,7 +338,7 @@ def test_fit_without_its_mesh_says_so() -> None:
 
 def test_a_running_fit_is_not_saved() -> None:
     state, path = extension("scene.running"), folder() / "running.blend"
-    state.tell(state.Running(bpy.context.scene.name, "sampling the photos", 0.5))
+    state.tell(state.Running(bpy.context.scene.name, "fit", "sampling the photos", 0.5))
     assert state.running(bpy.context.scene) is not None
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     state.tell(None)

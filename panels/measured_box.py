@@ -1,0 +1,27 @@
+"""What a fit found of every material, in words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ..core.report.figures import either_side
+from .wrapped import IN_BOX, wrapped
+
+
+def draw_measured(layout: bpy.types.UILayout, result: dict[str, Any] | None) -> None:
+    """result: the content of result.json."""
+    for material in (result or {}).get("materials", []):
+        box = layout.box()
+        box.label(text=material["name"], icon="MATERIAL")
+        held = material.get("held_out")
+        if held:
+            said = f"Predicts a photo it has not seen to {100 * held['typical']:.0f} %"
+            wrapped(box, said, "BLANK1", IN_BOX)
+        if "interval_90" in material["uncertainty"]:
+            known = either_side(material["uncertainty"]["median"])
+            wrapped(box, f"BRDF: {known} in half of directions", "BLANK1", IN_BOX)
+        box.label(text=f"{material['samples']['used']:,} samples", icon="BLANK1")
+        for warning in material["warnings"]:
+            wrapped(box, warning, "ERROR", IN_BOX)

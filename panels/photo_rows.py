@@ -1,0 +1,62 @@
+"""The list of lit photos."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..scene.photo_list import PatinaPhoto, PatinaPhotos, looked_at
+from ..scene.properties import capture_path
+from ..scene.shadow_images import shadow_images
+
+ROWS = 5
+
+
+class PATINA_UL_photos(bpy.types.UIList):
+    """A line a photo: how it looks, its file, its light, whether a shadow mask is there."""
+
+    bl_idname = "PATINA_UL_photos"
+
+    def draw_item(
+        self,
+        context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        data: PatinaPhotos,
+        item: PatinaPhoto,
+        icon: int,
+        active: PatinaPhotos,
+        property_name: str,
+    ) -> None:
+        gone = item.camera is None or item.camera.name not in context.scene.objects
+        row = layout.row(align=True)
+        row.active = not gone
+        preview = item.image.preview if item.image is not None else None
+        if preview is not None and preview.icon_id:
+            row.label(text=item.name, icon_value=preview.icon_id)
+        else:
+            row.label(text=item.name, icon="IMAGE_DATA")
+        right = row.row(align=True)
+        right.alignment = "RIGHT"
+        right.label(text=item.light)
+        masked = item.place in shadow_images(capture_path(context.scene))
+        state = "ERROR" if gone else "IMAGE_ALPHA" if masked else "BLANK1"
+        right.label(text="", icon=state)
+
+
+def draw_photos(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """The list, the photo that is looked at, and how it is shown."""
+    state = scene.patina_photos
+    if not len(state.photos):
+        return
+    layout.template_list(
+        PATINA_UL_photos.bl_idname, "", state, "photos", state, "active", rows=ROWS, maxrows=ROWS
+    )
+    row = layout.row(align=True)
+    row.operator("patina.next_photo", text="Previous", icon="TRIA_LEFT").step = -1
+    row.operator("patina.next_photo", text="Next", icon="TRIA_RIGHT").step = 1
+    photo = looked_at(scene)
+    if photo is None:
+        return
+    column = layout.column(align=True)
+    column.prop(state, "mesh_over", slider=True)
+    if photo.exposure:
+        column.label(text=f"Exposure {photo.exposure:.4g}")

@@ -1,0 +1,115 @@
+"""The sidebar's stages say what is there and what to press; the list of photos shows each."""
+
+from __future__ import annotations
+
+import bpy
+from support import extension
+from test_workflow import folder, made
+
+
+def two_from_one_place():
+    """Four photos of four cameras, and one more from the first camera under the second light."""
+    path = made().make_capture(folder() / "ball", photos=4)
+    text = path.read_text()
+    camera, light = "lit_1.exr", text.split("[[photo]]")[2]
+    more = light.replace('file = "lit_2.exr"', 'file = "again.exr"')
+    first = next(li for li in text.split("[[photo]]")[1].splitlines() if li.startswith("camera"))
+    more = "\n".join(first if li.startswith("camera") else li for li in more.splitlines())
+    (path.parent / "again.exr").write_bytes((path.parent / camera).read_bytes())
+    path.write_text(text.rstrip() + "\n\n[[photo]]\n" + more.strip() + "\n")
+    return path
+
+
+def test_stages_follow_the_work() -> None:
+    stages, scene = extension("scene.stages"), bpy.context.scene
+    found = stages.stages(scene)
+    assert list(found) == ["scan", "photos", "masks", "fit", "check", "material"]
+    assert stages.next_stage(found) == "scan" and found["scan"].press == "patina.import_capture"
+    path = made().make_capture(folder() / "ball", photos=3, extra="[fit]\nheld_out = false")
+    bpy.ops.patina.import_capture(filepath=str(path))
+    found = stages.stages(scene)
+    assert found["scan"].done and found["photos"].has == ("3 lit photos, 3 lights",)
+    assert stages.next_stage(found) == "fit", "masks are no must"
+    bpy.ops.patina.shadow_masks()
+    assert stages.stages(scene)["masks"].done
+    bpy.ops.patina.fit()
+    found = stages.stages(scene)
+    assert found["fit"].done and found["material"].done
+    assert stages.next_stage(found) == "check"
+    for name, stage in found.items():
+        assert stage.done or stage.missing, name
+        if stage.press:
+            group, operator = stage.press.split(".")
+            assert hasattr(getattr(bpy.ops, group), operator)
+
+
+def test_each_photo_is_looked_at_by_its_line() -> None:
+    """Two photos from one place: one camera, which shows the photo that is asked for."""
+    path = two_from_one_place()
+    assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
+    scene = bpy.context.scene
+    state, listed = scene.patina_photos, extension("scene.photo_list")
+    assert [p.name for p in state.photos] == [*(f"lit_{k + 1}.exr" for k in range(4)), "again.exr"]
+    first, last = state.photos[0], state.photos[4]
+    assert first.camera == last.camera == scene.camera
+    assert len(first.camera.data.background_images) == 1
+    shown = first.camera.data.background_images[0]
+    assert shown.image == first.image != last.image
+    state.active = 4
+    assert shown.image == last.image and scene.camera["patina_place"] == 4
+    assert listed.looked_at(scene).name == "again.exr"
+    lamps = [o for o in scene.objects if o.type == "LIGHT" and "patina_light" in o]
+    on = [lamp["patina_light"] for lamp in lamps if not lamp.hide_render]
+    assert on == [last.light] == [state.photos[1].light]
+    bpy.ops.patina.next_photo()
+    assert state.active == 0 and shown.image == first.image
+    bpy.ops.patina.next_photo(step=-1)
+    assert state.active == 4
+    state.active = 2
+    assert scene.camera == state.photos[2].camera
+
+    state.mesh_over = 0.25
+    behind = scene.camera.data.background_images[-1]
+    assert (behind.display_depth, round(behind.alpha, 6)) == ("FRONT", 0.75)
+    state.mesh_over = 1.0
+    assert (behind.display_depth, behind.alpha) == ("BACK", 1.0)
+
+
+def test_the_list_survives_and_old_files_get_one() -> None:
+    path, blend = made().make_capture(folder() / "ball", photos=3), folder() / "list.blend"
+    bpy.ops.patina.import_capture(filepath=str(path))
+    bpy.context.scene.patina_photos.active = 1
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    state = bpy.context.scene.patina_photos
+    names = [(p.name, p.camera.name, p.image.name, p.light) for p in state.photos]
+    assert len(names) == 3 and state.active == 1
+    state.photos.clear()  # as a version without the list saved it
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    state = bpy.context.scene.patina_photos
+    assert [(p.name, p.camera.name, p.image.name, p.light) for p in state.photos] == names
+    assert state.active == 1
+
+
+def test_a_deleted_camera_is_passed_over() -> None:
+    path = made().make_capture(folder() / "ball", photos=3)
+    bpy.ops.patina.import_capture(filepath=str(path))
+    scene, listed = bpy.context.scene, extension("scene.photo_list")
+    bpy.data.objects.remove(scene.patina_photos.photos[1].camera)
+    assert [p.name for p in listed.lit_photos(scene)] == ["lit_1.exr", "lit_3.exr"]
+    bpy.ops.patina.next_photo()
+    assert listed.looked_at(scene).name == "lit_3.exr"
+    scene.patina_photos.active = 1  # nothing to look at
+    assert listed.looked_at(scene) is None
+
+
+def test_time_left_is_told_in_round_numbers() -> None:
+    state = extension("scene.running")
+    for seconds, said in (
+        (None, "x"),
+        (3, "x, 5 s left"),
+        (43, "x, 45 s left"),
+        (200, "x, 3 min left"),
+    ):
+        assert state.Running("s", "fit", "x", 0.5, seconds).said == said
