@@ -169,7 +169,7 @@ def test_comes_and_goes_without_a_trace() -> None:
     module.unregister()
     try:
         before = traces()
-        for _ in range(5):
+        for _ in range(20):
             module.register()
             during = traces()
             module.unregister()
@@ -180,6 +180,35 @@ def test_comes_and_goes_without_a_trace() -> None:
             assert not left, f"left behind: {left}"
     finally:
         module.register()
+
+
+def test_twenty_files_leave_nothing() -> None:
+    """A file with a capture in it and one without, by turns: nothing piles up, nothing stays."""
+    from test_workflow import folder, made
+
+    kinds = ("objects", "cameras", "lights", "images", "collections", "texts", "materials")
+
+    def counts() -> dict[str, int]:
+        return {kind: len(getattr(bpy.data, kind)) for kind in kinds}
+
+    def attached() -> int:
+        lists = (getattr(bpy.app.handlers, name) for name in dir(bpy.app.handlers))
+        return sum(len(each) for each in lists if isinstance(each, list))
+
+    place = folder()
+    files = [str(place / "empty.blend"), str(place / "capture.blend")]
+    bpy.ops.wm.save_as_mainfile(filepath=files[0])
+    bpy.ops.patina.import_capture(filepath=str(made().make_capture(place / "ball", photos=3)))
+    bpy.ops.wm.save_as_mainfile(filepath=files[1])
+    first: dict[str, tuple[dict[str, int], int, dict[str, set[str]]]] = {}
+    for k in range(20):
+        file = files[k % 2]
+        bpy.ops.wm.open_mainfile(filepath=file)
+        found = counts(), attached(), traces()
+        assert found == first.setdefault(file, found), (k, file)
+    empty, full = (first[file] for file in files)
+    assert full[0]["images"] == empty[0]["images"] + 3
+    assert (full[1], full[2]) == (empty[1], empty[2])
 
 
 def test_disabled_and_enabled_in_preferences() -> None:
