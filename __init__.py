@@ -21,6 +21,7 @@ MODULES: tuple[str, ...] = (
     "operators.check",
     "operators.look_through",
     "operators.save_lights",
+    "operators.mark_assets",
     "panels.sidebar",
 )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import bpy
@@ -9,12 +10,20 @@ import bpy
 from ..core.report.figures import either_side
 from .wrapped import IN_BOX, wrapped
 
+SPHERE = 5.0  # of a line's height
 
-def draw_measured(layout: bpy.types.UILayout, result: dict[str, Any] | None) -> None:
-    """result: the content of result.json."""
+
+def draw_measured(
+    layout: bpy.types.UILayout,
+    result: dict[str, Any] | None,
+    there: Mapping[str, bpy.types.Material],
+) -> None:
+    """result: the content of result.json; there: name in it → material."""
     for material in (result or {}).get("materials", []):
         box = layout.box()
         box.label(text=material["name"], icon="MATERIAL")
+        if material["name"] in there:
+            box.template_icon(icon_value=icon_of(there[material["name"]]), scale=SPHERE)
         held = material.get("held_out")
         if held:
             said = f"Predicts a photo it has not seen to {100 * held['typical']:.0f} %"
@@ -25,3 +34,8 @@ def draw_measured(layout: bpy.types.UILayout, result: dict[str, Any] | None) -> 
         box.label(text=f"{material['samples']['used']:,} samples", icon="BLANK1")
         for warning in material["warnings"]:
             wrapped(box, warning, "ERROR", IN_BOX)
+
+
+def icon_of(material: bpy.types.Material) -> int:
+    """Of its preview, the usual one where it has none."""
+    return material.preview.icon_id if material.preview is not None else 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.apply import measured_materials
+from ..scene.apply import measured_materials, measured_of
 from ..scene.fallback import osl_hindrance
 from ..scene.materials import REASON_PROPERTY
 from ..scene.photo_list import looked_at
@@ -13,7 +13,7 @@ from ..scene.properties import DIAGNOSIS, capture_path, stored_result
 from .check_box import draw_check
 from .lamp_box import draw_lamp
 from .mask_box import draw_materials, draw_shadow
-from .measured_box import draw_measured
+from .measured_box import draw_measured, icon_of
 from .photo_rows import PATINA_UL_photos, draw_photos
 from .stage import StagePanel
 from .wrapped import wrapped
@@ -64,7 +64,7 @@ class PATINA_PT_fit(StagePanel, bpy.types.Panel):
         result = stored_result(capture_path(context.scene))
         if result is not None:
             layout.operator("patina.fit", text="Fit Anew", icon="FILE_REFRESH")
-        draw_measured(layout, result)
+        draw_measured(layout, result, measured_of(capture_path(context.scene)))
 
 
 class PATINA_PT_check(StagePanel, bpy.types.Panel):
@@ -91,11 +91,13 @@ class PATINA_PT_material(StagePanel, bpy.types.Panel):
         hindrance = osl_hindrance(context.scene) if found else None
         for material in found:
             row = layout.row()
-            row.label(text=material.name, icon="MATERIAL")
+            row.label(text=material.name, icon_value=icon_of(material))
             portable = REASON_PROPERTY in material or hindrance is not None
             row.label(text="Portable" if portable else "Measured")
         for reason in sorted({*reasons} if reasons else {hindrance} - {None}):
             wrapped(layout, f"Not the measurement itself: {reason}", "INFO")
+        if found:
+            layout.operator("patina.mark_assets", icon="ASSET_MANAGER")
 
 
 CLASSES = (

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from datetime import date
 
 import bpy
 
 from ..core.job import CaptureResult, Stage
 from ..core.report.result_json import describe
 from . import materials, meshes, osl_files
+from .preview import show_sphere
 from .properties import CAPTURE, store_result
 
 MEASURED = "patina_measured"  # on the material: the name it has in its capture
+DATE = "patina_date"  # on the material: when it was measured
 
 
 def measured_materials() -> list[bpy.types.Material]:
     """The materials that a fit made, by name."""
     return sorted((m for m in bpy.data.materials if MEASURED in m), key=lambda m: m.name)
+
+
+def measured_of(capture: str) -> dict[str, bpy.types.Material]:
+    """Name in the capture → material, of one capture."""
+    return {m[MEASURED]: m for m in measured_materials() if m.get(CAPTURE) == capture}
 
 
 def apply_result(
@@ -34,6 +42,8 @@ def apply_result(
         files = osl_files.ensure_files(brdf) if with_osl else None
         new = materials.create_material(fitted.name, brdf, fitted.principled, files, fitted.lobes)
         new[MEASURED], new[CAPTURE] = fitted.name, capture
+        new[DATE] = date.today().isoformat()
+        show_sphere(new, brdf)
         if old is not None:
             name = old.name
             old.user_remap(new)

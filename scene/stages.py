@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from .apply import measured_materials
+from .apply import measured_of
 from .photo_list import PatinaPhoto, lit_photos
 from .properties import DIAGNOSIS, capture_path, stored_result
 from .shadow_images import shadow_images
@@ -100,7 +100,7 @@ def _check(diagnosis: dict | None) -> Stage:  # type: ignore[type-arg]
 
 
 def _material(capture: str) -> Stage:
-    found = [m for m in measured_materials() if m.get("patina_capture") == capture]
+    found = measured_of(capture)
     if not found:
         return Stage(missing="Nothing measured yet")
     return Stage((_many(len(found), "measured material"),))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bpy
+import numpy as np
 from support import extension
 from test_workflow import folder, made
 
@@ -113,3 +114,32 @@ def test_time_left_is_told_in_round_numbers() -> None:
         (200, "x, 3 min left"),
     ):
         assert state.Running("s", "fit", "x", 0.5, seconds).said == said
+
+
+def test_a_measured_material_is_an_asset_that_knows_where_it_is_from() -> None:
+    path = made().make_capture(folder() / "ball", photos=3)
+    bpy.ops.patina.import_capture(filepath=str(path))
+    assert not bpy.ops.patina.mark_assets.poll()
+    bpy.ops.patina.fit()
+    material = bpy.data.materials["surface"]
+    width, height = material.preview.image_size
+    pixels = np.array(material.preview.image_pixels_float[:]).reshape(height, width, 4)
+    disc = pixels[..., 3] > 0.5
+    assert abs(disc.mean() - np.pi / 4 / 1.05**2) < 0.01, "a sphere on nothing"
+    red, green, blue, _ = pixels[disc].mean(axis=0)
+    assert red > 1.3 * green and red > 1.3 * blue, "the ball's red"
+    assert bpy.ops.patina.mark_assets() == {"FINISHED"}
+    data = material.asset_data
+    assert {"Patina", "measured", "surface", "ball"} == {tag.name for tag in data.tags}
+    assert "3 lit photos" in data.description and "unseen photos" in data.description
+    told = material["patina_provenance"]
+    assert told["date"].endswith(material["patina_date"]) and "ball.capture.toml" in told["scan"]
+    bpy.ops.patina.mark_assets()  # again: the same
+    assert len(data.tags) == 4
+    blend = folder() / "asset.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    again = bpy.data.materials["surface"]
+    assert again.asset_data is not None and tuple(again.preview.image_size) == (width, height)
+    kept = np.array(again.preview.image_pixels_float[:]).reshape(height, width, 4)
+    np.testing.assert_allclose(kept, pixels, atol=1 / 255)

@@ -1,0 +1,46 @@
+"""Material stage: the measured materials into the asset browser."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..scene.apply import measured_of
+from ..scene.assets import mark
+from ..scene.properties import capture_path, stored_result
+
+
+class PATINA_OT_mark_assets(bpy.types.Operator):
+    """Mark the measured materials as assets, with their spheres, tags and where they come from; \
+saved in a file of an asset library they are found from everywhere"""
+
+    bl_idname = "patina.mark_assets"
+    bl_label = "Mark as Assets"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if measured_of(capture_path(context.scene)):
+            return True
+        cls.poll_message_set("Nothing is measured yet: fit the materials first")
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        capture = capture_path(context.scene)
+        result = stored_result(capture)
+        if result is None:
+            self.report({"ERROR"}, "What the fit found is gone from this file: fit again")
+            return {"CANCELLED"}
+        marked = [m.name for m in measured_of(capture).values() if mark(m, result)]
+        if not marked:
+            self.report({"ERROR"}, "The last fit knows none of these materials: fit again")
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Assets now: {', '.join(marked)}")
+        return {"FINISHED"}
+
+
+def register() -> None:
+    bpy.utils.register_class(PATINA_OT_mark_assets)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(PATINA_OT_mark_assets)
