@@ -71,17 +71,16 @@ picture)
   system "$dir"
   bind "$dir" "$here"
   bind "$dir" "$cache"
-  command -v "$dir/usr/bin/xdotool" >/dev/null || inside "$dir" apt-get install -y -qq \
-    --no-install-recommends xvfb xauth xdotool imagemagick fonts-dejavu-core >/dev/null
+  command -v "$dir/usr/bin/import" >/dev/null || inside "$dir" apt-get install -y -qq \
+    --no-install-recommends xvfb xauth imagemagick fonts-dejavu-core >/dev/null
   BLENDER_USER_RESOURCES="$cache/blender-4.3-cp313" inside "$dir" /bin/bash -c '
-    cd "$0"; Xvfb :97 -screen 0 1600x900x24 +extension GLX >/dev/null 2>&1 & screen=$!
+    cd "$0"; rm -f /tmp/window-ready; Xvfb :97 -screen 0 1600x900x24 +extension GLX >/dev/null 2>&1 & screen=$!
     export DISPLAY=:97 LIBGL_ALWAYS_SOFTWARE=1; sleep 2
     blender --factory-startup --addons bl_ext.user_default.patina -P tools/window_scene.py \
       >/dev/null 2>&1 & window=$!
     for _ in $(seq 120); do [ -e /tmp/window-ready ] && break; sleep 1; done
     sleep 20  # shaders
-    xdotool mousemove 1309 248 click 1  # the tab of the sidebar
-    sleep 4; rm -f /tmp/window-ready; import -window root /tmp/window.png; kill $window $screen' "$here"
+    rm -f /tmp/window-ready; import -window root /tmp/window.png; kill $window $screen' "$here"
   mv "$dir/tmp/window.png" "$png" ;;
 *) sed -n '2,9p' "$0"; exit 2 ;;
 esac

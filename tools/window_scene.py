@@ -12,7 +12,7 @@ bpy.context.preferences.view.show_splash = False
 
 
 def build() -> None:
-    """Import, fit, stand behind the first photo, open the sidebar."""
+    """Import, fit, stand behind the first photo, the sidebar at the tab."""
     window = bpy.context.window_manager.windows[0]
     area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
     region = next(r for r in area.regions if r.type == "WINDOW")
@@ -25,6 +25,14 @@ def build() -> None:
         bpy.ops.patina.next_photo(step=0)
         bpy.ops.view3d.view_center_camera()
     area.spaces.active.shading.type = "MATERIAL"
+    bpy.app.timers.register(show_tab, first_interval=3)  # tabs are known once they were drawn
+
+
+def show_tab() -> None:
+    """Of the sidebar, and say that a photograph may be taken."""
+    areas = bpy.context.window_manager.windows[0].screen.areas
+    area = next(a for a in areas if a.type == "VIEW_3D")
+    next(r for r in area.regions if r.type == "UI").active_panel_category = "Patina"
     area.tag_redraw()
     Path("/tmp/window-ready").touch()
 
