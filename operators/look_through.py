@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.photo_list import lit_photos, look_at, looked_at
+from ..scene.photo_list import lit_photos, looked_at
 
 
 class PATINA_OT_next_photo(bpy.types.Operator):
@@ -36,10 +36,9 @@ class PATINA_OT_next_photo(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         found, now = lit_photos(scene), looked_at(scene)
-        places = [photo.place for photo in found]
-        at = (places.index(now.place) + self.step) % len(found) if now in found else 0
-        scene.patina_photos.active = list(scene.patina_photos.photos).index(found[at])
-        look_at(scene, found[at])
+        at = (found.index(now) + self.step) % len(found) if now in found else 0
+        state = scene.patina_photos
+        state.active = list(state.photos).index(found[at])  # which looks at it
         for area in context.screen.areas if context.screen else ():
             if area.type == "VIEW_3D":
                 area.spaces.active.region_3d.view_perspective = "CAMERA"

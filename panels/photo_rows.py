@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.photo_list import PatinaPhoto, PatinaPhotos, looked_at
+from ..scene.photo_list import PatinaPhoto, PatinaPhotos, has_camera, looked_at
 from ..scene.properties import capture_path
 from ..scene.shadow_images import shadow_images
 
@@ -26,9 +26,9 @@ class PATINA_UL_photos(bpy.types.UIList):
         active: PatinaPhotos,
         property_name: str,
     ) -> None:
-        gone = item.camera is None or item.camera.name not in context.scene.objects
+        there = has_camera(context.scene, item)
         row = layout.row(align=True)
-        row.active = not gone
+        row.active = there
         preview = item.image.preview if item.image is not None else None
         if preview is not None and preview.icon_id:
             row.label(text=item.name, icon_value=preview.icon_id)
@@ -38,8 +38,8 @@ class PATINA_UL_photos(bpy.types.UIList):
         right.alignment = "RIGHT"
         right.label(text=item.light)
         masked = item.place in shadow_images(capture_path(context.scene))
-        state = "ERROR" if gone else "IMAGE_ALPHA" if masked else "BLANK1"
-        right.label(text="", icon=state)
+        state = "IMAGE_ALPHA" if masked else "BLANK1"
+        right.label(text="", icon=state if there else "ERROR")
 
 
 def draw_photos(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:

@@ -61,10 +61,8 @@ class PATINA_PT_fit(StagePanel, bpy.types.Panel):
     stage = "fit"
 
     def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-        result = stored_result(capture_path(context.scene))
-        if result is not None:
-            layout.operator("patina.fit", text="Fit Anew", icon="FILE_REFRESH")
-        draw_measured(layout, result, measured_of(capture_path(context.scene)))
+        capture = capture_path(context.scene)
+        draw_measured(layout, stored_result(capture), measured_of(capture))
 
 
 class PATINA_PT_check(StagePanel, bpy.types.Panel):
@@ -76,7 +74,6 @@ class PATINA_PT_check(StagePanel, bpy.types.Panel):
     def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         diagnosis = stored_result(capture_path(context.scene), DIAGNOSIS)
         if diagnosis is not None:
-            layout.operator("patina.check", text="Check Anew", icon="FILE_REFRESH")
             draw_check(layout, diagnosis, context.scene.patina.causes)
 
 

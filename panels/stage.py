@@ -43,6 +43,8 @@ class StagePanel:
             if next_stage(found) == self.stage:
                 row.scale_y = LARGE
             row.operator(mine.press)
+        elif mine.again:
+            layout.operator(mine.press, text=mine.again, icon="FILE_REFRESH")
         self.draw_more(layout, context)
 
     def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -81,14 +81,17 @@ def list_photos(scene: bpy.types.Scene, photos: Sequence[LitPhoto]) -> None:
         line.camera, line.image, line.light = photo.camera, photo.image, photo.entry.light
         line.exposure = photo.entry.exposures[0] if photo.entry.exposures else 0.0
         _with_thumbnail(photo.image)
-    state.active = 0
-    if photos:
-        look_at(scene, state.photos[0])
+    state.active = 0  # which looks at it
 
 
 def lit_photos(scene: bpy.types.Scene) -> list[PatinaPhoto]:
     """Those whose camera is still in the scene."""
-    return [p for p in scene.patina_photos.photos if _there(scene, p.camera)]
+    return [photo for photo in scene.patina_photos.photos if has_camera(scene, photo)]
+
+
+def has_camera(scene: bpy.types.Scene, photo: PatinaPhoto) -> bool:
+    """Whether it can be looked at."""
+    return photo.camera is not None and photo.camera.name in scene.objects
 
 
 def looked_at(scene: bpy.types.Scene) -> PatinaPhoto | None:
@@ -102,7 +105,7 @@ def looked_at(scene: bpy.types.Scene) -> PatinaPhoto | None:
 def look_at(scene: bpy.types.Scene, photo: PatinaPhoto) -> None:
     """Through its camera, the photo behind the mesh, its lamp alone switched on."""
     camera = photo.camera
-    if not _there(scene, camera):
+    if not has_camera(scene, photo):
         return
     behind = camera.data.background_images
     if len(behind) and photo.image is not None:
@@ -132,10 +135,6 @@ def _with_thumbnail(image: bpy.types.Image | None) -> None:
     """A list shows what is there: Blender draws it in the background."""
     if image is not None and not bpy.app.background:
         image.preview_ensure()
-
-
-def _there(scene: bpy.types.Scene, camera: bpy.types.Object | None) -> bool:
-    return camera is not None and camera.name in scene.objects
 
 
 @bpy.app.handlers.persistent

@@ -15,11 +15,13 @@ from .shadow_images import shadow_images
 @dataclass(frozen=True)
 class Stage:
     """has: what is there, a line each; missing: what is to be done, None where nothing is; press:
-    the operator that does it; optional: whether the next stage does not wait for it."""
+    the operator that does it; again: what its button says where it is done; optional: whether the
+    next stage does not wait for it."""
 
     has: tuple[str, ...] = ()
     missing: str | None = None
     press: str = ""
+    again: str = ""
     optional: bool = False
 
     @property
@@ -88,7 +90,8 @@ def _masks(
 def _fit(result: dict | None) -> Stage:  # type: ignore[type-arg]
     if result is None:
         return Stage(missing="Not measured yet", press="patina.fit")
-    return Stage((f"{_many(len(result.get('materials', [])), 'material')} measured",))
+    has = f"{_many(len(result.get('materials', [])), 'material')} measured"
+    return Stage((has,), press="patina.fit", again="Fit Anew")
 
 
 def _check(diagnosis: dict | None) -> Stage:  # type: ignore[type-arg]
@@ -96,7 +99,8 @@ def _check(diagnosis: dict | None) -> Stage:  # type: ignore[type-arg]
         said = "Not checked yet: is the light, the camera, the mesh what the capture says?"
         return Stage((), said, "patina.check", optional=True)
     named = [cause.replace("_", " ") for cause in diagnosis["named"] if cause != "none"]
-    return Stage((f"Found: {', '.join(named)}" if named else "Nothing that can be named",))
+    has = f"Found: {', '.join(named)}" if named else "Nothing that can be named"
+    return Stage((has,), press="patina.check", again="Check Anew")
 
 
 def _material(capture: str) -> Stage:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
@@ -47,10 +48,8 @@ def main() -> int:
         ]
         panels.append(relit(out / "scene.blend", Path(folder), box))
     height = min(panel.shape[0] for panel in panels)
-    strip = [np.full((height, GAP, 3), 255, np.uint8)] * (2 * len(panels) - 1)
-    strip[::2] = [panel[:height] for panel in panels]
     TARGET.parent.mkdir(parents=True, exist_ok=True)
-    write(TARGET, np.concatenate(strip, axis=1))
+    write(TARGET, with_gaps([panel[:height] for panel in panels], axis=1))
     print(f"wrote {TARGET}: {TARGET.stat().st_size / 1000:.0f} kB")
     diagnosis_picture()
     return 0
@@ -80,6 +79,15 @@ def relit(blend: Path, folder: Path, box: tuple[slice, slice]) -> np.ndarray:
     scene.render.filepath = str(folder / "relit.png")
     bpy.ops.render.render(write_still=True)
     return read(Path(scene.render.filepath))[box]
+
+
+def with_gaps(panels: Sequence[np.ndarray], axis: int) -> np.ndarray:
+    """Panels (h, w, 3), alike along the other axis, with white between."""
+    shape = list(panels[0].shape)
+    shape[axis] = GAP
+    strip = [np.full(shape, 255, np.uint8)] * (2 * len(panels) - 1)
+    strip[::2] = panels
+    return np.concatenate(strip, axis=axis)
 
 
 def read(path: Path) -> np.ndarray:

@@ -160,12 +160,11 @@ class Model:
     def predicted(self, x: Sequence[Vector] | None = None) -> Array:
         """(n, 3) what the photos show."""
         if x is None:
-            return self.shown(self.lit)
+            return self.shown(self.lit.now, self.lit.reflected)
         now = self.situation(x)
         reflected = self.reflected(self.lamps(now, x))
-        return self.recorded(self.entering(reflected, now, x), now, x)
+        return self.shown(now, reflected, x)
 
-    def shown(self, lit: Lit, x: Sequence[Vector] | None = None) -> Array:
-        """(n, 3) what the photos show of light; x differs from its model's in numbers that change
-        neither surface nor lamp."""
-        return self.recorded(self.entering(lit.reflected, lit.now, x), lit.now, x)
+    def shown(self, now: Situation, reflected: Array, x: Sequence[Vector] | None = None) -> Array:
+        """(n, 3) what the photos show where the surface reflects so much of the lamp's light."""
+        return self.recorded(self.entering(reflected, now, x), now, x)

@@ -110,5 +110,6 @@ def _moved(model: Model, place: int, numbers: NDArray[np.intp], step: float) -> 
     x = list(model.x)
     x[place] = x[place].copy()
     x[place][numbers] += step
-    lights = model.effects[place].lights
-    return model.predicted(x) if lights else model.shown(model.lit, x)
+    if model.effects[place].lights:
+        return model.predicted(x)
+    return model.shown(model.lit.now, model.lit.reflected, x)

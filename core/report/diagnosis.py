@@ -14,7 +14,7 @@ from ..diagnose.search import Found, Trial
 from ..job import CaptureResult
 from ..photo import write_png
 from .page import page
-from .residual_picture import residual_picture
+from .residual_picture import photo_most_changed, residual_picture
 from .sphere import write_sphere
 from .trend_chart import trend_chart
 
@@ -106,10 +106,9 @@ def _evidence(folder: Path, found: Found, setting: Setting) -> str:
     cells, pixels = "", setting.pixels
     for trial in found.accepted:
         changed = trial.changed() / found.before.deviation
-        strength = np.bincount(pixels.photo, np.sum(changed**2, axis=1))
-        if not strength.any():
+        photo = photo_most_changed(pixels, changed)
+        if photo is None:
             continue
-        photo = int(np.argmax(strength / np.maximum(np.bincount(pixels.photo), 1)))
         cause, file = trial.effect.cause, evidence_file(trial.effect.cause)
         write_png(folder / file, residual_picture(pixels, -changed, photo))
         cells += (

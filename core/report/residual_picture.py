@@ -14,6 +14,14 @@ WITHIN = 3.0  # typical distances between the pixels that were looked at
 FULL = 3.0  # deviations, for full colour
 
 
+def photo_most_changed(pixels: Pixels, changed: NDArray[np.floating]) -> int | None:
+    """By a change (n, 3) in deviations, a pixel of it; None where nothing changes."""
+    strength = np.bincount(pixels.photo, np.sum(changed**2, axis=1))
+    if not strength.any():
+        return None
+    return int(np.argmax(strength / np.maximum(np.bincount(pixels.photo), 1)))
+
+
 def residual_picture(
     pixels: Pixels, residual: NDArray[np.floating], photo: int
 ) -> NDArray[np.uint8]:

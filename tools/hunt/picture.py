@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..common import ROOT, say
-from ..make_pictures import GAP, write
+from ..make_pictures import with_gaps, write
 
 TARGET = ROOT / "docs" / "images" / "diagnosis.jpg"
 SHOWN = (("cast_shadow", 2), ("near_light", 2), ("vignetting", 2))  # and the capture's seed
@@ -32,8 +32,7 @@ def make() -> None:
     filled = [
         np.pad(r, ((0, 0), (0, width - r.shape[1]), (0, 0)), constant_values=255) for r in rows
     ]
-    between = np.full((GAP, width, 3), 255, np.uint8)
-    write(TARGET, np.concatenate([x for row in filled for x in (row, between)][:-1], axis=0))
+    write(TARGET, with_gaps(filled, axis=0))
     print(f"wrote {TARGET}: {TARGET.stat().st_size / 1000:.0f} kB")
 
 
@@ -42,7 +41,7 @@ def _row(folder: Path, cause: str, seed: int) -> Array:
     from patina.core.job import FitJob, finished
     from patina.core.job.diagnose_job import DiagnoseJob
     from patina.core.report import display
-    from patina.core.report.residual_picture import residual_picture
+    from patina.core.report.residual_picture import photo_most_changed, residual_picture
 
     from .make import make as hide
 
@@ -53,8 +52,8 @@ def _row(folder: Path, cause: str, seed: int) -> Array:
     say(f"{cause}: {', '.join(found.causes) or 'none'}")
     trial, pixels = found.accepted[0], finished(job.setting).pixels
     changed = trial.changed() / found.before.deviation
-    strength = np.bincount(pixels.photo, np.sum(changed**2, axis=1))
-    photo = int(np.argmax(strength / np.bincount(pixels.photo)))
+    photo = photo_most_changed(pixels, changed)
+    assert photo is not None
     radiance = result.photos.read(photo).radiance
     white = display.white_level(radiance)
     box = display.crop_box(radiance.max(axis=2) > 0.002 * white, margin=2)
@@ -63,8 +62,7 @@ def _row(folder: Path, cause: str, seed: int) -> Array:
         display.photo_picture(radiance[box], white),
         *(residual_picture(pixels, r, photo) for r in (found.before.residual, after, -changed)),
     ]
-    gap = np.full((HEIGHT, GAP, 3), 255, np.uint8)
-    return np.concatenate([x for cell in cells for x in (_sized(cell), gap)][:-1], axis=1)
+    return with_gaps([_sized(cell) for cell in cells], axis=1)
 
 
 def _sized(cell: Array) -> Array:
