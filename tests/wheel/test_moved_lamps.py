@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from patina.core.job import inputs  # noqa: E402
 from patina.core.job.lights import Lights  # noqa: E402
 from patina.core.light import DistantLight, MountedLight, NearLight  # noqa: E402
 from patina.core.scan import Scan  # noqa: E402
-from patina.scene import lights, moved_lamps  # noqa: E402
+from patina.scene import lights, moved_lamps, photo_list  # noqa: E402
 from patina.scene.scan_collection import create_scan_collection  # noqa: E402
 from tests import make_capture as made  # noqa: E402
 
@@ -108,6 +109,14 @@ def _build(folder: Path, far: np.ndarray, known: bool = True) -> Built:
 @pytest.fixture(params=FAR, ids=["here", "far"])
 def built(request, tmp_path: Path) -> Built:
     return _build(tmp_path, request.param)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def listed_photos() -> Iterator[None]:
+    """A scan's collection fills the scene's list of photos, which the add-on brings along."""
+    photo_list.register()
+    yield
+    photo_list.unregister()
 
 
 def _step_through(built: Built) -> None:
