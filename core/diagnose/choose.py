@@ -28,10 +28,11 @@ from ..job.photos import LitPhoto, LitPhotos
 from ..light import Light
 from ..samples.reservoir import sample_hash
 from ..samples.take import light_surface
-from ..scan import Scan
+from ..scan import Camera, Scan
 from .brdfs import BRDFs
 from .closer_look import about_dark_spots, grid_step, on_grid
 from .image_cells import cell_numbers, from_centre
+from .part_lit import part_lit
 from .pixels import Pixels
 
 Array = NDArray[np.float32]
@@ -42,6 +43,7 @@ REACH = 8  # pixels from the edge of a shadow that are told apart
 HIGHLIGHT = np.radians(15.0)  # θh
 MORE = 0.2  # of a photo's share, at most, about dark spots
 BLOCKS = 6  # parts of a photo along the longer side of what it shows of the object
+BESIDE = 1.5  # pixels from the edge of a shadow that may be lit in part
 OUTLINE = 2  # pixels beside it that belong to no surface surely
 LEAST_COS_O = 0.15  # beyond 81° a pixel sees too much surface
 VEIL = 0.2  # of the diagonal
@@ -111,7 +113,8 @@ def _of_photo(
     )
     rows = about_dark_spots(all_over, brdfs, camera.width, step, int(MORE * count))
     more = rows[~np.isin(dense.pixel[rows], chosen.pixel)]
-    return _with_photo(Pixels.join([chosen, dense.select(more)]), photo)
+    chosen = Pixels.join([chosen, dense.select(more)])
+    return _with_photo(_part_lit(chosen, rays, light, camera), photo)
 
 
 def _of_band(
@@ -167,7 +170,8 @@ def _of_band(
         noise=none,
         slope=np.zeros((n, 2, 3), np.float32),
         veil=np.zeros((n, 2, 3), np.float32),
-        turn=_turns(view)[rows],
+        turn=_steps(view, view.normal)[rows],
+        step=_steps(view, view.point - view.point.mean(axis=0))[rows],
         usable=photo.usable.ravel().take(pixel),
         block=np.zeros(n, np.int32),
     )
@@ -204,9 +208,21 @@ def _with_photo(pixels: Pixels, photo: LitPhoto) -> Pixels:
     )
 
 
-def _turns(view: SurfaceView) -> Array:
-    """(n, 2, 3) what the normal is more a pixel to the right and down; 0 at outlines."""
-    image = view.image(np.asarray(view.normal, np.float32))
+def _part_lit(pixels: Pixels, rays: RayScene, light: Light, camera: Camera) -> Pixels:
+    """What is lit in part beside the edges of shadows."""
+    rows = np.flatnonzero(pixels.edge < BESIDE)
+    if not len(rows):
+        return pixels
+    some, visible = pixels.select(rows), pixels.visible.copy()
+    incidence = light.incidence(some.point, camera)
+    visible[rows] = part_lit(rays, some, some.light, incidence.distance)
+    return replace(pixels, visible=visible)
+
+
+def _steps(view: SurfaceView, values: NDArray[np.floating]) -> Array:
+    """(n, 2, 3) what normals or points (n, 3) are more a pixel to the right and down; 0 at
+    outlines."""
+    image = view.image(np.asarray(values, np.float32))
     out = np.zeros((*image.shape[:2], 2, 3), np.float32)
     out[:, 1:-1, 0] = 0.5 * (image[:, 2:] - image[:, :-2])
     out[1:-1, :, 1] = 0.5 * (image[2:] - image[:-2])

@@ -214,6 +214,11 @@ class Effect(ABC):
         kind = type(self)
         return kind.before is not Effect.before or kind.lamps is not Effect.lamps
 
+    def casting(self, setting: Setting, x: NDArray[np.float64]) -> Effect:
+        """The same, where the mesh casts shadows away from where these numbers put the lamp: they
+        are found once the effect is accepted, since each needs rays. Most move no lamp."""
+        return self
+
     def before(self, now: Situation, x: NDArray[np.float64]) -> Situation:
         """Surface and light with the effect."""
         return now

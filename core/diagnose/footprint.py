@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..angles.vectors import dot
 from .brdfs import BRDFs
 from .pixels import Pixels
 from .situation import Situation
@@ -29,10 +30,12 @@ class Footprint:
 
     @cached_property
     def wide(self) -> NDArray[np.intp]:
-        """Places of the pixels over which the highlight changes."""
+        """Places of the pixels over which the highlight changes, or a part of which is turned away
+        from the light."""
         turn = np.linalg.norm(self.pixels.turn, axis=2).sum(axis=1)
-        theta_h = Situation.of(self.pixels).angles.theta_h
-        return np.flatnonzero((turn > LEAST) & (theta_h < NEAR))
+        now = Situation.of(self.pixels)
+        ends = np.abs(dot(now.normal, now.light)) < turn
+        return np.flatnonzero((turn > LEAST) & ((now.angles.theta_h < NEAR) | ends))
 
     @cached_property
     def part(self) -> Pixels:

@@ -25,7 +25,8 @@ def pixels_of_samples(
     table: SampleTable, material: int, capture: Capture, scan: Scan, photos: LitPhotos, read: bool
 ) -> Generator[float, None, Pixels]:
     """Of every sample (n,), all of one material; yields the fraction done. read: whether photos
-    are, for ``slope`` and ``veil``, which are 0 otherwise, as ``turn`` and ``block`` always are.
+    are, for ``slope`` and ``veil``, which are 0 otherwise, as ``turn``, ``step`` and ``block``
+    always are.
     Raises InputError for a photo that is no longer there."""
     n = len(table)
     x, y = np.zeros(n, np.float32), np.zeros(n, np.float32)
@@ -47,8 +48,8 @@ def pixels_of_samples(
         irradiance=table.irradiance, visible=np.ones(n, np.float32),
         edge=np.full(n, REACH, np.float32), curvature=table.curvature, observed=table.radiance,
         noise=np.full((n, 3), 1e-20, np.float32), slope=slope, veil=veil,
-        turn=np.zeros((n, 2, 3), np.float32), usable=np.ones(n, bool),
-        block=np.zeros(n, np.int32),
+        turn=np.zeros((n, 2, 3), np.float32), step=np.zeros((n, 2, 3), np.float32),
+        usable=np.ones(n, bool), block=np.zeros(n, np.int32),
     )  # fmt: skip
 
 

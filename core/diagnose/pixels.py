@@ -16,12 +16,12 @@ class Pixels:
     photo, material: (n,) int16 numbers in the capture. pixel: (n,) int32 flat index in the photo.
     x, y: (n,) float32 from the photo's centre, 1 at half its diagonal. point: (n, 3) float64;
     normal, view, light: (n, 3) unit; scan frame. irradiance: (n, 3) at normal incidence. visible:
-    (n,) 1 where the mesh lets the light through, 0 in its cast shadow. edge: (n,) pixels to the
-    next edge of a shadow, at most REACH. curvature: (n,) 1/pixel, NaN unknown. observed: (n, 3)
+    (n,) part of the light that the mesh lets through, 0 in its cast shadow. edge: (n,) pixels to
+    the next edge of a shadow, at most REACH. curvature: (n,) 1/pixel, NaN unknown. observed: (n, 3)
     radiance; noise: (n, 3) its variance by the photo's own noise. slope: (n, 2, 3) what the photo
     shows more a pixel to the right and a pixel down; veil: (n, 2, 3) the photo blurred widely, and
-    its mean. turn: (n, 2, 3) what the normal is more a pixel to the right and a pixel down. usable:
-    (n,) not clipped. block: (n,) int32 the part of its photo each is in.
+    its mean. turn, step: (n, 2, 3) what normal and point are more a pixel to the right and a pixel
+    down. usable: (n,) not clipped. block: (n,) int32 the part of its photo each is in.
     """
 
     photo: NDArray[np.int16]
@@ -42,6 +42,7 @@ class Pixels:
     slope: NDArray[np.float32]
     veil: NDArray[np.float32]
     turn: NDArray[np.float32]
+    step: NDArray[np.float32]
     usable: NDArray[np.bool_]
     block: NDArray[np.int32]
 

@@ -52,6 +52,7 @@ NEARLY = 0.93  # of the best gain
 TRIED, PROMISING = 4, 0.25  # so many are fitted at least; and all that promise this of the best
 UNLIKELY = 0.05  # chance of effects of patches that are fitted
 MINOR = 0.05  # of what accepted effects gained: less is more likely what their model lacks
+SHADOWS = 2  # rounds in which a lamp that is found elsewhere casts its shadows anew
 EXPECTATIONS = 1  # rounds in which patches say what is usual among them
 ALIKE = 2.0  # standard errors by which gains differ that the photos cannot tell apart
 
@@ -202,6 +203,7 @@ def search(
             break
         if best.effect.of_brdf:
             best = replace(_remade(now, costs, best, setting), ties=best.ties)
+        best = _with_shadows(now, costs, best, setting)
         accepted.append(best)
         now = best.fitted
         left = [e for e in left if e.cause != best.effect.cause]
@@ -289,6 +291,16 @@ def _remade(now: Fitted, costs: Costs, best: Trial, setting: Setting) -> Trial:
     effect = best.effect.of(replace(setting, brdfs=best.fitted.model.brdfs))
     assert effect is not None
     return _try(now, costs, Asked(effect, best.gain, best.chance))
+
+
+def _with_shadows(now: Fitted, costs: Costs, best: Trial, setting: Setting) -> Trial:
+    """With shadows away from where it puts the lamp, if it moves one."""
+    for _ in range(SHADOWS):
+        effect = best.effect.casting(setting, best.x)
+        if effect is best.effect:
+            break
+        best = replace(_try(now, costs, Asked(effect, best.gain, best.chance)), ties=best.ties)
+    return best
 
 
 def _costs(now: Fitted) -> Costs:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..angles import half_difference
 from ..angles.vectors import tangents
 from ..geometry import RayScene
-from ..geometry.view import SHADOW_LIFT
+from ..geometry.lift import SHADOW_LIFT
 from .brdfs import BRDFs
 from .effect import Setting
 from .pixels import Pixels

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..angles.vectors import length
 from ..scan import Mesh
 from .cover import Cover
+from .lift import SHADOW_LIFT, facet_lift
 
 CHUNK = 1 << 20  # rays at once: 24 M rays with their results would take over 2 GB
 
@@ -31,11 +32,13 @@ class Hits(NamedTuple):
 @dataclass(frozen=True)
 class RayScene:
     """A mesh ready for rays. Embree works in float32: everything is shifted to the mesh's centre,
-    so that georeferenced coordinates lose nothing."""
+    so that georeferenced coordinates lose nothing. lift: how far above the surface shadow rays
+    start, scan units."""
 
     mesh: Mesh
     origin: NDArray[np.float64]
     scene: EmbreeScene
+    lift: float
 
     @classmethod
     def build(cls, mesh: Mesh) -> RayScene:
@@ -46,9 +49,16 @@ class RayScene:
         del triangles
         one = np.zeros((1, 3), np.float32)
         scene.run(one, one + 1)  # builds the tree here, not in the first of several threads
-        made = cls(mesh, origin, scene)
-        _ = made._vertex_table, made._corners, made.cover
-        return made
+        return cls(mesh, origin, scene, SHADOW_LIFT * mesh.size)._ready()
+
+    def close(self) -> RayScene:
+        """The same, whose shadow rays start as close to the surface as its facets allow."""
+        return replace(self, lift=facet_lift(self.mesh))._ready()
+
+    def _ready(self) -> RayScene:
+        """With all that it keeps, before several threads ask for it."""
+        _ = self._vertex_table, self._corners, self.cover
+        return self
 
     def first_hits(self, start: NDArray[np.float64], directions: NDArray[np.floating]) -> Hits:
         """First hits of rays along ``directions`` (n, 3) from one point ``start`` (3,), or from a

@@ -15,10 +15,6 @@ from .pixel_rays import PixelRays
 from .rays import Hits, RayScene
 from .window import Window, bands
 
-# Shadow rays start this fraction of the object's size above the surface: a scanned surface is rough
-# at the scale of its triangles and would shadow itself
-SHADOW_LIFT = 5e-4
-
 COLUMNS: dict[str, NDArray] = {
     "pixel": np.zeros(0, np.int32),
     "face": np.zeros(0, np.int32),
@@ -158,5 +154,5 @@ def cast_shadow(
 ) -> NDArray[np.bool_]:
     """(n,) whether the mesh blocks the light along ``towards`` (n, 3) at ``points`` (n, 3) with
     ``normals`` (n, 3), up to ``distance`` (n,) where the light is near."""
-    lift = np.float32(SHADOW_LIFT * rays.mesh.size)
+    lift = np.float32(rays.lift)
     return rays.occluded(points, towards, distance, lift * normals.astype(np.float32, copy=False))

@@ -72,9 +72,10 @@ def setting_of(
     """What a diagnosis looks at; yields the fraction done."""
     capture = result.capture
     brdfs = BRDFs.of([m.fit.brdf for m in result.materials])
+    rays = result.rays.close()
     scale = np.array([material.scale for material in result.materials], np.float32)
     pixels = yield from choose_pixels(
-        capture, result.scan, result.rays, result.photos, result.lights, brdfs, scale, pool
+        capture, result.scan, rays, result.photos, result.lights, brdfs, scale, pool
     )
     level = float(np.median(pixels.irradiance))
     pixels = replace(pixels, irradiance=pixels.irradiance / scale[pixels.material, None])
@@ -83,7 +84,7 @@ def setting_of(
     return Setting(
         pixels=pixels,
         brdfs=brdfs,
-        rays=result.rays,
+        rays=rays,
         light=np.array([names.index(photo.light) for photo in capture.photos]),
         lights=tuple(names),
         distant=np.array([light.distant for light in capture.lights]),

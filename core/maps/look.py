@@ -11,7 +11,7 @@ from ..angles import half_difference
 from ..angles.vectors import dot, tangents
 from ..capture import Capture
 from ..geometry import RayScene
-from ..geometry.view import SHADOW_LIFT, cast_shadow
+from ..geometry.view import cast_shadow
 from ..job.photos import LitPhoto
 from ..light import DistantLight, Incidence, Light, MountedLight, NearLight
 from ..scan import Camera, Scan
@@ -112,7 +112,7 @@ class PhotoLook:
         limits = None
         if not self.camera.orthographic:
             limits = np.linalg.norm(self.camera.pose.centre - points, axis=1)
-        lift = np.float32(SHADOW_LIFT * self.rays.mesh.size) * normals.astype(np.float32)
+        lift = np.float32(self.rays.lift) * normals.astype(np.float32)
         return self.rays.occluded(points, view, limits, lift)
 
     def _samples(

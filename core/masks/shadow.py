@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from ..angles.vectors import tangents
 from ..geometry import RayScene, SurfaceView
-from ..geometry.view import SHADOW_LIFT
 from ..light import DistantLight, Light
 from ..scan import Camera, Mesh
 
@@ -137,7 +136,7 @@ class _Points:
         self.rays, self.blur = rays, blur
         self.point, self.normal, self.towards = point, normal, towards
         self.distance, self.radius, self.turn = distance, radius, turn
-        self.start = point + SHADOW_LIFT * rays.mesh.size * normal
+        self.start = point + rays.lift * normal
         # two axes square to the light
         self.across, self.along = tangents(towards)
 

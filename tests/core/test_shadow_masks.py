@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patina.core.geometry import RayScene, SurfaceView, view_surface
-from patina.core.geometry.view import SHADOW_LIFT, cast_shadow
+from patina.core.geometry.view import cast_shadow
 from patina.core.light import DistantLight, MountedLight, NearLight
 from patina.core.masks.shadow import (
     TOLERANCE,
@@ -65,7 +65,7 @@ def floor_points(x) -> SurfaceView:
 
 def lifted(rays: RayScene) -> float:
     """Height of the roof above where shadow rays start."""
-    return HEIGHT - SHADOW_LIFT * rays.mesh.size
+    return HEIGHT - rays.lift
 
 
 @pytest.mark.parametrize("tilt", [-40.0, 0.0, 30.0, 60.0])

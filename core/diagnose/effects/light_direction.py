@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ...angles.vectors import tangents
 from ..effect import Array, Effect, Near, Numbers, Setting, felt_by
+from ..moved_shadows import MovedShadows
 from ..situation import Situation
 
 USUAL = np.radians(3.0)
@@ -19,12 +20,13 @@ FARTHEST = np.radians(25.0)
 class LightDirection(Effect):
     """numbers: for each distant light the tangents of two angles, radians, about ``aside`` and
     ``other``, (lights, 3) unit vectors across its direction. light: (n,) of each pixel, −1 for
-    one that is not distant."""
+    one that is not distant. shadows: of where the lamps were found to be."""
 
     names: tuple[str, ...]
     aside: Array
     other: Array
     light: NDArray[np.intp]
+    shadows: MovedShadows | None = None
     cause = "light_direction"
     proof = "a mirror ball beside the object in one photo under each light"
 
@@ -44,7 +46,8 @@ class LightDirection(Effect):
         return cls(names, *tangents(directions), place)
 
     def elsewhere(self, setting: Setting, near: Near) -> LightDirection:
-        return replace(self, light=self.light[near.photo])
+        found = replace(self, light=self.light[near.photo], shadows=None)
+        return found if self.shadows is None else found.casting(setting, self.shadows.x)
 
     @property
     def numbers(self) -> Numbers:
@@ -55,7 +58,11 @@ class LightDirection(Effect):
     def feels(self) -> NDArray[np.intp]:
         return felt_by(self.light, 2)
 
+    def casting(self, setting: Setting, x: np.ndarray) -> LightDirection:
+        return replace(self, shadows=MovedShadows.of(setting, replace(self, shadows=None), x))
+
     def before(self, now: Situation, x: np.ndarray) -> Situation:
+        now = now if self.shadows is None else self.shadows.on(now)
         moved = x[0::2, None] * self.aside + x[1::2, None] * self.other
         light = now.light + np.where(self.light[:, None] >= 0, moved[self.light], 0.0)
         light /= np.linalg.norm(light, axis=1, keepdims=True)

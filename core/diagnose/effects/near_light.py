@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effect import Array, Effect, Near, Numbers, Setting, felt_by, without_mean
+from ..moved_shadows import MovedShadows
 from ..situation import Situation
 from .light_direction import LightDirection
 
@@ -23,11 +24,12 @@ class NearLight(Effect):
     """numbers: for each distant light the object's size over the lamp's distance, then two angles
     and ln of a gain: where direction and irradiance were measured, a near lamp's are others than at
     the object's centre. from_afar: the same lights as distant ones; offset: (n, 3) from the centre,
-    in sizes."""
+    in sizes. shadows: of where the lamps were found to be."""
 
     from_afar: LightDirection
     offset: Array
     size: float
+    shadows: MovedShadows | None = None
     cause = "near_light"
     proof = "the same photos with the lamp twice as far away"
 
@@ -40,7 +42,8 @@ class NearLight(Effect):
 
     def elsewhere(self, setting: Setting, near: Near) -> NearLight:
         from_afar = self.from_afar.elsewhere(setting, near)
-        return replace(self, from_afar=from_afar, offset=_offset(setting))
+        found = replace(self, from_afar=from_afar, offset=_offset(setting), shadows=None)
+        return found if self.shadows is None else found.casting(setting, self.shadows.x)
 
     @property
     def numbers(self) -> Numbers:
@@ -70,7 +73,11 @@ class NearLight(Effect):
         """(lights,) sizes of the object over the distance."""
         return x[::EACH]
 
+    def casting(self, setting: Setting, x: np.ndarray) -> NearLight:
+        return replace(self, shadows=MovedShadows.of(setting, replace(self, shadows=None), x))
+
     def before(self, now: Situation, x: np.ndarray) -> Situation:
+        now = now if self.shadows is None else self.shadows.on(now)
         angles = np.stack([x[1::EACH], x[2::EACH]], axis=1).ravel()
         now = self.from_afar.before(now, angles)
         light = self.from_afar.light

@@ -1,0 +1,107 @@
+"""Pixels that a shadow's edge cuts, and shadows that go with the lamp, against plain geometry."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from patina.core.diagnose.effects.light_direction import LightDirection
+from patina.core.diagnose.moved_shadows import MovedShadows
+from patina.core.diagnose.part_lit import SIDE, part_lit
+from patina.core.diagnose.pixels import Pixels
+from patina.core.diagnose.situation import Situation
+from patina.core.geometry import RayScene
+from patina.core.geometry.lift import LEAST, SHADOW_LIFT, facet_lift
+from patina.core.scan import Mesh
+from tests import make_lit_ball
+
+WALL = 0.5  # high, at x = 0 across a floor
+WIDE = 0.02  # a pixel on the floor
+
+
+def _floor_and_wall() -> RayScene:
+    floor = [[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]]
+    wall = [[0, -2, 0], [0, 2, 0], [0, 2, WALL], [0, -2, WALL]]
+    faces = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]
+    mesh = Mesh(np.array(floor + wall, float), np.array(faces, np.int32))
+    return RayScene.build(mesh).close()
+
+
+def _row_of_pixels(x: np.ndarray, light: np.ndarray) -> Pixels:
+    n = len(x)
+    some = make_lit_ball.lit_ball().pixels.select(np.zeros(n, np.intp))
+    ones = np.ones((n, 1), np.float32)
+    step = np.zeros((n, 2, 3), np.float32)
+    step[:, 0, 0] = step[:, 1, 1] = WIDE
+    point = np.stack([x, np.full(n, 0.1), np.zeros(n)], axis=1)
+    return replace(
+        some, point=point, normal=ones * np.float32([0, 0, 1]), light=ones * light, step=step,
+        turn=np.zeros((n, 2, 3), np.float32), visible=np.ones(n, np.float32),
+    )  # fmt: skip
+
+
+def _towards(elevation: float) -> np.ndarray:
+    return np.array([-np.cos(elevation), 0, np.sin(elevation)], np.float32)
+
+
+@pytest.mark.parametrize("elevation", [0.2, 0.5, 1.0])
+def test_a_pixel_is_lit_as_far_as_the_shadow_does_not_reach(elevation: float) -> None:
+    ends = WALL / np.tan(elevation)  # of the shadow
+    x = ends + WIDE * np.linspace(-2, 2, 41)
+    towards = _towards(elevation)
+    pixels = _row_of_pixels(x, towards)
+    found = part_lit(_floor_and_wall(), pixels, pixels.light)
+    true = np.clip((x - ends) / WIDE + 0.5, 0, 1)
+    # columns of rays, and the lift by which a shadow begins late
+    late = SHADOW_LIFT * 4 / np.tan(elevation) / WIDE
+    assert np.abs(found - true).max() <= 0.5 / SIDE + late + 1e-6
+    assert abs(found.mean() - true.mean()) < 0.02 + late
+
+
+def test_what_is_turned_away_is_not_in_a_shadow() -> None:
+    pixels = _row_of_pixels(np.array([0.1]), _towards(0.5))
+    assert part_lit(_floor_and_wall(), pixels, -pixels.light) == pytest.approx(1.0)
+
+
+def test_shadows_go_with_the_lamp() -> None:
+    """A lamp that is found lower casts a longer shadow; what is said of it changes nothing where
+    the lamp is where the capture says."""
+    low, high = 0.45, 0.5
+    x = np.linspace(0.7, 1.3, 61)
+    rays = _floor_and_wall()
+    pixels = _row_of_pixels(x, _towards(high))
+    pixels = replace(pixels, visible=part_lit(rays, pixels, pixels.light))
+    setting = replace(make_lit_ball.lit_ball(), pixels=pixels, rays=rays)
+    effect = LightDirection.of(setting)
+    assert effect is not None
+    moved = _towards(low) / (_towards(low) @ _towards(high)) - _towards(high)
+    angles = np.array([effect.aside[0] @ moved, effect.other[0] @ moved])
+    cast = effect.casting(setting, angles).before(Situation.of(pixels), angles)
+    true = part_lit(rays, pixels, np.broadcast_to(_towards(low), (len(x), 3)))
+    assert np.abs(cast.visible - true).max() < 1e-5
+    assert (cast.visible < 0.5).sum() > (pixels.visible < 0.5).sum() + 3
+    still = MovedShadows.of(setting, effect, np.zeros(2))
+    assert np.abs(still.more).max() < 1e-6
+
+
+def test_the_lift_is_as_fine_as_the_mesh() -> None:
+    """Of a sphere it is about the height of the cap over a facet, between what float32 needs and
+    what is enough for every scan."""
+    lifts = []
+    for level in (1, 5, 6):
+        ball = trimesh.creation.icosphere(subdivisions=level)
+        mesh = Mesh(np.array(ball.vertices), np.array(ball.faces, np.int32))
+        lift = facet_lift(mesh) / mesh.size
+        assert LEAST <= lift <= SHADOW_LIFT
+        lifts.append(lift)
+    assert lifts[0] == SHADOW_LIFT and lifts[0] > lifts[1] > lifts[2]
+
+
+def test_every_column_is_selected() -> None:
+    """A new column of Pixels comes along wherever some are chosen."""
+    pixels = make_lit_ball.lit_ball().pixels
+    some = pixels.select(slice(3, 7))
+    assert all(len(getattr(some, f.name)) == 4 for f in fields(Pixels))
