@@ -12,8 +12,9 @@ from ..core.job import CaptureResult, FitJob
 from ..scene.apply import apply_result
 from ..scene.face_slots import with_painted_slots
 from ..scene.lights import with_dragged_lamps
+from ..scene.mask_images import with_mask_images
+from ..scene.painted import take_all
 from ..scene.running import tell
-from ..scene.shadow_images import with_shadow_images
 from .stepped import Stepped
 
 
@@ -34,7 +35,8 @@ def fit_job(operator: bpy.types.Operator, scene: bpy.types.Scene) -> FitJob:
     capture, dragged = with_dragged_lamps(read_capture(path), scene)
     if dragged:
         operator.report({"INFO"}, f"lights as their lamps stand now: {', '.join(dragged)}")
-    capture, prepare = with_painted_slots(with_shadow_images(capture), scene)
+    take_all(scene)
+    capture, prepare = with_painted_slots(with_mask_images(capture), scene)
     return FitJob(capture, prepare=prepare)
 
 

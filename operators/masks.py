@@ -15,13 +15,14 @@ from ..core.masks.proposal_job import ProposalJob
 from ..core.masks.write_masks import MasksJob, Wanted, material_names
 from ..scene.face_slots import show_proposal
 from ..scene.lights import with_dragged_lamps
-from ..scene.running import tell
-from ..scene.shadow_images import (
+from ..scene.mask_images import (
     masks_folder,
     shadow_images,
     show_shadow_masks,
-    with_shadow_images,
+    with_mask_images,
 )
+from ..scene.painted import take_all
+from ..scene.running import tell
 from .stepped import Stepped
 
 
@@ -41,6 +42,7 @@ class _OfCapture(Stepped):
         path = Path(bpy.path.abspath(context.scene.patina.capture))
         if not path.is_file():
             raise InputError("is gone; import the capture again from where it is now", file=path)
+        take_all(context.scene)
         capture, _ = with_dragged_lamps(read_capture(path), context.scene)
         self._capture = str(capture.file)
         self._scene = context.scene.name  # by name: a reference does not survive undo
@@ -76,7 +78,7 @@ class PATINA_OT_propose_materials(_OfCapture, bpy.types.Operator):
         mesh = scene.patina.mesh
         if mesh is None or mesh.type != "MESH" or mesh.name not in scene.objects:
             raise PatinaError("the scanned mesh is not in this scene: import the capture again")
-        return ProposalJob(with_shadow_images(capture), self.count or None)
+        return ProposalJob(with_mask_images(capture), self.count or None)
 
     def _take(self, scene: bpy.types.Scene) -> None:
         found = self._job.result.proposal
@@ -106,6 +108,7 @@ class PATINA_OT_shadow_masks(_OfCapture, bpy.types.Operator):
     def _job_of(self, scene: bpy.types.Scene, capture: Capture) -> Job:
         if shadow_images(self._capture) and not self.replace:
             raise PatinaError("there are shadow masks already: choose Replace to lose them")
+        self._photos = capture.photos
         self._out = check_out(masks_folder(capture.file))
         self._staging = staged_folder(self._out)
         return MasksJob(capture, Wanted(), self._staging.__enter__(), self._out)
@@ -114,7 +117,8 @@ class PATINA_OT_shadow_masks(_OfCapture, bpy.types.Operator):
         staging, self._staging = self._staging, None
         staging.__exit__(None, None, None)  # moves the files into place
         files = [self._out / name for name in self._job.result.shadows]
-        show_shadow_masks(scene, self._capture, files)
+        names = [photo.file.name for photo in self._photos]
+        show_shadow_masks(scene, self._capture, names, files)
         self.report({"INFO"}, f"{len(files)} shadow masks in {self._out}")
 
     def _stop(self, context: bpy.types.Context) -> None:

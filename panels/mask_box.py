@@ -1,29 +1,69 @@
-"""Shadow masks and proposed materials in the sidebar."""
+"""Materials and masks in the sidebar: proposed, painted, exported."""
 
 from __future__ import annotations
 
 import bpy
 
+from ..scene.mask_images import mask_images
+from ..scene.paints import Paint, paints
 from ..scene.photo_list import looked_at
 from ..scene.properties import capture_path
-from ..scene.shadow_images import shadow_images
+from ..scene.swatches import swatch
+
+OUT_SAID = {
+    "shadow": "Shadow",
+    "highlight": "Highlight to leave out",
+    "ignore": "Ignore",
+    "erase": "Erase shadow, highlight, ignore",
+}
 
 
-def draw_shadow(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
-    """Where there are shadow masks, say which image to paint on."""
-    there = shadow_images(capture_path(scene))
-    if not there:
-        return
-    photo = looked_at(scene)
-    image = there.get(photo.place) if photo is not None else None
-    if image is not None:
-        layout.label(text=f"Paint: {image.name}", icon="IMAGE_ALPHA")
-    layout.operator("patina.shadow_masks", text="Shadow Masks Anew").replace = True
-
-
-def draw_materials(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
-    """Propose materials, and accept the mesh's slots."""
-    layout.operator("patina.propose_materials", icon="MATERIAL")
+def draw_masks(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """What can be painted, and where."""
+    there, state = paints(scene), scene.patina_paint
+    materials = [p for p in there if p.kind == "material"] if scene.patina.use_slots else []
+    box = layout.box()
+    head = box.row()
+    head.label(text="Materials")
+    head.operator("patina.add_material", text="", icon="ADD")
+    for number, paint in enumerate(materials):
+        _row(box, scene, paint, number, number == state.active)
+    if not materials:
+        box.label(text="One: all of the object", icon="BLANK1")
+    row = box.row(align=True)
+    row.operator("patina.propose_materials", text="Propose", icon="SHADERFX")
+    row.operator("patina.slots_from_face_sets", text="Face Sets", icon="FACE_MAPS")
+    box = layout.box()
+    box.label(text="Left Out of a Photo")
+    first = sum(paint.kind == "material" for paint in there)
+    for number, paint in enumerate(there[first:], start=first):
+        _row(box, scene, paint, number, number == state.active)
+    layout.separator()
+    column = layout.column(align=True)
+    column.operator("patina.paint_mesh", icon="VPAINT_HLT")
+    column.operator("patina.paint_photo", icon="TPAINT_HLT")
+    column.operator("patina.take_paint", icon="CHECKMARK")
+    layout.prop(state, "opacity", slider=True)
+    if mask_images(capture_path(scene)):
+        layout.operator("patina.shadow_masks", text="Shadow Masks Anew").replace = True
+    layout.operator("patina.export_masks", icon="EXPORT")
     mesh = scene.patina.mesh
     if mesh is not None and mesh.type == "MESH" and any(mesh.data.materials):
         layout.prop(scene.patina, "use_slots")
+
+
+def _row(
+    layout: bpy.types.UILayout, scene: bpy.types.Scene, paint: Paint, number: int, active: bool
+) -> None:
+    row = layout.row(align=True)
+    slot = scene.patina.mesh.material_slots[paint.slot] if paint.slot >= 0 else None
+    said = OUT_SAID.get(paint.kind, paint.name)
+    pick = row.operator("patina.pick_paint", text=said if slot is None else "", depress=active,
+                        icon_value=swatch(paint.colour))  # fmt: skip
+    pick.number = number
+    if slot is not None and slot.material is not None:
+        row.prop(slot.material, "name", text="")
+    photo = looked_at(scene)
+    masks = mask_images(capture_path(scene)) if slot is None else {}
+    if photo is not None and (photo.place, paint.kind) in masks:
+        row.label(text="", icon="IMAGE_ALPHA")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
+from ..scene.mask_images import shadow_images
 from ..scene.photo_list import PatinaPhoto, PatinaPhotos, has_camera, looked_at
 from ..scene.properties import capture_path
-from ..scene.shadow_images import shadow_images
 
 ROWS = 5
 

@@ -12,7 +12,7 @@ from ..scene.photo_list import looked_at
 from ..scene.properties import DIAGNOSIS, capture_path, stored_result
 from .check_box import draw_check
 from .lamp_box import draw_lamp
-from .mask_box import draw_materials, draw_shadow
+from .mask_box import draw_masks
 from .measured_box import draw_measured, icon_of
 from .photo_rows import PATINA_UL_photos, draw_photos
 from .stage import StagePanel
@@ -51,8 +51,7 @@ class PATINA_PT_masks(StagePanel, bpy.types.Panel):
     stage = "masks"
 
     def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-        draw_shadow(layout, context.scene)
-        draw_materials(layout, context.scene)
+        draw_masks(layout, context.scene)
 
 
 class PATINA_PT_fit(StagePanel, bpy.types.Panel):

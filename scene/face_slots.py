@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.capture import Capture, MaterialEntry
-from ..core.capture.model import SHADOW_MASK
+from ..core.capture.model import LEFT_OUT
 from ..core.errors import InputError, PatinaError
 from ..core.scan import Scan
 from .apply import MEASURED
@@ -24,6 +24,7 @@ COLOURS = (
     (0.788, 0.347, 0.0), (0.093, 0.456, 0.815), (0.0, 0.342, 0.171), (0.871, 0.776, 0.054),
     (0.0, 0.168, 0.445), (0.665, 0.112, 0.0), (0.604, 0.191, 0.386), (0.2, 0.2, 0.2),
 )  # fmt: skip
+FIRST = "surface"  # what a scan is of before anything is painted
 FORBIDDEN = set('/\\:*?"<>|')
 
 Prepare = Callable[[Scan], Scan]
@@ -47,23 +48,40 @@ def show_proposal(
             f"{target.name} has {len(data.polygons):,} faces, the scan {len(labels):,}: import the "
             "capture anew, or undo what cut the mesh"
         )
-    _attribute(data, PROPOSED, "INT", labels.astype(np.int32))
-    _attribute(data, CONFIDENCE, "FLOAT", confidence.astype(np.float32))
+    face_attribute(data, PROPOSED, "INT", labels.astype(np.int32))
+    face_attribute(data, CONFIDENCE, "FLOAT", confidence.astype(np.float32))
     data.materials.clear()
     for number, name in enumerate(names):
-        data.materials.append(_stand_in(name, COLOURS[number % len(COLOURS)], capture))
+        data.materials.append(stand_in(name, COLOURS[number % len(COLOURS)], capture))
     data.polygons.foreach_set("material_index", labels.astype(np.int32))
     data.update()
     for material in [m for m in bpy.data.materials if m.get(STAND_IN) == capture and not m.users]:
         bpy.data.materials.remove(material)
 
 
+def new_slot(scene: bpy.types.Scene, capture: str, name: str) -> int:
+    """One more slot of the scanned mesh, with a coloured material; its number. The first one asked
+    for comes beside one that all faces wear: a scan's own material says nothing of what is what."""
+    mesh = scene.patina.mesh
+    leave_edit_mode(mesh)
+    data = mesh.data
+    if not scene.patina.use_slots and not data.materials.get(FIRST):
+        data.materials.clear()
+        data.materials.append(stand_in(FIRST, COLOURS[0], capture))
+        data.polygons.foreach_set("material_index", np.zeros(len(data.polygons), np.int32))
+        scene.patina.use_slots = True
+    number = len(data.materials)
+    said = name or f"material_{number + 1}"
+    data.materials.append(stand_in(said, COLOURS[number % len(COLOURS)], capture))
+    return number
+
+
 def with_painted_slots(capture: Capture, scene: bpy.types.Scene) -> tuple[Capture, Prepare | None]:
     """(the capture with a material for every slot that faces wear, what brings the slots to its
     scan). Where the artist has not accepted the slots (Scene.patina.use_slots): as it was, None.
 
-    The capture's own materials and their masks give way; shadow masks stay. Raises PatinaError
-    where there is nothing to take slots from.
+    The capture's own materials and their masks give way; masks of what is left out stay. Raises
+    PatinaError where there is nothing to take slots from.
     """
     if not scene.patina.use_slots:
         return capture, None
@@ -83,7 +101,7 @@ def with_painted_slots(capture: Capture, scene: bpy.types.Scene) -> tuple[Captur
         if name.casefold() in [other.casefold() for other in names[:i]]:
             raise PatinaError(f"two slots of {target.name} wear {name!r}: give them two materials")
     photos = tuple(
-        replace(photo, masks={k: v for k, v in photo.masks.items() if k == SHADOW_MASK})
+        replace(photo, masks={k: v for k, v in photo.masks.items() if k in LEFT_OUT})
         for photo in capture.photos
     )
     materials = tuple(MaterialEntry(name, faces=SLOTS) for name in names)
@@ -117,10 +135,11 @@ def _capture_name(material: bpy.types.Material | None, slot: int) -> str:
         return f"slot_{slot + 1}"
     name = str(material.get(MEASURED, material.name))
     safe = "".join("_" if c in FORBIDDEN or not c.isprintable() else c for c in name).strip(". ")
-    return f"slot_{slot + 1}" if not safe or safe == SHADOW_MASK else safe[:60]
+    return f"slot_{slot + 1}" if not safe or safe in LEFT_OUT else safe[:60]
 
 
-def _attribute(data: bpy.types.Mesh, name: str, kind: str, values: NDArray) -> None:
+def face_attribute(data: bpy.types.Mesh, name: str, kind: str, values: NDArray) -> None:
+    """Values (faces,) as an attribute of a mesh's faces, in place of one of that name."""
     old = data.attributes.get(name)
     if old is not None and (old.domain != "FACE" or old.data_type != kind):
         data.attributes.remove(old)
@@ -130,7 +149,7 @@ def _attribute(data: bpy.types.Mesh, name: str, kind: str, values: NDArray) -> N
     old.data.foreach_set("value", values)
 
 
-def _stand_in(name: str, colour: tuple[float, float, float], capture: str) -> bpy.types.Material:
+def stand_in(name: str, colour: tuple[float, float, float], capture: str) -> bpy.types.Material:
     """A coloured material of that name; one that an earlier proposal made is used again."""
     for material in bpy.data.materials:
         if material.get(STAND_IN) == capture and material.name == name:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import bpy
 
 from .apply import measured_of
+from .mask_images import shadow_images
 from .photo_list import PatinaPhoto, lit_photos
 from .properties import DIAGNOSIS, capture_path, stored_result
-from .shadow_images import shadow_images
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,11 @@ from pathlib import Path
 from ..errors import InputError
 from .entries import FitOptions, LightEntry, MaterialEntry, PhotoEntry, ToneEntry
 
-SHADOW_MASK = "shadow"
+SHADOW_MASK, HIGHLIGHT_MASK, IGNORE_MASK = "shadow", "highlight", "ignore"
+LEFT_OUT = (SHADOW_MASK, HIGHLIGHT_MASK, IGNORE_MASK)
+"""Masks of what nothing is measured from: where the light does not come from the lamp alone,
+highlights that are not the material's (glare, a bulb's reflection in a window), whatever else is
+not the object."""
 
 
 @dataclass(frozen=True)

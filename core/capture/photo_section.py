@@ -7,7 +7,7 @@ from pathlib import Path
 from ..errors import InputError
 from ..photo.transfer import Transfer
 from .entries import ChartEntry, PhotoEntry, ToneEntry
-from .model import SHADOW_MASK
+from .model import LEFT_OUT
 from .section import Section
 
 LARGEST_BRACKET = 32
@@ -55,7 +55,7 @@ def read_photo_entry(section: Section, lights: set[str], materials: set[str]) ->
     entries = section.table("masks")
     masks = {}
     for name in entries.data:
-        if name != SHADOW_MASK and name not in materials:
+        if name not in LEFT_OUT and name not in materials:
             raise entries.error(f"no [[material]] is named {name!r}", name)
         masks[name] = entries.file_path(name)
     section.close()

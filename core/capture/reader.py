@@ -12,7 +12,7 @@ from ..samples import Margins
 from .entries import FitOptions, LightEntry, MaterialEntry, ToneEntry
 from .light_section import read_light
 from .lines import key_lines
-from .model import SHADOW_MASK, Capture, ScanEntry
+from .model import LEFT_OUT, Capture, ScanEntry
 from .photo_section import read_photo_entry, read_tone
 from .section import Section, shown
 
@@ -170,8 +170,8 @@ def _material(section: Section) -> MaterialEntry:
     section.close()
     if sum(way is not None for way in (faces, vertex, texture)) > 1:
         raise section.error("expected one of faces, vertex_colour and texture_colour", "faces")
-    if name == SHADOW_MASK:
-        raise section.error(f"{SHADOW_MASK!r} is the name of the shadow masks", "name")
+    if name in LEFT_OUT:
+        raise section.error(f"{name!r} is the name of masks that leave something out", "name")
     if not _is_file_name(name):
         raise section.error(f"{name[:60]!r} cannot be part of a file name everywhere", "name")
     return MaterialEntry(name, faces, vertex, texture)

@@ -171,7 +171,7 @@ def _of_band(
         slope=np.zeros((n, 2, 3), np.float32),
         veil=np.zeros((n, 2, 3), np.float32),
         turn=_steps(view, view.normal)[rows],
-        step=_steps(view, view.point - view.point.mean(axis=0))[rows],
+        step=_steps(view, view.point - rays.origin)[rows],
         usable=photo.usable.ravel().take(pixel),
         block=np.zeros(n, np.int32),
     )

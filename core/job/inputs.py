@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..capture import Capture, MaterialEntry
-from ..capture.model import SHADOW_MASK
+from ..capture.model import LEFT_OUT
 from ..errors import InputError, PatinaError
 from ..geometry import SurfaceView
 from ..masks.face_materials import faces_by_texture, faces_by_vertex_colour
@@ -187,15 +187,17 @@ def material_pixels(
     place: int,
     read: Mapping[str, NDArray[np.bool_]] | None = None,
 ) -> tuple[dict[str, NDArray[np.bool_]], NDArray[np.bool_]]:
-    """({material: (n,) its pixels}, (n,) pixels in the shadow mask) of one photo's SurfaceView.
-    read: what photo_masks gave, where it is asked for more than once."""
+    """({material: (n,) its pixels}, (n,) pixels in one of the masks LEFT_OUT) of one photo's
+    SurfaceView. read: what photo_masks gave, where it is asked for more than once."""
     whole = photo_masks(capture, place) if read is None else read
     masks = {name: mask.ravel().take(view.pixel) for name, mask in whole.items()}
-    shadow = masks.pop(SHADOW_MASK, np.zeros(len(view.pixel), bool))
+    out = np.zeros(len(view.pixel), bool)
+    for name in LEFT_OUT:
+        out |= masks.pop(name, out)
     found = {}
     for index, material in enumerate(capture.materials):
         found[material.name] = _one_material(capture, scan, view, material, index, masks)
-    return found, shadow
+    return found, out
 
 
 def _one_material(

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..capture import Capture
-from ..capture.model import SHADOW_MASK
+from ..capture.model import LEFT_OUT, SHADOW_MASK
 from ..errors import InputError
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -60,7 +60,7 @@ def capture_with_masks(
     for number, photo in enumerate(photos):
         masks = dict(photo.get("masks", {}))
         if materials is not None:
-            masks = {name: file for name, file in masks.items() if name == SHADOW_MASK}
+            masks = {name: file for name, file in masks.items() if name in LEFT_OUT}
             masks.update(painted[number] if number < len(painted) else {})
         if shadows is not None:
             masks[SHADOW_MASK] = shadows[number]

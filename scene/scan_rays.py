@@ -1,0 +1,77 @@
+"""The scan of the capture in the scene, ready for rays, while Blender runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+
+from ..core.capture import Capture, read_capture
+from ..core.errors import InputError
+from ..core.geometry import RayScene
+from ..core.job import inputs
+from ..core.masks.carry import SeenFaces
+from ..core.scan import Scan
+from .handlers import attach, detach
+
+KEPT = 4  # photos of which it is known what they show: of 24 megapixels 200 MB each
+
+
+@dataclass(frozen=True)
+class ScanRays:
+    """Of one capture file as it was at ``changed``. seen: what each photo shows, by place, as far
+    as it was asked for."""
+
+    capture: Capture
+    scan: Scan
+    rays: RayScene
+    changed: float
+    seen: dict[int, SeenFaces]
+
+    def faces_of(self, place: int) -> SeenFaces:
+        """Which faces a photo shows where."""
+        if place not in self.seen:
+            while len(self.seen) >= KEPT:
+                self.seen.pop(next(iter(self.seen)))
+            camera = inputs.camera_of(self.capture, self.scan, place)
+            self.seen[place] = SeenFaces.of(self.rays, camera)
+        return self.seen[place]
+
+
+_last: ScanRays | None = None
+
+
+def scan_rays(path: str) -> ScanRays:
+    """Of a capture file; the last one is kept. Raises InputError."""
+    global _last
+    file = Path(path)
+    if not file.is_file():
+        raise InputError("is gone; import the capture again from where it is now", file=file)
+    changed = file.stat().st_mtime
+    if _last is None or _last.capture.file != file or _last.changed != changed:
+        capture = read_capture(file)
+        scan = inputs.open_scan(capture)
+        _last = ScanRays(capture, scan, RayScene.build(scan.mesh), changed, {})
+    return _last
+
+
+@bpy.app.handlers.persistent
+def _forget(*_: object) -> None:
+    """Another file is opened."""
+    global _last
+    _last = None
+
+
+HANDLERS = (("load_pre", _forget),)
+
+
+def register() -> None:
+    """Watch for another file."""
+    attach(HANDLERS)
+
+
+def unregister() -> None:
+    """No more, and forget the scan."""
+    detach(HANDLERS)
+    _forget()
