@@ -13,6 +13,7 @@ MODULES: tuple[str, ...] = (
     "scene.swatches",
     "scene.scan_rays",
     "scene.canvas",
+    "scene.brushes",
     "scene.mask_images",
     "scene.osl_files",
     "scene.lamps",

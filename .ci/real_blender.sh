@@ -3,8 +3,9 @@
 #   real_blender.sh install [DIR]       Blender 4.3 with Python 3.13 (about 2 minutes, 1.5 GB)
 #   real_blender.sh blender DIR ARGS    that Blender; sees the current folder, the checkout,
 #                                       the data beside it and Patina's cache, at the same paths
-#   real_blender.sh picture DIR PNG     photographs tools/window_scene.py in a real window (the
-#                                       extension as `run.py headless` has installed it)
+#   real_blender.sh session DIR OUT     tools/window/session.py in a real window on a virtual screen:
+#                                       photographs of every stage in OUT (the extension as
+#                                       `run.py headless` has installed it)
 # Debian's build has no OSL and no USD: those are tested on the bpy wheel.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -65,22 +66,20 @@ blender)
   bind "$dir" "${PATINA_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/patina}"
   bind "$dir" "$PWD"
   exec chroot "$dir" /bin/bash -c 'cd "$0" && exec blender "$@"' "$PWD" "$@" ;;
-picture)
-  dir=$1 png=$(realpath "$2")
+session)
+  dir=$1; mkdir -p "$2"; out=$(realpath "$2")
   cache=${PATINA_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/patina}
   system "$dir"
   bind "$dir" "$here"
   bind "$dir" "$cache"
-  command -v "$dir/usr/bin/import" >/dev/null || inside "$dir" apt-get install -y -qq \
-    --no-install-recommends xvfb xauth imagemagick fonts-dejavu-core >/dev/null
+  bind "$dir" "$out"
+  { [ -x "$dir/usr/bin/import" ] && [ -x "$dir/usr/bin/xdotool" ]; } || inside "$dir" apt-get \
+    install -y -qq --no-install-recommends xvfb xauth imagemagick xdotool fonts-dejavu-core >/dev/null
   BLENDER_USER_RESOURCES="$cache/blender-4.3-cp313" inside "$dir" /bin/bash -c '
-    cd "$0"; rm -f /tmp/window-ready; Xvfb :97 -screen 0 1600x900x24 +extension GLX >/dev/null 2>&1 & screen=$!
+    cd "$0"; Xvfb :97 -screen 0 1600x1000x24 +extension GLX >/dev/null 2>&1 & screen=$!
     export DISPLAY=:97 LIBGL_ALWAYS_SOFTWARE=1; sleep 2
-    blender --factory-startup --addons bl_ext.user_default.patina -P tools/window_scene.py \
-      >/dev/null 2>&1 & window=$!
-    for _ in $(seq 120); do [ -e /tmp/window-ready ] && break; sleep 1; done
-    sleep 20  # shaders
-    rm -f /tmp/window-ready; import -window root /tmp/window.png; kill $window $screen' "$here"
-  mv "$dir/tmp/window.png" "$png" ;;
+    blender --factory-startup --addons bl_ext.user_default.patina --window-geometry 0 0 1600 1000 \
+      -P tools/window/session.py -- "$1" && code=0 || code=$?
+    kill $screen; exit $code' "$here" "$out" ;;
 *) sed -n '2,9p' "$0"; exit 2 ;;
 esac

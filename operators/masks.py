@@ -84,10 +84,11 @@ class PATINA_OT_propose_materials(_OfCapture, bpy.types.Operator):
         found = self._job.result.proposal
         names = material_names(found.count)
         show_proposal(scene.patina.mesh, self._capture, found.labels, found.confidence, names)
+        scene.patina.use_slots = found.count > 1
         if found.count == 1:
             self.report({"INFO"}, "One material: the photos show no difference")
         else:
-            self.report({"INFO"}, f"{found.count} materials; repaint them in Edit Mode")
+            self.report({"INFO"}, f"{found.count} materials; paint over what is wrong")
 
 
 class PATINA_OT_shadow_masks(_OfCapture, bpy.types.Operator):

@@ -8,10 +8,11 @@ import bpy
 
 from ..commands.staging import check_out
 from ..core.errors import PatinaError
+from ..scene.brushes import ready_to_paint
 from ..scene.canvas import canvas_of, canvases, draw
 from ..scene.face_slots import leave_edit_mode, new_slot
 from ..scene.mask_files import write_masks
-from ..scene.mesh_paint import show_on_mesh, slots_of_face_sets
+from ..scene.mesh_paint import show_on_mesh, shown_on_mesh, slots_of_face_sets
 from ..scene.paint_editor import show_canvas
 from ..scene.painted import take_all
 from ..scene.paints import paints, take_up, wear
@@ -74,11 +75,10 @@ class PATINA_OT_pick_paint(_OnScan, bpy.types.Operator):
     number: bpy.props.IntProperty(options={"HIDDEN", "SKIP_SAVE"})  # type: ignore[valid-type]
 
     def _do(self, context: bpy.types.Context) -> set[str]:
-        there = paints(context.scene)
-        if not 0 <= self.number < len(there):
+        if not 0 <= self.number < len(paints(context.scene)):
             raise PatinaError(f"there is no paint number {self.number}")
         context.scene.patina_paint.active = self.number
-        take_up(context, there[self.number])
+        take_up(context)
         return {"FINISHED"}
 
 
@@ -100,7 +100,7 @@ class PATINA_OT_paint_mesh(_OnScan, bpy.types.Operator):
             with context.temp_override(active_object=mesh, object=mesh):
                 bpy.ops.object.mode_set(mode="VERTEX_PAINT")
         show_on_mesh(scene, mesh)
-        _take_active(context)
+        ready_to_paint(context, "vertex_paint")
         for area in context.screen.areas if context.screen else ():
             if area.type == "VIEW_3D":
                 shading = area.spaces.active.shading
@@ -129,7 +129,7 @@ class PATINA_OT_paint_photo(_OnScan, bpy.types.Operator):
         take_all(scene)
         image = canvas_of(scene, capture_path(scene), looked_at(scene).place)
         show_canvas(context, image)
-        _take_active(context)
+        ready_to_paint(context, "image_paint")
         return {"FINISHED"}
 
 
@@ -197,21 +197,15 @@ left out"""
         return {"FINISHED"}
 
 
-def _take_active(context: bpy.types.Context) -> None:
-    """Brushes get the colour of the active paint."""
-    there, state = paints(context.scene), context.scene.patina_paint
-    take_up(context, there[min(state.active, len(there) - 1)])
-
-
 def _up_to_date(context: bpy.types.Context) -> None:
     """Canvases and the painted mesh show what is there now."""
     scene, mesh = context.scene, context.scene.patina.mesh
     capture = capture_path(scene)
     for image in canvases(capture).values():
         draw(scene, capture, image)
-    if mesh.mode == "VERTEX_PAINT":
+    if shown_on_mesh(mesh):
         show_on_mesh(scene, mesh)
-    _take_active(context)
+    take_up(context)
 
 
 CLASSES = (

@@ -57,6 +57,7 @@ class Stepped:
         self._since = time.perf_counter()
         self._timer = context.window_manager.event_timer_add(self.TICK, window=context.window)
         context.window_manager.modal_handler_add(self)
+        tell(Running(self._scene, self.PANEL, "beginning", 0.0))  # the first step may be a long one
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.mask_images import mask_images
+from ..scene.mask_images import mask_images, shadow_images
 from ..scene.paints import Paint, paints
 from ..scene.photo_list import looked_at
 from ..scene.properties import capture_path
@@ -44,7 +44,7 @@ def draw_masks(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     column.operator("patina.paint_photo", icon="TPAINT_HLT")
     column.operator("patina.take_paint", icon="CHECKMARK")
     layout.prop(state, "opacity", slider=True)
-    if mask_images(capture_path(scene)):
+    if shadow_images(capture_path(scene)):
         layout.operator("patina.shadow_masks", text="Shadow Masks Anew").replace = True
     layout.operator("patina.export_masks", icon="EXPORT")
     mesh = scene.patina.mesh
@@ -58,10 +58,12 @@ def _row(
     row = layout.row(align=True)
     slot = scene.patina.mesh.material_slots[paint.slot] if paint.slot >= 0 else None
     said = OUT_SAID.get(paint.kind, paint.name)
-    pick = row.operator("patina.pick_paint", text=said if slot is None else "", depress=active,
-                        icon_value=swatch(paint.colour))  # fmt: skip
-    pick.number = number
-    if slot is not None and slot.material is not None:
+    icon = "RADIOBUT_ON" if active else "RADIOBUT_OFF"
+    row.operator("patina.pick_paint", text="", icon=icon, depress=active).number = number
+    row.label(text="", icon_value=swatch(paint.colour))
+    if slot is None:
+        row.operator("patina.pick_paint", text=said, depress=active).number = number
+    elif slot.material is not None:
         row.prop(slot.material, "name", text="")
     photo = looked_at(scene)
     masks = mask_images(capture_path(scene)) if slot is None else {}

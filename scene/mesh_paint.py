@@ -33,6 +33,11 @@ def show_on_mesh(scene: bpy.types.Scene, mesh: bpy.types.Object) -> None:
     data.update()
 
 
+def shown_on_mesh(mesh: bpy.types.Object) -> bool:
+    """Whether it has the materials' colours, true or not any more."""
+    return mesh.type == "MESH" and COLOURS in mesh.data.color_attributes
+
+
 def take_from_mesh(scene: bpy.types.Scene, mesh: bpy.types.Object) -> int:
     """What was painted on the mesh since its colours were shown, as the faces' slots; how many
     faces that is. A face wears what most of its corners were given."""

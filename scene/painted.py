@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .canvas import take_strokes
-from .mesh_paint import show_on_mesh, take_from_mesh
+from .mesh_paint import show_on_mesh, shown_on_mesh, take_from_mesh
 from .properties import capture_path
 
 
@@ -18,6 +18,6 @@ def take_all(scene: bpy.types.Scene) -> tuple[int, int]:
         if faces:
             scene.patina.use_slots = True
     pixels = take_strokes(scene, capture_path(scene))
-    if pixels and mesh is not None and mesh.mode == "VERTEX_PAINT":
+    if pixels and mesh is not None and shown_on_mesh(mesh):
         show_on_mesh(scene, mesh)  # a stroke on a photo may have changed it
     return faces, pixels

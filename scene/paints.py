@@ -66,8 +66,10 @@ def wear(mesh: bpy.types.Object, slots: NDArray[np.int32]) -> None:
     mesh.data.update()
 
 
-def take_up(context: bpy.types.Context, paint: Paint) -> None:
-    """Blender's brushes get the colour of a paint, for meshes and for images."""
+def take_up(context: bpy.types.Context) -> None:
+    """Blender's brushes get the colour of the active paint, for meshes and for images."""
+    there = paints(context.scene)
+    paint = there[min(context.scene.patina_paint.active, len(there) - 1)]
     linear = _linear(paint.colour)
     settings = context.tool_settings
     for mode in (settings.vertex_paint, settings.image_paint):

@@ -38,7 +38,7 @@ class PatinaScene(bpy.types.PropertyGroup):
         poll=lambda self, candidate: candidate.type == "MESH",
     )
     use_slots: bpy.props.BoolProperty(  # type: ignore[valid-type]
-        name="Fit Slots",
+        name="Fit These Materials",
         description="Fit one material to each material slot of the scanned mesh, instead of those "
         "of the capture file",
     )

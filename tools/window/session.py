@@ -1,0 +1,267 @@
+"""Blender script: an artist's session in a real window, from an empty file to finished materials on
+the demo capture, with a photograph of each stage. Strokes are drags of a real mouse (xdotool).
+
+blender --factory-startup --addons bl_ext.user_default.patina -P tools/window/session.py -- OUT
+(`.ci/real_blender.sh session DIR OUT` does it on a virtual screen, and fails where this does.)
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import subprocess
+import sys
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+
+OUT = Path(sys.argv[sys.argv.index("--") + 1])
+PACKAGE = "bl_ext.user_default.patina"
+STAGES = ["scan", "photos", "masks", "fit", "check", "material"]
+HEADER, FIRST = 25, 18  # pixels: from one closed panel's header to the next, to the first's middle
+PATIENCE = 900  # seconds for all of it
+DRAWN = 2.0  # seconds until a window has surely been drawn
+found: dict[str, object] = {}
+
+
+def window() -> bpy.types.Window:
+    """The only one."""
+    return bpy.context.window_manager.windows[0]
+
+
+def area_of(kind: str) -> bpy.types.Area:
+    """The first one of a kind."""
+    return next(a for a in window().screen.areas if a.type == kind)
+
+
+def region_of(area: bpy.types.Area, kind: str = "WINDOW") -> bpy.types.Region:
+    """Of an area: what is worked in, or the sidebar ("UI")."""
+    return next(r for r in area.regions if r.type == kind)
+
+
+def press(operator: str, how: str = "EXEC_DEFAULT", **settings: object) -> None:
+    """As its button does."""
+    area = area_of("VIEW_3D")
+    room, name = operator.split(".")
+    with bpy.context.temp_override(window=window(), area=area, region=region_of(area)):
+        outcome = getattr(getattr(bpy.ops, room), name)(how, **settings)
+    assert outcome & {"FINISHED", "RUNNING_MODAL"}, (operator, outcome)
+
+
+def part(name: str):
+    """A module of the installed extension."""
+    return importlib.import_module(f"{PACKAGE}.{name}")
+
+
+def photograph(name: str) -> None:
+    """The whole screen: Blender's own screenshot is black where there is no graphics card."""
+    subprocess.run(["import", "-window", "root", str(OUT / f"{name}.png")], check=True)
+
+
+def on_screen(region: bpy.types.Region, x: float, y: float) -> tuple[int, int]:
+    """Of a place in a region, from the screen's top left corner."""
+    return round(region.x + x), round(window().height - (region.y + y))
+
+
+def mouse(*words: object) -> None:
+    """Let a mouse do something while Blender goes on."""
+    said = [str(word) for word in words]
+    subprocess.Popen(["xdotool", *said], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def drag(places: list[tuple[int, int]]) -> float:
+    """Press at the first place, go on to the last; seconds that it takes."""
+    words: list[object] = ["mousemove", *places[0], "sleep", 0.4, "mousedown", 1, "sleep", 0.2]
+    for place in places[1:]:
+        words += ["mousemove", *place, "sleep", 0.05]
+    mouse(*words, "sleep", 0.3, "mouseup", 1)
+    return 3.0 + 0.06 * len(places)
+
+
+def open_panel(stage: str) -> float:
+    """Ctrl-click a header: that panel opens, the others close."""
+    region = region_of(area_of("VIEW_3D"), "UI")
+    number = STAGES.index(stage)
+    x, y = on_screen(region, 90, region.height - FIRST - HEADER * number)
+    mouse("mousemove", x, y, "keydown", "ctrl", "click", 1, "sleep", 0.2, "keyup", "ctrl")
+    return 2 * DRAWN
+
+
+def until_done() -> Iterator[float]:
+    """While a job runs."""
+    running = part("scene.running").running
+    yield DRAWN
+    while running(bpy.context.scene) is not None:
+        yield 0.5
+
+
+def begin() -> Iterator[float]:
+    """An empty file; the sidebar at the tab."""
+    bpy.context.preferences.view.show_splash = False
+    for item in list(bpy.data.objects):
+        bpy.data.objects.remove(item)
+    area = area_of("VIEW_3D")
+    area.spaces.active.show_region_ui = True
+    yield DRAWN  # tabs are known once they were drawn
+    region_of(area, "UI").active_panel_category = "Patina"
+    area.tag_redraw()
+    yield DRAWN
+    photograph("1_empty")
+
+
+def scan_and_photos() -> Iterator[float]:
+    """The demo capture; a lit photo looked through."""
+    press("patina.import_demo")
+    press("view3d.view_center_camera")
+    yield DRAWN
+    photograph("2_scan")
+    bpy.context.scene.patina_photos.active = 4
+    yield open_panel("photos")
+    photograph("3_photos")
+
+
+def materials_and_masks() -> Iterator[float]:
+    """Proposed, then mended by strokes on the mesh and on a photo."""
+    scene = bpy.context.scene
+    mesh = scene.patina.mesh
+    yield open_panel("masks")
+    press("patina.propose_materials", "INVOKE_DEFAULT")
+    yield from until_done()
+    photograph("4_proposed")
+    slots, paints = part("scene.paints").worn_slots, part("scene.paints").paints
+    before = slots(mesh)
+    press("patina.paint_mesh")
+    press("patina.pick_paint", number=1)
+    yield DRAWN
+    area = area_of("VIEW_3D")
+    region = region_of(area)
+    corners = [mesh.matrix_world @ v.co for v in list(mesh.data.vertices)[::997]]
+    places = [
+        location_3d_to_region_2d(region, area.spaces.active.region_3d, corner) for corner in corners
+    ]
+    middle = np.median([p for p in places if p is not None], axis=0)
+    way = [on_screen(region, middle[0] + 6 * k - 60, middle[1] + 4 * k - 40) for k in range(21)]
+    yield drag(way)
+    photograph("5_painted_mesh")
+    press("patina.take_paint")
+    found["faces painted on the mesh"] = int((slots(mesh) != before).sum())
+    before = slots(mesh)
+    press("object.mode_set", mode="OBJECT")
+    press("patina.paint_photo")
+    yield DRAWN
+    editor = area_of("IMAGE_EDITOR")
+    with bpy.context.temp_override(window=window(), area=editor, region=region_of(editor)):
+        bpy.ops.image.view_all(fit_view=True)
+    yield DRAWN
+    view = region_of(editor)
+
+    def across(left: float, right: float, height: float) -> list[tuple[int, int]]:
+        ends = np.linspace(left, right, 24)
+        return [on_screen(view, *view.view2d.view_to_region(x, height, clip=False)) for x in ends]
+
+    yield drag(across(0.42, 0.58, 0.5))
+    press("patina.pick_paint", number=[p.kind for p in paints(scene)].index("ignore"))
+    yield drag(across(0.3, 0.7, 0.2))
+    photograph("6_painted_photo")
+    press("patina.take_paint")
+    yield DRAWN
+    photograph("7_taken")
+    found["faces painted on a photo"] = int((slots(mesh) != before).sum())
+    masks = part("scene.mask_images")
+    capture = part("scene.properties").capture_path(scene)
+    found["pixels ignored"] = {
+        kind: int(masks.read_mask_image(image).sum())
+        for (place, kind), image in masks.mask_images(capture).items()
+        if place == scene.patina_photos.active
+    }
+    with bpy.context.temp_override(window=window(), area=editor, region=region_of(editor)):
+        bpy.ops.screen.area_close()
+    yield DRAWN
+
+
+def fit_and_check() -> Iterator[float]:
+    """To finished materials, marked as assets."""
+    yield open_panel("fit")
+    area_of("VIEW_3D").spaces.active.shading.type = "MATERIAL"
+    press("patina.fit", "INVOKE_DEFAULT")
+    yield 6.0
+    photograph("8_fitting")
+    yield from until_done()
+    yield 10.0  # shaders
+    photograph("9_fitted")
+    yield open_panel("check")
+    press("patina.check", "INVOKE_DEFAULT")
+    yield from until_done()
+    yield 10.0
+    photograph("10_checked")
+    yield open_panel("material")
+    press("patina.mark_assets")
+    yield DRAWN
+    photograph("11_material")
+    stored = part("scene.properties")
+    result = stored.stored_result(stored.capture_path(bpy.context.scene))
+    found["materials"] = {m["name"]: m["samples"]["used"] for m in result["materials"]}
+
+
+def judge() -> None:
+    """What a session has to leave."""
+    assert found["faces painted on the mesh"] > 20, found
+    assert found["faces painted on a photo"] > 20, found
+    assert found["pixels ignored"]["ignore"] > 100, found
+    assert len(found["materials"]) == 2, found
+    bpy.ops.wm.save_as_mainfile(filepath=str(OUT / "session.blend"))
+
+
+def session() -> Iterator[float]:
+    """All of it; seconds to wait after each step."""
+    for stage in (begin, scan_and_photos, materials_and_masks, fit_and_check):
+        print("session:", stage.__name__, flush=True)
+        yield from stage()
+    judge()
+
+
+def end(code: int) -> None:
+    """Say what was found, and leave Blender."""
+    (OUT / "session.json").write_text(json.dumps(found, indent=1), "utf-8")
+    print("session:", "failed" if code else "done", found, flush=True)
+    os._exit(code)
+
+
+STEPS = session()
+
+
+def tick() -> float | None:
+    """The next step; whatever goes wrong ends the session."""
+    try:
+        wait = next(STEPS)
+    except StopIteration:
+        end(0)
+    except BaseException:
+        traceback.print_exc()
+        photograph("failed")
+        end(1)
+    area_of("VIEW_3D").tag_redraw()
+    return wait
+
+
+def too_long() -> None:
+    """A job that never ends must not hold up whoever waits."""
+    print(f"session: not done in {PATIENCE} s", flush=True)
+    end(1)
+
+
+# all panels closed, so that headers are where a click expects them
+sidebar = part("panels.sidebar")
+for panel in [c for c in sidebar.CLASSES if issubclass(c, bpy.types.Panel)]:
+    if not getattr(panel, "bl_parent_id", ""):
+        bpy.utils.unregister_class(panel)
+        panel.bl_options = {"DEFAULT_CLOSED"}
+        bpy.utils.register_class(panel)
+OUT.mkdir(parents=True, exist_ok=True)
+bpy.app.timers.register(tick, first_interval=3)
+bpy.app.timers.register(too_long, first_interval=PATIENCE)
