@@ -63,8 +63,10 @@ def _row(
     row.label(text="", icon_value=swatch(paint.colour))
     if slot is None:
         row.operator("patina.pick_paint", text=said, depress=active).number = number
-    elif slot.material is not None:
+    elif slot.material is not None and slot.material.name == paint.name:
         row.prop(slot.material, "name", text="")
+    else:
+        row.label(text=paint.name)
     photo = looked_at(scene)
     masks = mask_images(capture_path(scene)) if slot is None else {}
     if photo is not None and (photo.place, paint.kind) in masks:

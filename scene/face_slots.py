@@ -109,6 +109,11 @@ def with_painted_slots(capture: Capture, scene: bpy.types.Scene) -> tuple[Captur
     return replace(capture, materials=materials, photos=photos), _bring(faces, target.name)
 
 
+def shown_name(material: bpy.types.Material) -> str:
+    """Without the number that Blender gives a measured material whose stand-in is still there."""
+    return str(material.get(MEASURED, material.name))
+
+
 def leave_edit_mode(target: bpy.types.Object) -> None:
     """End the edit session that a mesh's faces belong to while it lasts."""
     if target.data.is_editmode:
@@ -133,7 +138,7 @@ def _capture_name(material: bpy.types.Material | None, slot: int) -> str:
     """A material's name as a capture file may have it: part of file names on every system."""
     if material is None:
         return f"slot_{slot + 1}"
-    name = str(material.get(MEASURED, material.name))
+    name = shown_name(material)
     safe = "".join("_" if c in FORBIDDEN or not c.isprintable() else c for c in name).strip(". ")
     return f"slot_{slot + 1}" if not safe or safe in LEFT_OUT else safe[:60]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..core.capture.model import LEFT_OUT
 from ..core.report.display import srgb
-from .face_slots import COLOURS
+from .face_slots import COLOURS, shown_name
 
 OUT_COLOURS = {"shadow": (91, 42, 134), "highlight": (255, 255, 255), "ignore": (255, 0, 160)}
 ERASER = (0, 0, 0)
@@ -34,7 +34,7 @@ def paints(scene: bpy.types.Scene) -> list[Paint]:
     found = []
     mesh = scene.patina.mesh
     for number, slot in enumerate(mesh.material_slots if mesh is not None else ()):
-        name = slot.material.name if slot.material else f"Slot {number + 1}"
+        name = shown_name(slot.material) if slot.material else f"Slot {number + 1}"
         found.append(Paint("material", name, number, slot_colour(number)))
     for kind in LEFT_OUT:
         found.append(Paint(kind, kind.capitalize(), -1, OUT_COLOURS[kind]))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import bpy
 
 from .apply import measured_of
+from .face_slots import shown_name
 from .mask_images import shadow_images
 from .photo_list import PatinaPhoto, lit_photos
 from .properties import DIAGNOSIS, capture_path, stored_result
@@ -74,7 +75,7 @@ def _masks(
 ) -> Stage:
     mesh, has = scene.patina.mesh, []
     if mesh is not None and mesh.type == "MESH" and scene.patina.use_slots:
-        names = [slot.name for slot in mesh.material_slots if slot.material]
+        names = [shown_name(s.material) for s in mesh.material_slots if s.material]
         has.append(f"{_many(len(names), 'material')} on the mesh: {', '.join(names)}")
     elif result is not None:
         names = [material["name"] for material in result.get("materials", [])]

@@ -27,6 +27,7 @@ HEADER, FIRST = 25, 18  # pixels: from one closed panel's header to the next, to
 PATIENCE = 900  # seconds for all of it
 DRAWN = 2.0  # seconds until a window has surely been drawn
 found: dict[str, object] = {}
+opened: list[int] = []
 
 
 def window() -> bpy.types.Window:
@@ -84,12 +85,15 @@ def drag(places: list[tuple[int, int]]) -> float:
 
 
 def open_panel(stage: str) -> float:
-    """Ctrl-click a header: that panel opens, the others close."""
+    """Click the header of the open panel, then that of another one: all above it are closed."""
     region = region_of(area_of("VIEW_3D"), "UI")
-    number = STAGES.index(stage)
-    x, y = on_screen(region, 90, region.height - FIRST - HEADER * number)
-    mouse("mousemove", x, y, "keydown", "ctrl", "click", 1, "sleep", 0.2, "keyup", "ctrl")
-    return 2 * DRAWN
+    words: list[object] = []
+    for number in [*opened, STAGES.index(stage)]:
+        x, y = on_screen(region, 90, region.height - FIRST - HEADER * number)
+        words += ["mousemove", x, y, "sleep", 0.3, "click", 1, "sleep", 0.7]
+    mouse(*words)
+    opened[:] = [STAGES.index(stage)]
+    return 3 * DRAWN
 
 
 def until_done() -> Iterator[float]:
