@@ -20,6 +20,8 @@ MODULES: tuple[str, ...] = (
     "scene.worlds",
     "scene.fallback",
     "scene.checked",
+    "scene.traits",
+    "scene.follow_traits",
     "operators.import_capture",
     "operators.solve",
     "operators.masks",
@@ -29,7 +31,9 @@ MODULES: tuple[str, ...] = (
     "operators.look_through",
     "operators.save_lights",
     "operators.mark_assets",
+    "operators.reset_traits",
     "panels.sidebar",
+    "panels.traits_box",
 )
 
 

@@ -27,7 +27,7 @@ from ..core.appearance.principled_fit import PrincipledFit
 from ..core.basis import Basis, PrincipalBRDF
 from ..core.errors import PatinaError
 from .lamps import update_lamps
-from .lobe_group import add_lobe_stack
+from .lobe_group import add_lobe_stack, fill_lobe_stack
 from .osl_files import PROPERTIES, ShaderFiles, pack
 from .worlds import update_worlds
 
@@ -88,9 +88,7 @@ def create_material(
     tree.nodes.clear()
     _portable_branch(tree, principled)
     stack = None if lobes is None else _lobe_branch(tree, lobes)
-    seen = principled.principled  # in Solid mode
-    material.diffuse_color = (*(float(c) for c in np.clip(seen.base_color, 0, 1)), 1.0)
-    material.metallic, material.roughness = seen.metallic, seen.roughness
+    show_solid(material, principled.principled)
     material[COEFFICIENTS] = np.asarray(brdf.coefficients, float).ravel().tolist()
     material[BASIS] = brdf.basis.version
     reason = osl_missing()
@@ -159,16 +157,15 @@ def _compile(source: str) -> str:
 def _portable_branch(tree: bpy.types.NodeTree, fit: PrincipledFit) -> None:
     frame = _frame(tree, "Portable: exporters", (0, -420))
     node = tree.nodes.new("ShaderNodeBsdfPrincipled")
-    node.label = f"Principled fit (error {100 * fit.error:.1f} %)"
     node.parent, node.location = frame, (0, -40)
-    fill_principled(node, fit.principled)
+    show_principled(node, fit)
     _output(tree, node, "ALL", "Portable").is_active_output = True
 
 
 def _lobe_branch(tree: bpy.types.NodeTree, fit: LobeStackFit) -> bpy.types.Node:
     frame = _frame(tree, "Lobe stack: EEVEE, and Cycles without OSL", (0, -1120))
     node = add_lobe_stack(tree, fit.stack, (0, -40))
-    node.label = f"Lobe stack (error {100 * fit.error:.1f} %)"
+    show_lobes(node, fit)
     node.parent = frame
     _output(tree, node, "EEVEE", "EEVEE")
     return node
@@ -184,6 +181,24 @@ def _output(
     output.parent, output.location = node.parent, (320, -40 - 160 * taken)
     tree.links.new(node.outputs["BSDF"], output.inputs["Surface"])
     return output
+
+
+def show_solid(material: bpy.types.Material, principled: Principled) -> None:
+    """What Solid mode draws."""
+    material.diffuse_color = (*(float(c) for c in np.clip(principled.base_color, 0, 1)), 1.0)
+    material.metallic, material.roughness = principled.metallic, principled.roughness
+
+
+def show_principled(node: bpy.types.Node, fit: PrincipledFit) -> None:
+    """The fit in a Principled node, and how near it is."""
+    node.label = f"Principled fit (error {100 * fit.error:.1f} %)"
+    fill_principled(node, fit.principled)
+
+
+def show_lobes(node: bpy.types.Node, fit: LobeStackFit) -> None:
+    """The fit in a node of the lobe stack's group, and how near it is."""
+    node.label = f"Lobe stack (error {100 * fit.error:.1f} %)"
+    fill_lobe_stack(node, fit.stack)
 
 
 def fill_principled(node: bpy.types.Node, principled: Principled) -> None:

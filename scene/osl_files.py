@@ -33,6 +33,8 @@ PROPERTIES = {
     SAMPLING: "patina_sampling",
 }
 """Socket → property of the material that names its file."""
+MEASURED_SAMPLING = "patina_measured_sampling"
+"""On a material whose traits are moved: the file of the sampling table it has as measured."""
 OWN_PREFIXES = (osl_atlas.REMAINDER_PREFIX, osl_atlas.SAMPLING_PREFIX)
 
 
@@ -81,10 +83,15 @@ def file_sockets(node: bpy.types.Node) -> list[bpy.types.NodeSocket]:
 
 def drop_unused() -> None:
     """Forget the packed files of materials that are gone; files on disk stay."""
-    needed = {m.get(key) for m in bpy.data.materials for key in PROPERTIES.values()}
+    needed = {m.get(key) for m in bpy.data.materials for key in _kept_names()}
     for image in [i for i in bpy.data.images if i.name.startswith(OWN_PREFIXES)]:
         if image.name not in needed and image.users <= int(image.use_fake_user):
             bpy.data.images.remove(image)
+
+
+def _kept_names() -> tuple[str, ...]:
+    """The properties of a material that name files."""
+    return *PROPERTIES.values(), MEASURED_SAMPLING
 
 
 def pack(path: Path) -> bpy.types.Image:
@@ -110,7 +117,7 @@ def restore() -> list[str]:
     missing = []
     for material in own_materials():
         found = [
-            _restored(socket, material.get(PROPERTIES[socket.identifier]))
+            read_again(socket, material.get(PROPERTIES[socket.identifier]))
             for node in script_nodes(material)
             for socket in file_sockets(node)
         ]
@@ -121,8 +128,9 @@ def restore() -> list[str]:
     return missing
 
 
-def _restored(socket: bpy.types.NodeSocket, name: str | None) -> bool:
-    """True where the socket names a file that is there, now or again."""
+def read_again(socket: bpy.types.NodeSocket, name: str | None) -> bool:
+    """Lead a socket whose file is gone to the packed one of that name; True where it names a file
+    that is there, now or again."""
     if os.path.isfile(socket.default_value):
         return True
     if not name:
@@ -192,7 +200,7 @@ def _after_load(*_: object) -> None:
 def _after_save(*_: object) -> None:
     """A first save gives the .blend a folder: the files follow it there."""
     for material in bpy.data.materials:
-        for key in PROPERTIES.values():
+        for key in _kept_names():
             name = material.get(key)
             if name and not (blend_folder() / name).is_file():
                 write_packed(bpy.data.images.get(name), blend_folder() / name)

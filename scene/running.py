@@ -36,6 +36,11 @@ def tell(state: Running | None) -> None:
     """Set or clear what runs, and have every 3D viewport show it."""
     global _now
     _now = state
+    redraw()
+
+
+def redraw() -> None:
+    """Every 3D viewport, with its sidebar."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":

@@ -7,7 +7,8 @@ one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +21,34 @@ Array = NDArray[np.floating]
 CELLS = (96, 24)
 
 
+@dataclass(frozen=True)
+class Hemispheres:
+    """Directions of light for several views, one after the other.
+
+    angles: (views · n,); weight: (views, n) cos θi times the solid angle that each stands for.
+    """
+
+    angles: Angles
+    weight: Array
+
+    @classmethod
+    def of(cls, theta_o: Sequence[float] | Array) -> Hemispheres:
+        """For views at θo (radians)."""
+        spheres = [Hemisphere.of(float(theta), *CELLS) for theta in theta_o]
+        parts = zip(*(sphere.angles for sphere in spheres), strict=True)
+        weight = np.stack([sphere.cos_i * sphere.solid for sphere in spheres])
+        return cls(Angles(*(np.concatenate(part) for part in parts)), weight)
+
+    def albedo(self, rho: Array) -> Array:
+        """(views, 3) ∫ρ cos θi dωi of ρ (views · n, 3) in 1/sr at the angles."""
+        each = np.asarray(rho, float).reshape(*self.weight.shape, -1)
+        return np.stack([w @ r for w, r in zip(self.weight, each, strict=True)])
+
+
 def directional_albedo(evaluate: Callable[[Angles], Array], theta_o: Array) -> Array:
     """(v, 3) ∫ρ cos θi dωi of ``evaluate(angles) -> (n, 3)`` seen from each θo (radians)."""
-    out = np.empty((len(theta_o), 3))
-    for v, theta in enumerate(theta_o):
-        sphere = Hemisphere.of(float(theta), *CELLS)
-        rho = np.asarray(evaluate(sphere.angles), float)
-        out[v] = (sphere.cos_i * sphere.solid) @ rho
-    return out
+    hemispheres = Hemispheres.of(theta_o)
+    return hemispheres.albedo(evaluate(hemispheres.angles))
 
 
 def limit(albedo: Array) -> Array:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,32 +23,76 @@ Reflector = Callable[[Angles], NDArray[np.floating]] | Principled | LobeStack
 """A table (angles -> ρ (n, 3) in 1/sr), or a model of which light and view are not alike."""
 
 
+@dataclass(frozen=True)
+class LitPart:
+    """What one light meets of a sphere: the places (n,) among all points inside; unit vectors
+    (n, 3), (1, 3) and (n, 3); factor (n,): what ρ is multiplied by."""
+
+    places: NDArray[np.intp]
+    normal: NDArray[np.float64]
+    light: NDArray[np.float64]
+    view: NDArray[np.float64]
+    factor: NDArray[np.float64]
+
+    @property
+    def angles(self) -> Angles:
+        """(n,) of each."""
+        return half_difference(self.normal, self.light, self.view)
+
+
+@dataclass(frozen=True)
+class LitSphere:
+    """A sphere of ``size`` pixels across under two distant lights, before anything is put on it.
+
+    Orthographic view along −z; key light of irradiance π, so that a white matte sphere reaches 1.
+    inside: (m, m) points of the picture on the sphere, m = size · oversample.
+    """
+
+    size: int
+    oversample: int
+    inside: NDArray[np.bool_]
+    parts: tuple[LitPart, ...]
+
+    @classmethod
+    def of(cls, size: int, oversample: int = 2) -> LitSphere:
+        n = size * oversample
+        axis = (np.arange(n) + 0.5) / n * 2.1 - 1.05
+        x, y = np.meshgrid(axis, -axis)
+        inside = x**2 + y**2 < 1.0
+        normal = np.stack([x, y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], axis=-1)[inside]
+        view = np.broadcast_to(np.array([0.0, 0.0, 1.0]), normal.shape)
+        parts = []
+        for direction, strength in ((KEY, 1.0), (RIM, RIM_STRENGTH)):
+            light = direction / np.linalg.norm(direction)
+            cos_i = normal @ light
+            lit = cos_i > 0
+            factor = strength * np.pi * cos_i[lit]
+            parts.append(
+                LitPart(np.flatnonzero(lit), normal[lit], light[None, :], view[lit], factor)
+            )
+        return cls(size, oversample, inside, tuple(parts))
+
+    def picture(
+        self, rho: Sequence[NDArray[np.floating]]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """(radiance (size, size, 3), coverage (size, size)) of ρ (n, 3) in 1/sr of each part."""
+        radiance = np.zeros((int(self.inside.sum()), 3), np.float32)
+        for part, own in zip(self.parts, rho, strict=True):
+            radiance[part.places] += (part.factor[:, None] * own).astype(np.float32)
+        image = np.zeros((*self.inside.shape, 3), np.float32)
+        image[self.inside] = radiance
+        size, each = self.size, self.oversample
+        blocks = image.reshape(size, each, size, each, 3).mean(axis=(1, 3))
+        coverage = self.inside.reshape(size, each, size, each).mean(axis=(1, 3))
+        return blocks, coverage.astype(np.float32)
+
+
 def lit_sphere(
     reflector: Reflector, size: int = 320, oversample: int = 2
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """(radiance (size, size, 3), coverage (size, size)) of a sphere under two distant lights.
-
-    Orthographic view along −z; key light of irradiance π, so that a
-    white matte sphere reaches 1.
-    """
-    n = size * oversample
-    axis = (np.arange(n) + 0.5) / n * 2.1 - 1.05
-    x, y = np.meshgrid(axis, -axis)
-    inside = x**2 + y**2 < 1.0
-    normal = np.stack([x, y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], axis=-1)[inside]
-    view = np.broadcast_to(np.array([0.0, 0.0, 1.0]), normal.shape)
-    radiance = np.zeros((len(normal), 3), np.float32)
-    for direction, strength in ((KEY, 1.0), (RIM, RIM_STRENGTH)):
-        light = direction / np.linalg.norm(direction)
-        cos_i = normal @ light
-        lit = cos_i > 0
-        rho = _reflectance(reflector, normal[lit], light[None, :], view[lit])
-        radiance[lit] += (strength * np.pi * cos_i[lit, None] * rho).astype(np.float32)
-    image = np.zeros((n, n, 3), np.float32)
-    image[inside] = radiance
-    blocks = image.reshape(size, oversample, size, oversample, 3).mean(axis=(1, 3))
-    coverage = inside.reshape(size, oversample, size, oversample).mean(axis=(1, 3))
-    return blocks, coverage.astype(np.float32)
+    """(radiance (size, size, 3), coverage (size, size)) of LitSphere with the reflector on it."""
+    sphere = LitSphere.of(size, oversample)
+    return sphere.picture([_reflectance(reflector, part) for part in sphere.parts])
 
 
 def write_sphere(path: Path, reflector: Reflector) -> None:
@@ -57,13 +102,8 @@ def write_sphere(path: Path, reflector: Reflector) -> None:
     write_png(path, np.dstack([display.srgb(sphere), alpha]))
 
 
-def _reflectance(
-    reflector: Reflector,
-    normal: NDArray[np.floating],
-    light: NDArray[np.floating],
-    view: NDArray[np.floating],
-) -> NDArray[np.floating]:
-    """ρ (n, 3) in 1/sr for unit vectors (n, 3)."""
+def _reflectance(reflector: Reflector, part: LitPart) -> NDArray[np.floating]:
+    """ρ (n, 3) in 1/sr at the points of a part."""
     if isinstance(reflector, (Principled, LobeStack)):
-        return reflector.at(Configuration.around(normal, light, view))
-    return reflector(half_difference(normal, light, view))
+        return reflector.at(Configuration.around(part.normal, part.light, part.view))
+    return reflector(part.angles)

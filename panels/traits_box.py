@@ -1,0 +1,99 @@
+"""Below the material stage: sliders that change a measured material, and the way back."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+
+from ..scene.follow_traits import behind
+from ..scene.materials import BASIS
+from ..scene.moved import measured_brdf, sliders, standing, state, words_of
+from ..scene.traits import shown_material
+from .measured_box import SPHERE, icon_of
+from .wrapped import wrapped
+
+
+class PATINA_PT_traits(bpy.types.Panel):
+    bl_idname = "PATINA_PT_traits"
+    bl_label = "Change Traits"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Patina"
+    bl_parent_id = "PATINA_PT_material"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return shown_material(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, material = self.layout, shown_material(context)
+        _choice(layout, context, material)
+        layout.template_icon(icon_value=icon_of(material), scale=SPHERE)
+        if measured_brdf(material) is None:
+            said = (
+                "The components it was measured in are not on this computer: fit again to change it"
+            )
+            wrapped(layout, said, "ERROR")
+            return
+        traits = material.patina_traits
+        layout.row().prop(traits, "channels", expand=True)
+        column, shifts = layout.column(align=True), getattr(traits, traits.channels)
+        for number, (name, word) in enumerate(
+            zip(sliders(material), words_of(material[BASIS]), strict=False), 1
+        ):
+            column.prop(shifts, name, text=f"{number} {word.capitalize()}", slider=True)
+        for line, icon in notes(material):
+            wrapped(layout, line, icon)
+        layout.operator("patina.reset_traits", icon="LOOP_BACK")
+
+
+def _choice(
+    layout: bpy.types.UILayout, context: bpy.types.Context, material: bpy.types.Material
+) -> None:
+    """Which material, and the list to choose another from where the mesh has several."""
+    mesh = context.scene.patina.mesh
+    if mesh is not None and len(mesh.material_slots) > 1 and context.object in (None, mesh):
+        layout.template_list(
+            "MATERIAL_UL_matslots",
+            "",
+            mesh,
+            "material_slots",
+            mesh,
+            "active_material_index",
+            rows=2,
+        )
+    layout.label(text=material.name, icon="MATERIAL")
+
+
+def notes(material: bpy.types.Material) -> list[tuple[str, str]]:
+    """(sentence, icon) on what the sliders have made of the material."""
+    said = []
+    found = standing(material)
+    if found.excess is not None:
+        albedo, view = found.excess
+        where = "from the front" if view < 0.1 else f"{math.degrees(view):.0f}° from the normal"
+        said.append(
+            (f"Seen {where} it gives back {albedo:.2g} times the light that falls on it: renders "
+             "hold it to 1", "ERROR")
+        )  # fmt: skip
+    if not state(material):
+        return said
+    if found.beyond:
+        listed = ", ".join(str(i + 1) for i in found.beyond)
+        said.append(
+            (f"Component {listed}: farther out than any material the components were made from",
+             "INFO")
+        )  # fmt: skip
+    if behind(material):
+        said.append(("EEVEE and exports follow in a moment", "SORTTIME"))
+    return said
+
+
+def register() -> None:
+    bpy.utils.register_class(PATINA_PT_traits)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(PATINA_PT_traits)

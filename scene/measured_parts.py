@@ -1,0 +1,150 @@
+"""What of a material's nodes a moved trait changes: written anew, and put back as it was.
+
+A material whose traits are moved keeps what it had when they were not, to be put back to the bit,
+also where the artist had turned an input by hand.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Container, Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.appearance import osl_source
+from ..core.basis import PrincipalBRDF
+from . import osl_files
+from .lobe_group import MADE_AS
+from .lobe_group import NAME as LOBE_STACK
+
+KEPT = "patina_as_measured"  # on the material: JSON
+BODY, BODY_SCALE = "body", "body_scale"  # inputs of the OSL shader, linked where there are maps
+
+WRITTEN = (osl_source.SAMPLING, osl_source.ALPHAS, BODY)  # of the OSL shader, by set_sampling
+
+
+def principled_node(material: bpy.types.Material) -> bpy.types.Node | None:
+    """What exporters see, where it still is the Principled."""
+    outputs = (n for n in _nodes(material, "OUTPUT_MATERIAL") if n.target == "ALL")
+    links = [link for node in outputs for link in node.inputs["Surface"].links]
+    found = (link.from_node for link in links)
+    return next((node for node in found if node.type == "BSDF_PRINCIPLED"), None)
+
+
+def lobe_node(material: bpy.types.Material) -> bpy.types.Node | None:
+    """What EEVEE shows."""
+    return next(
+        (
+            node
+            for node in _nodes(material, "GROUP")
+            if node.node_tree is not None
+            and MADE_AS in node.node_tree
+            and node.node_tree.name.split(".")[0] == LOBE_STACK
+        ),
+        None,
+    )
+
+
+def set_coefficients(material: bpy.types.Material, brdf: PrincipalBRDF) -> int:
+    """The shader's inputs; returns how many changed. Every write makes Cycles build it anew."""
+    changed = 0
+    for node in osl_files.script_nodes(material):
+        sockets = {socket.identifier: socket for socket in node.inputs}
+        for i, rgb in enumerate(np.asarray(brdf.coefficients).T):
+            socket = sockets.get(osl_source.coefficient_name(i))
+            if socket is None:
+                break
+            value = tuple(float(v) for v in np.float32(rgb))
+            if tuple(socket.default_value) != value:
+                socket.default_value, changed = value, changed + 1
+    return changed
+
+
+def set_sampling(
+    material: bpy.types.Material,
+    path: Path,
+    alphas: tuple[float, float, float],
+    body: NDArray[np.floating],
+) -> None:
+    """The table that half vectors are drawn from, the lobes' widths, and the body's level (3,) for
+    those of the shaders that wear maps."""
+    for node in osl_files.script_nodes(material):
+        sockets = {socket.identifier: socket for socket in node.inputs}
+        sockets[osl_source.SAMPLING].default_value = path.resolve().as_posix()
+        sockets[osl_source.ALPHAS].default_value = alphas
+        if sockets[BODY_SCALE].is_linked:
+            sockets[BODY].default_value = tuple(float(v) for v in body)
+    material[osl_files.PROPERTIES[osl_source.SAMPLING]] = path.name
+
+
+def keep(material: bpy.types.Material) -> None:
+    """Remember what there is, unless something is remembered already."""
+    if KEPT in material:
+        return
+    principled, lobes = principled_node(material), lobe_node(material)
+    told: dict[str, Any] = {
+        "solid": [list(material.diffuse_color), material.metallic, material.roughness],
+        "principled": None if principled is None else _inputs(principled),
+        "lobes": None if lobes is None else _inputs(lobes),
+        "shaders": [_inputs(node, WRITTEN) for node in osl_files.script_nodes(material)],
+    }
+    material[KEPT] = json.dumps(told)
+    name = material.get(osl_files.PROPERTIES[osl_source.SAMPLING])
+    if name:
+        material[osl_files.MEASURED_SAMPLING] = name
+
+
+def put_back(material: bpy.types.Material) -> None:
+    """As it was before any trait was moved; the nodes that are gone stay gone."""
+    if KEPT not in material:
+        return
+    told = json.loads(material[KEPT])
+    color, material.metallic, material.roughness = told["solid"]
+    material.diffuse_color = color
+    for node, inputs in (
+        (principled_node(material), told["principled"]),
+        (lobe_node(material), told["lobes"]),
+        *zip(osl_files.script_nodes(material), told["shaders"], strict=False),
+    ):
+        if node is not None and inputs is not None:
+            _put_inputs(node, inputs)
+    name = material.get(osl_files.MEASURED_SAMPLING)
+    if name:
+        material[osl_files.PROPERTIES[osl_source.SAMPLING]] = name
+        for node in osl_files.script_nodes(material):
+            for socket in osl_files.file_sockets(node):
+                if socket.identifier == osl_source.SAMPLING:
+                    osl_files.read_again(socket, name)
+        del material[osl_files.MEASURED_SAMPLING]
+    del material[KEPT]
+
+
+def _nodes(material: bpy.types.Material, kind: str) -> Iterator[bpy.types.Node]:
+    tree = material.node_tree
+    yield from (node for node in (tree.nodes if tree else ()) if node.type == kind)
+
+
+def _inputs(node: bpy.types.Node, only: Container[str] | None = None) -> dict[str, Any]:
+    """Label and inputs (only some of them); floats as JSON has them come back to the bit."""
+    values = {
+        socket.identifier: _plain(socket.default_value)
+        for socket in node.inputs
+        if hasattr(socket, "default_value") and (only is None or socket.identifier in only)
+    }
+    return {"label": node.label, "values": values}
+
+
+def _plain(value: Any) -> Any:
+    return value if isinstance(value, (str, int, float)) else list(value)
+
+
+def _put_inputs(node: bpy.types.Node, told: dict[str, Any]) -> None:
+    node.label = told["label"]
+    for socket in node.inputs:
+        value = told["values"].get(socket.identifier)
+        if value is not None and _plain(socket.default_value) != value:
+            socket.default_value = value

@@ -1,0 +1,250 @@
+"""Sliders of a measured material: all that shows it follows, and 0 is what was measured, to the bit."""
+
+from __future__ import annotations
+
+import time
+
+import bpy
+import numpy as np
+from support import Skip, extension
+from test_workflow import folder, made
+
+FIT = "[fit]\nheld_out = false"
+
+
+_fitted: list[str] = []  # the .blend of the one fit that all tests here look at
+
+
+def measured() -> bpy.types.Material:
+    """A fitted material, in a file of the test's own."""
+    if not _fitted:
+        path = made().make_capture(folder() / "ball", photos=3, extra=FIT)
+        assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
+        assert bpy.ops.patina.fit() == {"FINISHED"}
+        _fitted.append(str(folder() / "fitted.blend"))
+        bpy.ops.wm.save_as_mainfile(filepath=_fitted[0])
+    bpy.ops.wm.open_mainfile(filepath=_fitted[0])
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder() / "own.blend"))
+    material = bpy.data.materials["surface"]
+    moved = extension("scene.moved")
+    extension("scene.preview").show_sphere(material, moved.measured_brdf(material))
+    return material
+
+
+class Plainer:
+    """Fits of portable models that take no time: what follows when, not how well, is tested."""
+
+    def __enter__(self):
+        self.module = extension("scene.follow_traits")
+        self.fits = self.module.fit_principled, self.module.fit_lobe_stack
+        principled, lobes = self.fits
+        self.module.fit_principled = lambda evaluate: principled(evaluate, False, (10, 4, 3))
+        self.module.fit_lobe_stack = lambda evaluate: lobes(evaluate, 1, False)
+        return self.module
+
+    def __exit__(self, *_):
+        self.module.fit_principled, self.module.fit_lobe_stack = self.fits
+
+
+def preview(material: bpy.types.Material) -> np.ndarray:
+    found = material.preview
+    return np.array(found.image_pixels_float[:]).reshape(*reversed(found.image_size), 4)
+
+
+def look(material: bpy.types.Material) -> dict:
+    """All that a slider may change, as exact values."""
+    parts = extension("scene.measured_parts")
+    told = {
+        "coefficients": list(material["patina_coefficients"]),
+        "solid": (*material.diffuse_color, material.metallic, material.roughness),
+        "files": [material.get(k) for k in extension("scene.osl_files").PROPERTIES.values()],
+    }
+    nodes = {"principled": parts.principled_node(material), "lobes": parts.lobe_node(material)}
+    for i, node in enumerate(extension("scene.osl_files").script_nodes(material)):
+        nodes[f"shader {i}"] = node
+    for name, node in nodes.items():
+        told[name] = (node.label,) + tuple(
+            (s.identifier, s.default_value if isinstance(s.default_value, (str, int, float))
+             else tuple(s.default_value))
+            for s in node.inputs if hasattr(s, "default_value")
+        )  # fmt: skip
+    return told
+
+
+def coefficients(material: bpy.types.Material) -> np.ndarray | None:
+    """(3, 8) of the OSL shader; None where there is none."""
+    found = extension("scene.osl_files").script_nodes(material)
+    if not found:
+        return None
+    sockets = {s.identifier: s for s in found[0].inputs}
+    return np.array([sockets[f"coefficient_{i + 1}"].default_value[:] for i in range(8)]).T
+
+
+def test_the_sphere_and_the_shader_follow_at_once() -> None:
+    material = measured()
+    stored, first = list(material["patina_coefficients"]), preview(material)
+    as_fitted = coefficients(material)
+    material.patina_traits.every.trait_1 = 0.5
+    material.patina_traits.every.trait_2 = -1.0
+    material.patina_traits.red.trait_2 = 0.25
+    assert list(material["patina_coefficients"]) == stored
+    step = 1 / np.sqrt(300)
+    expected = np.array(stored).reshape(3, -1)[:, :8].copy()
+    expected[:, 0] += 0.5 * step
+    expected[:, 1] += np.array([-0.75, -1.0, -1.0]) * step
+    if as_fitted is not None:
+        np.testing.assert_allclose(coefficients(material), expected, rtol=1e-6)
+        assert not np.allclose(as_fitted, expected, atol=step / 4)
+    moved = extension("scene.moved")
+    np.testing.assert_allclose(moved.moved_brdf(material).coefficients[:, :8], expected)
+    small = preview(material)
+    assert small.shape[0] == moved.QUICK
+    blocks = first.reshape(moved.QUICK, 2, moved.QUICK, 2, 4).mean(axis=(1, 3))
+    assert np.abs(small - blocks).max() > 0.2
+    with Plainer() as follow:
+        follow.settle()
+        assert not follow.behind(material)
+    large = preview(material).reshape(moved.QUICK, 2, moved.QUICK, 2, 4).mean(axis=(1, 3))
+    assert np.abs(small - large).mean() < 0.01, "the sphere in full is the same sphere"
+
+
+def test_a_change_is_shown_within_a_tenth_of_a_second() -> None:
+    material = measured()
+    material.patina_traits.every.trait_1 = 0.1  # looks up what it needs
+    taken = []
+    for k in range(12):
+        start = time.perf_counter()
+        setattr(material.patina_traits.every, f"trait_{k % 8 + 1}", 0.3 + 0.02 * k)
+        taken.append(time.perf_counter() - start)
+    print(f"     median {1000 * np.median(taken):.0f} ms, slowest {1000 * max(taken):.0f} ms")
+    assert np.median(taken) < 0.1
+
+
+def test_reset_brings_back_what_was_measured_to_the_bit() -> None:
+    material = measured()
+    before, sphere = look(material), preview(material)
+    assert not bpy.ops.patina.reset_traits.poll()
+    with Plainer() as follow:
+        for name, value in (("trait_1", 1.5), ("trait_4", -2.0)):
+            setattr(material.patina_traits.every, name, value)
+        material.patina_traits.blue.trait_3 = 0.7
+        follow.settle()
+        assert not follow.behind(material)
+        after = look(material)
+        assert after["coefficients"] == before["coefficients"]
+        for name in ("principled", "lobes", "solid"):
+            assert after[name] != before[name], name
+        images = {image.name for image in bpy.data.images}
+        material.patina_traits.every.trait_2 = 1.0
+        follow.settle()
+        assert len({image.name for image in bpy.data.images} - images) <= 1
+    assert bpy.ops.patina.reset_traits() == {"FINISHED"}
+    assert not extension("scene.moved").shifts(material).any()
+    assert look(material) == before
+    np.testing.assert_array_equal(preview(material), sphere)
+    assert not [key for key in material.keys() if "traits_shown" in key or "as_measured" in key]
+    assert not extension("scene.follow_traits").behind(material)
+
+
+def test_a_slider_back_at_0_is_as_measured_too() -> None:
+    material = measured()
+    before, sphere = look(material), preview(material)
+    with Plainer() as follow:
+        material.patina_traits.every.trait_1 = 1.0
+        follow.settle()
+        material.patina_traits.every.trait_1 = 0.0
+        assert look(material) == before
+        follow.settle()
+        np.testing.assert_array_equal(preview(material), sphere)
+
+
+def test_undo_and_redo_agree_with_the_sliders() -> None:
+    material = measured()
+    if not bpy.ops.ed.undo_push.poll():
+        raise Skip("no undo here")
+    name = material.name
+    before, sphere = look(material), preview(material)
+    bpy.ops.ed.undo_push(message="fit")
+    with Plainer() as follow:
+        material.patina_traits.every.trait_1 = 1.0
+        bpy.ops.ed.undo_push(message="slider")  # before the rest has followed, as Blender does
+        follow.settle()
+        moved, shown = look(material), preview(material)
+        bpy.ops.ed.undo()
+        material = bpy.data.materials[name]
+        assert material.patina_traits.every.trait_1 == 0.0
+        assert look(material) == before
+        follow.settle()
+        np.testing.assert_array_equal(preview(material), sphere)
+        bpy.ops.ed.redo()
+        material = bpy.data.materials[name]
+        assert material.patina_traits.every.trait_1 == 1.0
+        follow.settle()
+        assert look(material) == moved
+        np.testing.assert_array_equal(preview(material), shown)
+        bpy.ops.patina.reset_traits()
+        assert look(material) == before
+
+
+def test_sliders_and_look_are_saved_and_a_new_fit_has_none() -> None:
+    material, blend = measured(), folder() / "moved.blend"
+    before = look(material)
+    with Plainer() as follow:
+        material.patina_traits.every.trait_1 = 0.75
+        bpy.ops.wm.save_as_mainfile(filepath=str(blend))  # in the background: settles
+        assert not follow.behind(material)
+        moved, sphere = look(material), preview(material)
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    material = bpy.data.materials["surface"]
+    assert material.patina_traits.every.trait_1 == 0.75
+    assert look(material) == moved and not follow.behind(material)
+    np.testing.assert_allclose(preview(material), sphere, atol=1 / 255)
+    bpy.ops.patina.reset_traits()
+    again = look(material)
+    assert again == before
+    material.patina_traits.every.trait_1 = 0.75
+    assert bpy.ops.patina.fit() == {"FINISHED"}
+    material = bpy.data.materials["surface"]
+    assert not extension("scene.moved").state(material)
+    assert look(material)["coefficients"] == before["coefficients"]
+
+
+def test_the_timer_follows_and_goes() -> None:
+    material = measured()
+    with Plainer() as follow:
+        material.patina_traits.every.trait_3 = 1.0
+        assert bpy.app.timers.is_registered(follow._tick)
+        assert follow._tick() > 0, "not while the slider moves"
+        end = time.monotonic() + 120
+        while (wait := follow._tick()) is not None and time.monotonic() < end:
+            time.sleep(wait)
+        assert not follow.behind(material)
+        extension().unregister()
+        try:
+            assert not bpy.app.timers.is_registered(follow._tick)
+        finally:
+            extension().register()
+
+
+def test_the_panel_says_what_cannot_be() -> None:
+    material = measured()
+    box, moved = extension("panels.traits_box"), extension("scene.moved")
+    words = moved.words_of(material["patina_basis"])
+    assert len(words) == 8 and all(words)
+    assert not box.notes(material)
+    material.patina_traits.every.trait_2 = -4.0
+    said = " ".join(line for line, _ in box.notes(material))
+    assert "times the light" in said and "Component 2" in said and "EEVEE" in said
+    assert extension("scene.traits").shown_material(bpy.context) == material
+    del material["patina_basis"], material["patina_coefficients"]
+    assert extension("scene.traits").shown_material(bpy.context) is None
+
+
+def test_a_material_whose_basis_is_not_here_stays_as_it_is() -> None:
+    material = measured()
+    before = look(material)
+    material["patina_basis"] = "0123456789ab"
+    material.patina_traits.every.trait_1 = 1.0
+    assert look(material) == before and not bpy.ops.patina.reset_traits.poll()
+    extension("scene.follow_traits").settle()
+    assert look(material) == before
