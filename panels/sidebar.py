@@ -16,6 +16,7 @@ from .mask_box import draw_masks
 from .measured_box import draw_measured, icon_of
 from .photo_rows import PATINA_UL_photos, draw_photos
 from .stage import StagePanel
+from .traits_box import standing_word
 from .wrapped import wrapped
 
 
@@ -89,7 +90,7 @@ class PATINA_PT_material(StagePanel, bpy.types.Panel):
             row = layout.row()
             row.label(text=material.name, icon_value=icon_of(material))
             portable = REASON_PROPERTY in material or hindrance is not None
-            row.label(text="Portable" if portable else "Measured")
+            row.label(text=standing_word(material, portable))
         for reason in sorted({*reasons} if reasons else {hindrance} - {None}):
             wrapped(layout, f"Not the measurement itself: {reason}", "INFO")
         if found:

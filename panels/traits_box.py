@@ -8,7 +8,7 @@ import bpy
 
 from ..scene.follow_traits import behind
 from ..scene.materials import BASIS
-from ..scene.moved import measured_brdf, sliders, standing, state, words_of
+from ..scene.moved import measured_brdf, movable, sliders, standing, state, words_of
 from ..scene.traits import shown_material
 from .measured_box import SPHERE, icon_of
 from .wrapped import wrapped
@@ -65,6 +65,13 @@ def _choice(
             rows=2,
         )
     layout.label(text=material.name, icon="MATERIAL")
+
+
+def standing_word(material: bpy.types.Material, portable: bool) -> str:
+    """What a material in the list is; portable: where the measured shader cannot run."""
+    if movable(material) and state(material):
+        return "Changed"
+    return "Portable" if portable else "Measured"
 
 
 def notes(material: bpy.types.Material) -> list[tuple[str, str]]:

@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 
 from .apply import DATE, MEASURED
+from .moved import movable, state
 
 PROVENANCE = "patina_provenance"  # on the material
 
@@ -20,6 +21,8 @@ def mark(material: bpy.types.Material, result: dict[str, Any]) -> bool:
     if mine is None:
         return False
     told = provenance(mine, result, material.get(DATE, ""))
+    if movable(material) and state(material):
+        told["changed"] = "with its traits changed by hand since"
     material[PROVENANCE] = told
     material.asset_mark()
     data = material.asset_data

@@ -22,7 +22,9 @@ BENCHES = (
     "viewport",
     "diagnose",
     "speed",
+    "traits",
 )
+OWN = ("speed", "traits")  # these need no reference data
 
 
 def main() -> int:
@@ -33,9 +35,10 @@ def main() -> int:
     unknown = [name for name in told.names if name not in BENCHES]
     if unknown:
         parser.error(f"no measurement is called {unknown[0]!r}; there are {', '.join(BENCHES)}")
-    if told.names == ["speed"]:  # it makes its own
+    if told.names and set(told.names) <= set(OWN):
         load_patina()
-        importlib.import_module(".bench_speed", __package__).run(Path())
+        for name in told.names:
+            importlib.import_module(f".bench_{name}", __package__).run(Path())
         return 0
     data = Path(os.environ.get("PATINA_SHARED", ROOT.parent / "shared")) / "data"
     if not data.is_dir():

@@ -1,4 +1,4 @@
-"""Sliders of a measured material: all that shows it follows, and 0 is what was measured, to the bit."""
+"""Sliders of a measured material: all that shows it follows, and 0 is what was measured."""
 
 from __future__ import annotations
 
@@ -63,11 +63,10 @@ def look(material: bpy.types.Material) -> dict:
     for i, node in enumerate(extension("scene.osl_files").script_nodes(material)):
         nodes[f"shader {i}"] = node
     for name, node in nodes.items():
-        told[name] = (node.label,) + tuple(
-            (s.identifier, s.default_value if isinstance(s.default_value, (str, int, float))
-             else tuple(s.default_value))
-            for s in node.inputs if hasattr(s, "default_value")
-        )  # fmt: skip
+        inputs = {s.identifier: s.default_value for s in node.inputs if hasattr(s, "default_value")}
+        plain = (str, int, float)
+        values = {k: v if isinstance(v, plain) else tuple(v) for k, v in inputs.items()}
+        told[name] = (node.label, values)
     return told
 
 
@@ -142,7 +141,9 @@ def test_reset_brings_back_what_was_measured_to_the_bit() -> None:
     assert not extension("scene.moved").shifts(material).any()
     assert look(material) == before
     np.testing.assert_array_equal(preview(material), sphere)
-    assert not [key for key in material.keys() if "traits_shown" in key or "as_measured" in key]
+    assert not {"patina_traits_shown", "patina_as_measured", "patina_measured_sampling"} & {
+        *material.keys()
+    }
     assert not extension("scene.follow_traits").behind(material)
 
 
@@ -211,6 +212,7 @@ def test_sliders_and_look_are_saved_and_a_new_fit_has_none() -> None:
 
 def test_the_timer_follows_and_goes() -> None:
     material = measured()
+    before, sphere = look(material), preview(material)
     with Plainer() as follow:
         material.patina_traits.every.trait_3 = 1.0
         assert bpy.app.timers.is_registered(follow._tick)
@@ -219,6 +221,14 @@ def test_the_timer_follows_and_goes() -> None:
         while (wait := follow._tick()) is not None and time.monotonic() < end:
             time.sleep(wait)
         assert not follow.behind(material)
+        material.patina_traits.every.trait_3 = 2.0
+        while follow._work is None:
+            time.sleep(follow._tick())
+        bpy.ops.patina.reset_traits()  # while a piece is under way: it comes too late
+        while (wait := follow._tick()) is not None and time.monotonic() < end:
+            time.sleep(wait)
+        assert look(material) == before
+        np.testing.assert_array_equal(preview(material), sphere)
         extension().unregister()
         try:
             assert not bpy.app.timers.is_registered(follow._tick)
@@ -238,6 +248,49 @@ def test_the_panel_says_what_cannot_be() -> None:
     assert extension("scene.traits").shown_material(bpy.context) == material
     del material["patina_basis"], material["patina_coefficients"]
     assert extension("scene.traits").shown_material(bpy.context) is None
+
+
+class Layout:
+    """Takes down what a panel draws; only properties that there are can be drawn."""
+
+    def __init__(self) -> None:
+        self.drawn: list[str] = []
+
+    def prop(self, data, name: str, text: str = "", **_) -> None:
+        assert name in data.bl_rna.properties, name
+        self.drawn.append(text)
+
+    def label(self, text: str = "", **_) -> None:
+        self.drawn.append(text)
+
+    def operator(self, name: str, **_) -> None:
+        group, operator = name.split(".")
+        assert operator in dir(getattr(bpy.ops, group)), name
+        self.drawn.append(name)
+
+    def template_icon(self, **_) -> None:
+        pass
+
+    def row(self, **_):
+        return self
+
+    column = row
+
+
+def test_the_panel_draws_a_slider_a_component_with_what_it_does() -> None:
+    material = measured()
+    panel, layout = extension("panels.traits_box").PATINA_PT_traits, Layout()
+    assert panel.poll(bpy.context)
+    panel.draw(type("Panel", (), {"layout": layout})(), bpy.context)
+    assert "1 Stronger, sharper highlight" in layout.drawn and "surface" in layout.drawn
+    assert sum(line[:1].isdigit() for line in layout.drawn) == 8
+    assert layout.drawn[-1] == "patina.reset_traits"
+    word = extension("panels.traits_box").standing_word
+    assert word(material, False) == "Measured"
+    material.patina_traits.green.trait_2 = -0.5
+    assert word(material, False) == "Changed"
+    bpy.ops.patina.mark_assets()
+    assert "changed by hand" in material.asset_data.description
 
 
 def test_a_material_whose_basis_is_not_here_stays_as_it_is() -> None:

@@ -1,0 +1,181 @@
+"""Moved components: linear in the logarithm, exact at 0, honest about what cannot be."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from patina.core.angles import Angles
+from patina.core.appearance import trait_words, traits
+from patina.core.appearance.energy import directional_albedo
+from patina.core.appearance.hemisphere import Hemisphere
+from patina.core.appearance.trait_words import Effect
+from patina.core.basis import Basis, PrincipalBRDF, mapping
+from patina.core.report.sphere import LitSphere, lit_sphere
+
+
+@pytest.fixture(scope="module")
+def brdf() -> PrincipalBRDF:
+    basis = Basis.default()
+    return PrincipalBRDF(basis, np.random.default_rng(0).normal(0, 0.03, (3, 40)))
+
+
+@pytest.fixture(scope="module")
+def angles() -> Angles:
+    rng = np.random.default_rng(1)
+    return Angles(rng.uniform(0, 1.5, 500), rng.uniform(0, 1.5, 500), rng.uniform(0, np.pi, 500))
+
+
+def _shifts(seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).normal(0, 1.0, (3, 8))
+
+
+def test_a_shift_is_so_many_deviations_of_the_training_coefficients(brdf) -> None:
+    basis, shifts = brdf.basis, _shifts(2)
+    spread = basis.training.std(axis=0)[:8]
+    np.testing.assert_allclose(traits.deviation(basis), spread, rtol=2e-3)
+    there = traits.moved(brdf, shifts).coefficients
+    np.testing.assert_allclose(
+        there[:, :8] - brdf.coefficients[:, :8], traits.deviation(basis) * shifts, atol=1e-12
+    )
+    np.testing.assert_array_equal(there[:, 8:], brdf.coefficients[:, 8:])
+    few = PrincipalBRDF(basis, brdf.coefficients[:, :5])  # the paper's method has no more
+    assert traits.moved(few, shifts).coefficients.shape == (3, 5)
+
+
+def test_no_shift_is_the_measured_brdf_to_the_bit(brdf, angles) -> None:
+    none = np.zeros((3, 8))
+    assert traits.moved(brdf, none) is brdf
+    there_and_back = traits.moved(traits.moved(brdf, _shifts(3)), none)
+    assert there_and_back.coefficients is not brdf.coefficients
+    movable = traits.Movable.of(brdf, traits.Looked.of(brdf.basis, angles))
+    np.testing.assert_array_equal(movable.at(none), brdf.evaluate(angles))
+
+
+def test_moving_is_linear_in_the_logarithm(brdf, angles) -> None:
+    movable = traits.Movable.of(brdf, traits.Looked.of(brdf.basis, angles))
+    weight = mapping.cos_map(angles)
+    first, second = 0.3 * _shifts(4), 0.3 * _shifts(5)
+
+    def log(shifts: np.ndarray) -> np.ndarray:
+        return mapping.log_weighted(movable.at(shifts), weight)
+
+    none = np.zeros((3, 8))
+    both = log(first) + log(second) - log(none)
+    floor = np.log(mapping.EPSILON) + 0.01  # below it there is no reflectance to have
+    kept = np.min([log(s) for s in (none, first, second, first + second)], axis=0) > floor
+    assert kept.mean() > 0.5
+    np.testing.assert_allclose(log(first + second)[kept], both[kept], atol=2e-3)
+
+
+def test_what_is_looked_up_once_says_what_the_moved_brdf_says(brdf, angles) -> None:
+    movable = traits.Movable.of(brdf, traits.Looked.of(brdf.basis, angles))
+    shifts = _shifts(6)
+    expected = traits.moved(brdf, shifts).evaluate(angles)
+    np.testing.assert_allclose(movable.at(shifts), expected, rtol=2e-4, atol=1e-6)
+    red = np.zeros((3, 8))
+    red[0] = shifts[0]
+    np.testing.assert_array_equal(movable.at(red)[:, 1:], movable.at(np.zeros((3, 8)))[:, 1:])
+
+
+def test_the_moved_sphere_is_the_sphere_of_the_moved_brdf(brdf) -> None:
+    sphere, shifts = LitSphere.of(48), _shifts(7)
+    parts = [traits.Movable.of(brdf, traits.Looked.of(brdf.basis, p.angles)) for p in sphere.parts]
+    seen, coverage = sphere.picture([part.at(shifts) for part in parts])
+    expected, inside = lit_sphere(traits.moved(brdf, shifts).evaluate, 48)
+    np.testing.assert_allclose(seen, expected, rtol=1e-3, atol=1e-4 * expected.max())
+    np.testing.assert_array_equal(coverage, inside)
+    unmoved, _ = sphere.picture([part.at(np.zeros((3, 8))) for part in parts])
+    np.testing.assert_array_equal(unmoved, lit_sphere(brdf.evaluate, 48)[0])
+
+
+def test_the_albedo_is_that_of_the_moved_brdf(brdf) -> None:
+    albedo, shifts = traits.MovableAlbedo.of(brdf), _shifts(8)
+    moved = traits.moved(brdf, shifts)
+    expected = directional_albedo(moved.evaluate, np.array(traits.VIEWS))
+    np.testing.assert_allclose(albedo.at(shifts), expected, rtol=1e-3)
+    by_hand = []
+    for theta in traits.VIEWS:
+        sphere = Hemisphere.of(theta, 96, 24)
+        by_hand.append((sphere.cos_i * sphere.solid) @ moved.evaluate(sphere.angles).astype(float))
+    np.testing.assert_allclose(expected, by_hand, rtol=1e-12)
+
+
+def test_more_light_out_than_in_is_told(brdf) -> None:
+    albedo = traits.MovableAlbedo.of(brdf)
+    assert traits.excess(albedo.at(np.zeros((3, 8)))) is None
+    shifts = np.zeros((3, 8))
+    shifts[1, 1] = -5.0  # green alone: a much brighter body
+    found = albedo.at(shifts)
+    told = traits.excess(found)
+    assert told is not None and told[0] == pytest.approx(found[:, 1].max())
+    assert told[1] == traits.VIEWS[int(np.argmax(found[:, 1]))]
+    assert traits.excess(np.full((7, 3), 1.005)) is None
+
+
+def test_what_no_material_is_like_is_told(brdf) -> None:
+    shifts = np.zeros((3, 8))
+    assert traits.beyond_measured(brdf, shifts) == []
+    shifts[2, 4], shifts[0, 1] = 9.0, 0.1
+    assert traits.beyond_measured(brdf, shifts) == [4]
+    unknown = PrincipalBRDF(replace(brdf.basis, training=None), brdf.coefficients)
+    assert traits.beyond_measured(unknown, shifts) == []
+
+
+def test_words_follow_from_what_is_measured() -> None:
+    found = [
+        Effect(0.0, 2.0, -0.3, 0.0),
+        Effect(-1.0, -0.2, 0.0, 0.05),
+        Effect(0.05, 0.0, 0.0, 0.9),
+        Effect(0.05, -0.09, 0.0, 0.0),
+        Effect(0.6, 0.0, 0.28, 0.0),
+    ]
+    assert trait_words.words(found) == [
+        "stronger, sharper highlight",
+        "darker body",
+        "more at grazing angles",
+        trait_words.NOTHING,
+        "wider highlight, brighter body",
+    ]
+
+
+def test_a_component_does_what_its_words_say() -> None:
+    """On a material that none of the words was measured on, by another way."""
+    basis = Basis.default()
+    words = trait_words.words(trait_words.effects(basis))
+    plain = PrincipalBRDF(basis, np.zeros((3, 8)))
+    theta = np.radians(np.linspace(0, 60, 241))
+    profile = Angles(theta, np.full(241, 0.3), np.full(241, np.pi / 2))
+    facing = np.radians([0.0])
+
+    def moved(component: int) -> PrincipalBRDF:
+        shifts = np.zeros((3, 8))
+        shifts[:, component] = 1.0
+        return traits.moved(plain, shifts)
+
+    first, second, fourth = moved(0), moved(1), moved(3)
+    assert "stronger" in words[0] and "sharper" in words[0]
+    seen, before = (b.evaluate(profile)[:, 0] for b in (first, plain))
+    assert seen[0] > 5 * before[0] and seen[160] / seen[0] < 0.2 * before[160] / before[0]
+    assert words[1] == "darker body"
+    assert np.all(
+        directional_albedo(second.evaluate, facing)
+        < 0.6 * directional_albedo(plain.evaluate, facing)
+    )
+    assert words[3] == "more at grazing angles"
+    edge = Angles(np.zeros(2), np.radians([10.0, 80.0]), np.zeros(2))
+    rise = [float(np.divide(*b.evaluate(edge)[::-1, 0])) for b in (fourth, plain)]
+    assert rise[0] > 2 * rise[1]
+
+
+def test_the_table_of_the_documents_is_the_basis_own(root: Path) -> None:
+    """docs/traits.md, written by `run.py bench traits`."""
+    from tools.bench_traits import table
+
+    text = (root / "docs" / "traits.md").read_text(encoding="utf-8")
+    written = re.search(r"<!-- begin traits -->\n(.*?)\n<!-- end traits -->", text, re.S)
+    assert written is not None and written.group(1) == table(Basis.default())

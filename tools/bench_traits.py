@@ -1,0 +1,70 @@
+"""What each slider of a measured material does: the table of docs/traits.md, written anew."""
+
+from __future__ import annotations
+
+import re
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .common import ROOT
+
+if TYPE_CHECKING:
+    from patina.core.basis import Basis
+
+DOCUMENT = ROOT / "docs" / "traits.md"
+
+
+def run(data: Path) -> None:
+    """Write the table into the document, and print what a change costs. data: not looked at."""
+    import numpy as np
+
+    from patina.core.appearance.osl_atlas import TRAITS
+    from patina.core.appearance.traits import Looked, Movable, MovableAlbedo
+    from patina.core.basis import Basis, PrincipalBRDF
+    from patina.core.report import display
+    from patina.core.report.sphere import LitSphere
+
+    basis = Basis.default()
+    text = DOCUMENT.read_text(encoding="utf-8")
+    made = re.sub(
+        r"(<!-- begin traits -->\n).*?(\n<!-- end traits -->)",
+        lambda found: found.group(1) + table(basis) + found.group(2),
+        text,
+        flags=re.S,
+    )
+    DOCUMENT.write_text(made, encoding="utf-8")
+    print(table(basis))
+    brdf = PrincipalBRDF(basis, np.zeros((3, basis.count)))
+    sphere = LitSphere.of(128)
+    parts = [Movable.of(brdf, Looked.of(basis, p.angles)) for p in sphere.parts]
+    albedo = MovableAlbedo.of(brdf)
+    shifts = np.full((3, TRAITS), 0.5)
+    for what, work in (
+        ("sphere", lambda: display.srgb(sphere.picture([p.at(shifts) for p in parts])[0])),
+        ("albedo", lambda: albedo.at(shifts)),
+    ):
+        taken = []
+        for _ in range(9):
+            start = time.perf_counter()
+            work()
+            taken.append(time.perf_counter() - start)
+        print(f"{what}: {1000 * float(np.median(taken)):.1f} ms a change")
+
+
+def table(basis: Basis) -> str:
+    """Factors that each quantity of core/appearance/trait_words.py takes for one deviation."""
+    import numpy as np
+
+    from patina.core.appearance.trait_words import effects, words
+
+    found = effects(basis)
+    lines = [
+        "| component | variance | up by one deviation | body | peak | width | at grazing angles |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for i, (effect, word) in enumerate(zip(found, words(found), strict=True)):
+        each = (effect.body, effect.peak, effect.width, effect.grazing)
+        factors = " | ".join(f"× {np.exp(e):.2f}" for e in each)
+        lines.append(f"| {i + 1} | {100 * basis.explained[i]:.1f} % | {word} | {factors} |")
+    return "\n".join(lines)
