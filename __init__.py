@@ -22,6 +22,8 @@ MODULES: tuple[str, ...] = (
     "scene.checked",
     "scene.traits",
     "scene.follow_traits",
+    "scene.last_fit",
+    "scene.export_choice",
     "operators.import_capture",
     "operators.solve",
     "operators.masks",
@@ -34,6 +36,8 @@ MODULES: tuple[str, ...] = (
     "operators.reset_traits",
     "panels.sidebar",
     "panels.traits_box",
+    "operators.export",
+    "panels.export_box",
 )
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from functools import partial
 from pathlib import Path
 
 from ..core.errors import InputError
 from ..core.export import Loss, renderer_formats, table_formats, write_losses
 from ..core.export.file_names import check_distinct
 from ..core.export.subject import Subject
+from ..core.job.beside import beside
 from ..core.job.job import Step
 from ..core.result import FittedMaterial, FittedResult, read_result
 from .progress import Progress
@@ -44,29 +46,49 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     out = check_out(arguments.out)
-    result = read_result(arguments.result)
-    chosen = _chosen(result, arguments.material)
-    check_distinct([material.name for material in chosen])
-    _check_not_itself(out, result, arguments.to)
-    formats = list(dict.fromkeys(arguments.to))
-    subjects = [Subject(material) for material in chosen]
-    progress, losses = Progress(), []
-    with staged_folder(out) as folder:
-        for done, name in enumerate(formats):
-            progress(Step(f"writing {name}", done / len(formats)))
-            losses += _write(name, folder, out, result, subjects)
-        lines = write_losses(folder, losses, ", ".join(s.name for s in subjects))
+    steps = export(out, read_result(arguments.result), arguments.to, arguments.material)
+    progress = Progress()
+    while True:
+        try:
+            progress(next(steps))
+        except StopIteration as end:
+            losses, lines = end.value
+            break
     print("\n".join(lines).rstrip())
     for file in sorted({file for loss in losses for file in loss.files}):
         print(f"wrote {out / file}")
     print(f"      {out / 'losses.txt'}, losses.json")
 
 
-def _write(
+def export(
+    out: Path, result: FittedResult, formats: Sequence[str], names: Sequence[str] | None = None
+) -> Generator[Step, None, tuple[list[Loss], list[str]]]:
+    """Write a result's materials (``names``: these alone) into a folder, in steps. Returns what
+    each format keeps of each material, and the lines of losses.txt. Raises InputError.
+
+    BLENDER's formats open a .blend of their own, in place of the one that is open.
+    """
+    chosen = _chosen(result, names)
+    check_distinct([material.name for material in chosen])
+    _check_not_itself(out, result, formats)
+    formats = list(dict.fromkeys(formats))
+    subjects = [Subject(material) for material in chosen]
+    losses: list[Loss] = []
+    with staged_folder(out) as folder:
+        for done, name in enumerate(formats):
+            step = Step(f"writing {name}", done / len(formats))
+            yield step
+            if name in PLAIN:
+                losses += yield from beside(partial(PLAIN[name], folder, subjects), step)
+            else:
+                losses += _write_by_blender(name, folder, out, result, subjects)
+        lines = write_losses(folder, losses, ", ".join(s.name for s in subjects))
+    return losses, lines
+
+
+def _write_by_blender(
     name: str, folder: Path, out: Path, result: FittedResult, subjects: Sequence[Subject]
 ) -> list[Loss]:
-    if name in PLAIN:
-        return PLAIN[name](folder, subjects)
     from ..scene import export_formats  # needs bpy
 
     write = {

@@ -11,6 +11,7 @@ from ..core.errors import InputError
 from ..core.job import CaptureResult, FitJob
 from ..scene.apply import apply_result
 from ..scene.face_slots import with_painted_slots
+from ..scene.last_fit import keep_fit
 from ..scene.lights import with_dragged_lamps
 from ..scene.mask_images import with_mask_images
 from ..scene.painted import take_all
@@ -43,6 +44,7 @@ def fit_job(operator: bpy.types.Operator, scene: bpy.types.Scene) -> FitJob:
 def show_result(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> None:
     """The materials onto the mesh, and what should be known about them to the user."""
     notes = apply_result(scene, result, operator._job.stages)
+    keep_fit(result)
     for material in result.materials:
         for warning in material.warnings:
             operator.report({"WARNING"}, f"{material.name}: {warning}")

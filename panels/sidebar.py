@@ -1,5 +1,5 @@
-"""The sidebar tab: Scan, Photos & Light, Materials & Masks, Fit, Check, Material, in the order of
-the work."""
+"""The sidebar tab: Scan, Photos & Light, Materials & Masks, Fit, Check, Material & Export, in the
+order of the work."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class PATINA_PT_check(StagePanel, bpy.types.Panel):
 
 class PATINA_PT_material(StagePanel, bpy.types.Panel):
     bl_idname = "PATINA_PT_material"
-    bl_label = "Material"
+    bl_label = "Material & Export"
     stage = "material"
 
     def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

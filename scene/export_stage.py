@@ -29,7 +29,22 @@ def open_scan(file: Path, names: Sequence[str]) -> bpy.types.Object | None:
     if mesh is None or mesh.type != "MESH" or mesh.name not in bpy.context.scene.objects:
         return None
     worn = {slot.material.get(MEASURED) for slot in mesh.material_slots if slot.material}
-    return mesh if set(names) <= worn else None
+    if not set(names) <= worn:
+        return None
+    _show(mesh)
+    return mesh
+
+
+def _show(thing: bpy.types.Object) -> None:
+    """Exporters take nothing that is hidden, and the artist may have hidden it."""
+    thing.hide_viewport = False
+    if thing.name not in bpy.context.view_layer.objects:  # its collection is switched off
+        bpy.context.scene.collection.objects.link(thing)
+        bpy.context.view_layer.update()
+    thing.hide_set(False)
+    if not thing.visible_get() and thing.name not in bpy.context.scene.collection.objects:
+        bpy.context.scene.collection.objects.link(thing)
+        bpy.context.view_layer.update()
 
 
 def new_stage() -> bpy.types.Scene:

@@ -1,0 +1,110 @@
+"""Material stage: the measured materials for other programs. A stepped job, ESC cancels."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from ..commands.export_open import ExportJob
+from ..core.basis.merl_folder import user_cache
+from ..core.errors import InputError
+from ..scene.export_choice import FORMATS
+from ..scene.properties import capture_path, stored_result
+from ..scene.running import tell
+from .stepped import Stepped
+
+
+class PATINA_OT_export(Stepped, bpy.types.Operator):
+    """Write the measured materials for other programs, and what each format loses of them. They \
+are written as the last fit found them; glTF and USD take the scanned mesh along as it is now"""
+
+    bl_idname = "patina.export"
+    bl_label = "Export Materials"
+    PANEL = "material"
+    bl_options = {"REGISTER", "UNDO"}
+
+    TICK = 0.1
+    CANCELLED = "Export cancelled"
+
+    directory: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Directory",
+        description="The folder that the export's own folder is made in",
+        subtype="DIR_PATH",
+        options={"SKIP_SAVE"},
+    )
+    filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})  # type: ignore[valid-type]
+    folder: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Folder",
+        description="Name of the folder that is written; an earlier export in it is replaced. "
+        "Empty: the name of the capture and 'export'",
+        options={"SKIP_SAVE"},
+    )
+    formats: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Formats",
+        description="What the materials are written as",
+        items=[(word, name, holds) for word, (name, holds) in FORMATS.items()],
+        options={"ENUM_FLAG", "SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if stored_result(capture_path(context.scene)) is None:
+            cls.poll_message_set("Nothing is measured yet: fit the materials first")
+            return False
+        return cls.idle(context)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Beside the file browser."""
+        layout = self.layout
+        layout.prop(self, "folder")
+        layout.label(text="Formats:")
+        layout.column(align=True).prop(self, "formats")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if getattr(self, "_picked", False):  # in the file browser: go on in steps
+            told = {name: getattr(self, name) for name in ("directory", "folder", "formats")}
+            return bpy.ops.patina.export("INVOKE_DEFAULT", **told)
+        return super().execute(context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if not self.formats:
+            self.formats = context.scene.patina_export.formats
+        if not self.directory:
+            self._picked = True
+            self.directory = str(Path(bpy.data.filepath or capture_path(context.scene)).parent)
+            self.folder = self.folder or _usual(context.scene)
+            context.window_manager.fileselect_add(self)
+            return {"RUNNING_MODAL"}
+        return super().invoke(context, event)
+
+    def _start(self, context: bpy.types.Context) -> None:
+        if not self.directory:
+            raise InputError("say which folder to write into", key="directory")
+        formats = self.formats or context.scene.patina_export.formats
+        parent = Path(bpy.path.abspath(self.directory))
+        out = parent / (self.folder or _usual(context.scene))
+        self._job = ExportJob(context.scene, sorted(formats), out, user_cache())
+        self._scene = context.scene.name  # by name: a reference does not survive undo
+
+    def _finish(self, context: bpy.types.Context) -> None:
+        for loss in self._job.losses:
+            head, *more = (line.strip() for line in loss.lines())
+            kind = "WARNING" if loss.dropped else "INFO"
+            self.report({kind}, f"{head}: {'; '.join(more)}")
+        count = len(self._job.files)
+        self.report({"INFO"}, f"{count} files in {self._job.out}")
+
+
+def _usual(scene: bpy.types.Scene) -> str:
+    """The name of the folder where none is told."""
+    return f"{Path(capture_path(scene)).name.split('.')[0]} export"
+
+
+def register() -> None:
+    bpy.utils.register_class(PATINA_OT_export)
+
+
+def unregister() -> None:
+    tell(None)
+    bpy.utils.unregister_class(PATINA_OT_export)

@@ -1,0 +1,206 @@
+"""The measured materials of the open .blend as files, with the operator of the sidebar."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import bpy
+import numpy as np
+from support import extension
+from test_workflow import folder, made
+
+
+def measured():
+    """A capture in the scene, and what a fit would have left there: seconds instead of a minute."""
+    path = made().make_capture(folder() / "ball", photos=2)
+    assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
+    basis = extension("core.basis").Basis.default()
+    entry = {
+        "name": "surface",
+        "estimator": "measured",
+        "coefficients": basis.training[12:15].tolist(),
+        "scale_known": True,
+        "principled": {
+            "base_color": [0.5, 0.25, 0.1], "roughness": 0.3, "diffuse_roughness": 0.4,
+            "cube_root_error": 0.06, "lambertian_cube_root_error": 0.5,
+        },
+    }  # fmt: skip
+    told = {"format": 2, "basis": {"version": basis.version}, "materials": [entry]}
+    properties = extension("scene.properties")
+    properties.store_result(str(path.resolve()), {**told, "capture": str(path.resolve())})
+    material = bpy.data.materials.new("surface")
+    material["patina_measured"], material["patina_capture"] = "surface", str(path.resolve())
+    if material.node_tree is None:
+        material.use_nodes = True
+    bpy.context.scene.patina.mesh.data.materials.append(material)
+    return path
+
+
+def fitted():
+    path = made().make_capture(folder() / "ball", photos=2, extra="[fit]\nheld_out = false")
+    assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
+    assert bpy.ops.patina.fit() == {"FINISHED"}
+    return path
+
+
+def refused(**told) -> str:
+    try:
+        bpy.ops.patina.export(**told)
+    except RuntimeError as error:
+        assert "Traceback" not in str(error), error
+        return str(error)
+    raise AssertionError("it was written")
+
+
+def test_nothing_measured_is_nothing_to_export() -> None:
+    assert not bpy.ops.patina.export.poll()
+    path = made().make_capture(folder() / "ball", photos=2)
+    bpy.ops.patina.import_capture(filepath=str(path))
+    assert not bpy.ops.patina.export.poll()
+    assert "fit the materials first" in refused(directory=str(folder()), formats={"binary"})
+
+
+def test_tables_are_those_of_the_command() -> None:
+    """Written from the .blend, and by `fit` and `material`: the same bytes."""
+    measured()
+    out = folder()
+    told = {"directory": str(out), "folder": "mine", "formats": {"binary", "npz", "mtlx"}}
+    assert bpy.ops.patina.export(**told) == {"FINISHED"}
+    names = {p.name for p in (out / "mine").iterdir()}
+    assert {"surface.binary", "surface.npz", "surface.mtlx", "losses.txt", "losses.json"} <= names
+    said = json.loads(bpy.data.texts["Patina result"].as_string())
+    coefficients = np.array(said["materials"][0]["coefficients"])
+    assert np.array_equal(np.load(out / "mine" / "surface.npz")["coefficients"], coefficients)
+
+    record = out / "record"
+    record.mkdir()
+    (record / "result.json").write_text(bpy.data.texts["Patina result"].as_string())
+    material, result = extension("commands.material"), extension("core.result")
+    for _ in material.export(
+        out / "command", result.read_result(record), ["mtlx", "binary", "npz"]
+    ):
+        pass
+    for name in names:
+        ours, theirs = (out / which / name for which in ("mine", "command"))
+        if name.endswith(".npz"):  # archives hold the time
+            one, other = np.load(ours), np.load(theirs)
+            assert all(np.array_equal(one[key], other[key]) for key in one.files)
+        else:
+            assert ours.read_bytes() == theirs.read_bytes(), name
+
+
+def test_the_mesh_goes_out_and_the_open_file_stays() -> None:
+    """glTF and assets are written by another Blender: nothing here is opened, saved or lost."""
+    measured()
+    scene, mesh = bpy.context.scene, bpy.context.scene.patina.mesh
+    mesh["unsaved"] = 7
+    mesh.hide_set(True)  # exporters take only what is seen
+    before = bpy.data.filepath, sorted(o.name for o in scene.objects)
+    out = folder()
+    told = {"directory": str(out), "folder": "a", "formats": {"gltf", "blend", "binary"}}
+    assert bpy.ops.patina.export(**told) == {"FINISHED"}
+    assert (bpy.data.filepath, sorted(o.name for o in bpy.context.scene.objects)) == before
+    assert bpy.context.scene.patina.mesh["unsaved"] == 7 and mesh.hide_get()
+    losses = json.loads((out / "a" / "losses.json").read_text())["losses"]
+    assert {loss["format"] for loss in losses} == {"gltf", "blend", "binary"}
+    assert all((out / "a" / file).is_file() for loss in losses for file in loss["files"])
+    assert not [p for p in out.iterdir() if p.name != "a"], "crumbs"
+
+    faces = len(mesh.data.polygons)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.import_scene.gltf(filepath=str(out / "a" / "scan.glb"))
+    found = next(o for o in bpy.data.objects if o.type == "MESH")
+    assert len(found.data.polygons) == faces, "the scan, not a preview sphere"
+    bpy.ops.wm.open_mainfile(filepath=str(out / "a" / "materials.blend"))
+    assert bpy.data.materials["surface"].asset_data is not None
+
+
+def test_without_its_mesh_the_material_goes_out_on_a_sphere() -> None:
+    measured()
+    bpy.data.objects.remove(bpy.context.scene.patina.mesh)
+    out = folder()
+    bpy.ops.patina.export(directory=str(out), folder="a", formats={"gltf"})
+    assert (out / "a" / "materials.glb").is_file() and not (out / "a" / "scan.glb").exists()
+
+
+def test_the_report_lives_as_long_as_the_fit() -> None:
+    path, out = fitted(), folder()
+    choice, scene = extension("scene.export_choice"), bpy.context.scene
+    assert choice.missing(scene, "report") is None
+    told = {"directory": str(out), "folder": "a", "formats": {"report", "record"}}
+    assert bpy.ops.patina.export(**told) == {"FINISHED"}
+    page = (out / "a" / "report" / "index.html").read_text("utf-8")
+    assert "surface" in page and path.name in page
+    record = json.loads((out / "a" / "result.json").read_text())
+    assert record == extension("scene.properties").stored_result(str(path.resolve()))
+
+    text = bpy.data.texts["Patina result"]
+    said, kept = json.loads(text.as_string()), text.as_string()
+    said["materials"][0]["coefficients"][0][0] += 0.01
+    text.clear()
+    text.write(json.dumps(said))  # as after an undo: the .blend tells of another fit
+    assert choice.missing(scene, "report") is not None
+    text.clear()
+    text.write(kept)
+    assert choice.missing(scene, "report") is None
+
+    blend = folder() / "later.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    assert "fit again" in choice.missing(bpy.context.scene, "report")
+    told["folder"] = "b"
+    assert "fit again" in refused(**told) and not (out / "b").exists()
+    told["formats"] = {"record"}
+    assert bpy.ops.patina.export(**told) == {"FINISHED"}
+
+
+def test_a_folder_with_other_files_is_left_alone() -> None:
+    path = measured()
+    mine = path.parent / "surface.binary"
+    mine.write_bytes(b"mine")
+    told = {"directory": str(path.parent.parent), "folder": "ball", "formats": {"binary"}}
+    assert "no earlier export" in refused(**told) and mine.read_bytes() == b"mine"
+    told["folder"] = ""
+    for _ in range(2):  # again: replaced
+        assert bpy.ops.patina.export(**told) == {"FINISHED"}
+    assert (path.parent.parent / "ball export" / "surface.binary").stat().st_size > 1e6
+
+
+def test_the_choice_of_the_panel_is_taken_where_none_is_told() -> None:
+    measured()
+    state, out = bpy.context.scene.patina_export, folder()
+    assert state.formats == {"gltf"}
+    state.formats = {"exr"}
+    bpy.ops.patina.export(directory=str(out), folder="a")
+    assert (out / "a" / "surface_table.exr").is_file()
+    state.formats = set()
+    assert "at least one format" in refused(directory=str(out), folder="b")
+
+
+def test_a_second_blender_that_fails_is_one_line() -> None:
+    background = extension("scene.background")
+    errors = extension("core.errors")
+    for words, said in (
+        (["material", "/nowhere", "--to", "gltf", "--out", "/tmp/x"], "expected a result"),
+        (["nonsense"], "invalid choice"),
+    ):
+        try:
+            for step in background.in_background(words):
+                assert 0 <= step.fraction <= 1
+        except errors.PatinaError as error:
+            assert said in str(error) and "\n" not in str(error)
+        else:
+            raise AssertionError("it went well")
+
+
+def test_a_dropped_export_leaves_nothing() -> None:
+    measured()
+    out = folder()
+    export = extension("commands.export_open")
+    job = export.ExportJob(bpy.context.scene, ["gltf"], out / "a", folder())
+    for _ in range(8):
+        assert job.step()
+    assert job.now.stage and math.isfinite(job.now.fraction)
+    job.close()
+    assert list(out.iterdir()) == []
