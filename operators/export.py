@@ -12,6 +12,7 @@ from ..core.errors import InputError
 from ..scene.export_choice import FORMATS
 from ..scene.properties import capture_path, stored_result
 from ..scene.running import tell
+from .report_errors import hand_on
 from .stepped import Stepped
 
 
@@ -64,7 +65,7 @@ are written as the last fit found them; glTF and USD take the scanned mesh along
     def execute(self, context: bpy.types.Context) -> set[str]:
         if getattr(self, "_picked", False):  # in the file browser: go on in steps
             told = {name: getattr(self, name) for name in ("directory", "folder", "formats")}
-            return bpy.ops.patina.export("INVOKE_DEFAULT", **told)
+            return hand_on(self, bpy.ops.patina.export, "INVOKE_DEFAULT", **told)
         return super().execute(context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

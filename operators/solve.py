@@ -14,6 +14,7 @@ from ..core.solve.solution import MODEL
 from ..core.solve.solve import LENSES
 from ..scene.folders import rectified_folder
 from ..scene.scan_collection import create_reconstruction
+from .report_errors import hand_on
 from .stepped import Stepped
 
 
@@ -58,7 +59,7 @@ class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         if getattr(self, "_picked", False):  # in the file browser: go on in steps
             told = {name: getattr(self, name) for name in ("directory", "out", "lens", "threads")}
-            return bpy.ops.patina.solve_photos("INVOKE_DEFAULT", **told)
+            return hand_on(self, bpy.ops.patina.solve_photos, "INVOKE_DEFAULT", **told)
         return super().execute(context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

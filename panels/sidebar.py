@@ -28,6 +28,7 @@ class PATINA_PT_scan(StagePanel, bpy.types.Panel):
     def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         mesh = context.scene.patina.mesh
         if mesh is None or mesh.name not in context.scene.objects:
+            layout.operator("patina.new_capture", icon="FILE_NEW")
             layout.operator("patina.solve_photos", icon="CAMERA_DATA")
             layout.operator("patina.import_demo", icon="MONKEY")
         else:

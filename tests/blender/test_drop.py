@@ -1,0 +1,181 @@
+"""Files dropped onto a viewport: which operator takes them, and what it makes of them."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from support import extension
+from test_workflow import counts, folder, made
+
+
+def handlers() -> dict[str, type]:
+    found = bpy.types.FileHandler.__subclasses__()
+    return {cls.bl_idname: cls for cls in found if cls.bl_idname.startswith("PATINA_")}
+
+
+def drop(*names: str) -> str:
+    """The operator that Blender would call for files of these names, over a viewport."""
+    suffixes = {"." + name.rpartition(".")[2].lower() for name in names}
+    fits = [cls for cls in handlers().values() if suffixes & set(cls.bl_file_extensions.split(";"))]
+    assert len(fits) == 1, (names, fits)
+    group, operator = fits[0].bl_import_operator.split(".")
+    assert hasattr(getattr(bpy.ops, group), operator)
+    return fits[0].bl_import_operator
+
+
+def a_scan(photos: int = 3):
+    """A scan without a capture file; its lit photos are named like the scan's."""
+    path = made().make_capture(folder() / "ball", photos=photos)
+    path.unlink()
+    lit = path.parent / "lit"
+    lit.mkdir()
+    for k in range(photos):
+        (path.parent / f"lit_{k + 1}.exr").rename(lit / f"view_{k + 1:02d}.exr")
+    return path.parent
+
+
+def files(*names: str) -> list[dict[str, str]]:
+    return [{"name": name} for name in names]
+
+
+def refused(operator, **told) -> str:
+    try:
+        operator(**told)
+    except RuntimeError as error:
+        assert "Traceback" not in str(error), error
+        return str(error)
+    raise AssertionError("it was taken")
+
+
+def test_each_kind_of_file_has_one_operator() -> None:
+    assert drop("ball.capture.toml") == "patina.import_capture"
+    for name in ("cameras.xml", "cameras.bin", "images.txt", "a.psx", "transforms.json"):
+        assert drop(name) == "patina.new_capture"
+    assert drop("a.jpg", "b.CR2", "c.exr", "d.png") == "patina.drop_photos"
+
+
+def test_only_a_viewport_takes_them() -> None:
+    class Area:
+        def __init__(self, kind: str) -> None:
+            self.type = kind
+
+    class Context:
+        def __init__(self, area: Area | None) -> None:
+            self.area = area
+
+    for cls in handlers().values():
+        assert cls.poll_drop(Context(Area("VIEW_3D")))
+        assert not cls.poll_drop(Context(Area("TEXT_EDITOR"))) and not cls.poll_drop(Context(None))
+
+
+def test_handlers_come_and_go() -> None:
+    module = extension()
+    assert len(handlers()) == 3
+    names = set(handlers())
+    assert names <= set(dir(bpy.types))
+    module.unregister()
+    try:
+        assert not names & set(dir(bpy.types))
+    finally:
+        module.register()
+
+
+def test_cameras_and_photos_become_a_capture() -> None:
+    """A COLMAP file, the photos of a folder: the capture says what was measured by hand."""
+    scan = a_scan()
+    told = {
+        "cameras": str(scan / "sparse" / "cameras.bin"),
+        "directory": str(scan / "lit"),
+        "files": files("view_01.exr", "view_03.exr"),
+        "light": "DISTANT",
+        "direction": (0.6, 0.0, 0.8),
+    }
+    assert bpy.ops.patina.new_capture(**told) == {"FINISHED"}
+    path = scan / "ball.capture.toml"
+    capture = extension("core.capture").read_capture(path)
+    assert [p.camera for p in capture.photos] == ["view_01.jpg", "view_03.jpg"]
+    assert [p.file.resolve() for p in capture.photos] == [
+        (scan / "lit" / f"view_0{k}.exr").resolve() for k in (1, 3)
+    ]
+    assert np.allclose(capture.lights[0].direction, (0.6, 0.0, 0.8))
+    assert capture.scan.mesh.name == "mesh.ply" and capture.scan.cameras.name == "sparse"
+    scene = bpy.context.scene
+    assert len(scene.patina_photos.photos) == 2 and scene.patina.mesh is not None
+    assert extension("scene.properties").capture_path(scene) == str(path.resolve())
+    assert bpy.ops.patina.fit.poll()
+
+
+def test_every_light_is_read_back() -> None:
+    new, reader = extension("core.capture.new_capture"), extension("core.capture")
+    scan = a_scan(2)
+    photos = sorted((scan / "lit").iterdir())
+    for lamp, way in (
+        (new.LampWords.flash((0.1, -0.2, 0.0)), "mounted"),
+        (new.LampWords.sun(), "sun"),
+        (new.LampWords.distant((0, 0, 1)), "direction"),
+    ):
+        out = new.free_name(scan, "again")
+        new.write_new_capture(out, scan / "sparse", scan / "mesh.ply", photos, lamp)
+        assert getattr(reader.read_capture(out).lights[0], way) is not None
+    assert sorted(p.name for p in scan.glob("*.toml")) == [
+        "again 2.capture.toml", "again 3.capture.toml", "again.capture.toml",
+    ]  # fmt: skip
+
+
+def test_cameras_alone_come_in_as_cameras() -> None:
+    scan = a_scan()
+    cameras = str(scan / "sparse" / "images.bin")
+    assert bpy.ops.patina.new_capture(filepath=cameras) == {"FINISHED"}
+    assert len([o for o in bpy.context.scene.objects if o.type == "CAMERA"]) >= 3
+    assert not list(scan.glob("*.toml")) and not bpy.context.scene.patina.capture
+
+
+def test_what_cannot_become_a_capture_says_why_and_leaves_nothing() -> None:
+    scan = a_scan()
+    (scan / "lit" / "other.exr").write_bytes((scan / "lit" / "view_01.exr").read_bytes())
+    operator, before = bpy.ops.patina.new_capture, counts()
+    told = {"cameras": str(scan / "sparse"), "directory": str(scan / "lit")}
+    assert "other.exr" in refused(operator, **told, files=files("view_01.exr", "other.exr"))
+    assert "expected one" in refused(operator, directory=told["directory"])
+    (scan / "second.ply").write_bytes((scan / "mesh.ply").read_bytes())
+    assert "mesh" in refused(operator, **told, files=files("view_01.exr"))
+    (scan / "lit" / "view_02.exr").write_bytes(b"damaged")
+    mesh = str(scan / "mesh.ply")
+    assert "view_02.exr" in refused(operator, **told, mesh=mesh, files=files("view_02.exr"))
+    assert not list(scan.glob("*.toml*")) and counts() == before
+
+
+def test_photos_change_nothing_until_somebody_says_what_they_are() -> None:
+    scan = a_scan()
+    told = {"directory": str(scan / "lit"), "files": files("view_01.exr", "view_02.exr")}
+    path = made().make_capture(folder() / "open", photos=2)
+    bpy.ops.patina.import_capture(filepath=str(path))
+    before, said = counts(), path.read_text()
+    assert bpy.ops.patina.drop_photos(**told) == {"CANCELLED"}
+    assert (counts(), path.read_text()) == (before, said)
+    assert len(bpy.context.scene.patina_photos.photos) == 2
+
+
+def test_photos_of_an_open_capture_become_another_one() -> None:
+    path = made().make_capture(folder() / "ball", photos=3)
+    lit = path.parent / "more"
+    lit.mkdir()
+    (lit / "view_02.exr").write_bytes((path.parent / "lit_2.exr").read_bytes())
+    bpy.ops.patina.import_capture(filepath=str(path))
+    said = path.read_text()
+    told = {"directory": str(lit), "files": files("view_02.exr"), "use": "LIT"}
+    assert bpy.ops.patina.drop_photos(**told) == {"FINISHED"}
+    assert path.read_text() == said
+    capture = extension("core.capture").read_capture(path.with_name("ball 2.capture.toml"))
+    assert [p.camera for p in capture.photos] == ["view_02.jpg"]
+    assert capture.scan.mesh.resolve() == (path.parent / "mesh.ply").resolve()
+
+    (lit / "other.exr").write_bytes((lit / "view_02.exr").read_bytes())
+    told["files"] = files("other.exr")
+    assert "other.exr" in refused(bpy.ops.patina.drop_photos, **told)
+    state = extension("scene.running")
+    state.tell(state.Running(bpy.context.scene.name, "fit", "sampling", 0.5))
+    try:
+        assert not bpy.ops.patina.drop_photos.poll()
+    finally:
+        state.tell(None)
