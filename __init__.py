@@ -7,6 +7,7 @@ from types import ModuleType
 
 # Every module that has something to register, in order; unregistered the other way round
 MODULES: tuple[str, ...] = (
+    "panels.preferences",
     "scene.properties",
     "scene.photo_list",
     "scene.paint_state",
@@ -23,6 +24,7 @@ MODULES: tuple[str, ...] = (
     "scene.traits",
     "scene.follow_traits",
     "scene.last_fit",
+    "scene.cache",
     "scene.export_choice",
     "operators.import_capture",
     "operators.new_capture",
@@ -36,6 +38,8 @@ MODULES: tuple[str, ...] = (
     "operators.save_lights",
     "operators.mark_assets",
     "operators.reset_traits",
+    "operators.export",
+    "operators.empty_cache",
     "panels.sidebar",
     "panels.traits_box",
     "operators.export",

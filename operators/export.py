@@ -7,9 +7,9 @@ from pathlib import Path
 import bpy
 
 from ..commands.export_open import ExportJob
-from ..core.basis.merl_folder import user_cache
 from ..core.errors import InputError
 from ..scene.export_choice import FORMATS
+from ..scene.folders import cache_folder
 from ..scene.properties import capture_path, stored_result
 from ..scene.running import tell
 from .report_errors import hand_on
@@ -85,7 +85,7 @@ are written as the last fit found them; glTF and USD take the scanned mesh along
         formats = self.formats or context.scene.patina_export.formats
         parent = Path(bpy.path.abspath(self.directory))
         out = parent / (self.folder or _usual(context.scene))
-        self._job = ExportJob(context.scene, sorted(formats), out, user_cache())
+        self._job = ExportJob(context.scene, sorted(formats), out, cache_folder())
         self._scene = context.scene.name  # by name: a reference does not survive undo
 
     def _finish(self, context: bpy.types.Context) -> None:

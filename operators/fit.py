@@ -9,12 +9,15 @@ import bpy
 from ..core.capture import read_capture
 from ..core.errors import InputError
 from ..core.job import CaptureResult, FitJob
+from ..core.samples import Margins
 from ..scene.apply import apply_result
+from ..scene.cache import own_basis, trim_cache
 from ..scene.face_slots import with_painted_slots
 from ..scene.last_fit import keep_fit
 from ..scene.lights import with_dragged_lamps
 from ..scene.mask_images import with_mask_images
 from ..scene.painted import take_all
+from ..scene.preferences import preferences
 from ..scene.running import tell
 from .stepped import Stepped
 
@@ -33,18 +36,23 @@ def fit_job(operator: bpy.types.Operator, scene: bpy.types.Scene) -> FitJob:
     path = Path(bpy.path.abspath(scene.patina.capture))
     if not path.is_file():
         raise InputError("is gone; import the capture again from where it is now", file=path)
-    capture, dragged = with_dragged_lamps(read_capture(path), scene)
+    margins = preferences().margins
+    capture, dragged = with_dragged_lamps(read_capture(path, margins), scene)
+    if capture.fit.margins != Margins():
+        told = ", ".join(f"{name} {value:g}" for name, value in vars(capture.fit.margins).items())
+        operator.report({"INFO"}, f"left out, by capture and preferences: {told}")
     if dragged:
         operator.report({"INFO"}, f"lights as their lamps stand now: {', '.join(dragged)}")
     take_all(scene)
     capture, prepare = with_painted_slots(with_mask_images(capture), scene)
-    return FitJob(capture, prepare=prepare)
+    return FitJob(capture, own_basis(), prepare)
 
 
 def show_result(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> None:
     """The materials onto the mesh, and what should be known about them to the user."""
     notes = apply_result(scene, result, operator._job.stages)
     keep_fit(result)
+    trim_cache()
     for material in result.materials:
         for warning in material.warnings:
             operator.report({"WARNING"}, f"{material.name}: {warning}")

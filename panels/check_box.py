@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 
 from ..scene.evidence import MISSED
+from ..scene.lengths import with_lengths
 from .wrapped import IN_BOX, wrapped
 
 MOST = 6
@@ -44,7 +45,7 @@ def draw_check(
         row.progress(text=name, factor=min(max(_sure(cause) / max(most, 1e-9), 0), 1), type="BAR")
         if cause["accepted"]:
             row.operator("patina.show_evidence", text="", icon="HIDE_OFF").cause = cause["cause"]
-            wrapped(box, cause["sentence"], "BLANK1", IN_BOX)
+            wrapped(box, with_lengths(cause["sentence"]), "BLANK1", IN_BOX)
     if len(causes):
         used = {cause.name for cause in causes if cause.use}
         changed = used != set(diagnosis["applied"])
@@ -52,7 +53,7 @@ def draw_check(
         row.alert = changed
         row.operator("patina.refit", icon="FILE_REFRESH" if changed else "CHECKMARK")
     if diagnosis["unexplained"]:
-        wrapped(layout, diagnosis["left"]["sentence"], "QUESTION")
+        wrapped(layout, with_lengths(diagnosis["left"]["sentence"]), "QUESTION")
 
 
 def _sure(cause: dict[str, Any]) -> float:

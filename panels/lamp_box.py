@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 
 from ..scene.lamp_stand import DISTANT, KIND, MOUNTED, NEAR
+from ..scene.lengths import length
 from ..scene.moved_lamps import by_hand, lamp_of
 from ..scene.properties import CAPTURE, stored_result
 
@@ -44,5 +45,5 @@ def _refined(result: dict[str, Any], name: str) -> str | None:
         return None
     if "angle 1" in moved:
         return f"Refined by {math.degrees(math.hypot(*moved.values())):.1f}°"
-    place = [f"{key} {value:.4g}" for key, value in moved.items() if not key.startswith("1/")]
+    place = [f"{key} {length(value)}" for key, value in moved.items() if not key.startswith("1/")]
     return f"Refined: {', '.join(place)}"

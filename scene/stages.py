@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import bpy
+import numpy as np
 
 from .apply import measured_of
 from .face_slots import shown_name
+from .lengths import length
 from .mask_images import shadow_images
 from .photo_list import PatinaPhoto, lit_photos
 from .properties import DIAGNOSIS, capture_path, stored_result
@@ -58,7 +60,9 @@ def _scan(mesh: bpy.types.Object | None) -> Stage:
     if mesh is None:
         return Stage(missing="No scan yet", press="patina.import_capture")
     faces = len(mesh.data.polygons) if mesh.type == "MESH" else 0
-    return Stage((f"{mesh.name}: {faces:,} faces",))
+    corners = np.array(mesh.bound_box)
+    across = float(np.ptp(corners, axis=0).max())
+    return Stage((f"{mesh.name}: {faces:,} faces, {length(across)} long",))
 
 
 def _photos(lit: list[PatinaPhoto]) -> Stage:

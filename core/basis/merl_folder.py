@@ -123,7 +123,7 @@ def cached_basis(
     )
     cache.mkdir(parents=True, exist_ok=True)
     storage.save(stored, basis)
-    return basis
+    return storage.load(stored)  # rounded as it will be found again: a result names its version
 
 
 def user_cache() -> Path:

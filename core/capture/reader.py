@@ -31,8 +31,9 @@ LARGEST_FILE = 1_000_000  # bytes; a capture of a thousand photos has a tenth of
 LONGEST_LINE = 10_000
 
 
-def read_capture(path: Path) -> Capture:
-    """The capture in a file. Raises InputError naming the key and the line."""
+def read_capture(path: Path, margins: Margins | None = None) -> Capture:
+    """The capture in a file. margins: where it does not say them (default: the documented ones).
+    Raises InputError naming the key and the line."""
     top = open_capture(path)
     lines = top.lines
 
@@ -65,7 +66,7 @@ def read_capture(path: Path) -> Capture:
         for section in top.tables("photo")
     )
     _refuse_doubles(top, materials, {name for photo in photos for name in photo.masks})
-    fit = _fit(top.table("fit"))
+    fit = _fit(top.table("fit"), margins or Margins())
     top.table("diagnose").close()
     top.close()
     if not photos:
@@ -211,8 +212,8 @@ def _refuse_doubles(top: Section, materials: tuple[MaterialEntry, ...], masked: 
         )
 
 
-def _fit(section: Section) -> FitOptions:
-    margins, paper = Margins(), PaperSettings()
+def _fit(section: Section, margins: Margins) -> FitOptions:
+    paper = PaperSettings()
     method = section.optional_text("method") or METHODS[0]
     if method not in METHODS:
         known = " or ".join(f"{m!r}" for m in METHODS)

@@ -25,6 +25,7 @@ from ..samples.level import at_typical_level
 from ..scan import Scan
 from . import inputs
 from .applied import Applied
+from .beside import beside
 from .estimators import Estimate, estimate
 from .job import Job, Step, finished
 from .lights import Lights, find_lights, refined
@@ -107,16 +108,17 @@ def _way(entry: LightEntry) -> str:
 class FitJob(Job):
     """Fit every material of a capture; ``result`` is there when the job is done.
 
-    prepare: what is done to the scan once it is read (face attributes that no file has). threads:
-    how many look at the photos (None: one a core); the result does not depend on it. keep: whether
-    ``samples`` holds those that each material was fitted to, by its name. portable: whether the
-    materials' portable forms are fitted too.
+    basis: to fit in, or how to come by it, beside the job (None: the embedded one). prepare: what
+    is done to the scan once it is read (face attributes that no file has). threads: how many look
+    at the photos (None: one a core); the result does not depend on it. keep: whether ``samples``
+    holds those that each material was fitted to, by its name. portable: whether the materials'
+    portable forms are fitted too.
     """
 
     def __init__(
         self,
         capture: Capture,
-        basis: Basis | None = None,
+        basis: Basis | Callable[[], Basis] | None = None,
         prepare: Callable[[Scan], Scan] | None = None,
         threads: int | None = None,
         keep: bool = False,
@@ -136,7 +138,10 @@ class FitJob(Job):
         """Scan, photos, then one material after the other."""
         capture = self.capture
         yield Step("reading the scan", 0.0)
-        basis = self.basis or Basis.default()
+        if isinstance(self.basis, Basis) or self.basis is None:
+            basis = self.basis or Basis.default()
+        else:
+            basis = yield from beside(self.basis, Step("computing the basis", 0.0))
         scan = inputs.open_scan(capture)
         if self.prepare is not None:
             scan = self.prepare(scan)

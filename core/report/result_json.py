@@ -62,6 +62,7 @@ def describe(
         },
         "capture": str(result.capture.file),
         "notes": list(result.notes),
+        "margins": vars(result.capture.fit.margins),
         "unexplained_by_lights": None
         if result.lights.unexplained is None
         else dict(zip(("before", "after"), result.lights.unexplained, strict=True)),

@@ -248,6 +248,7 @@ class TestMerlFolder:
             folder, lambda stage, _: stages.append(stage), self.sums(folder), tmp_path
         )
         assert again.version == storage.load(next(tmp_path.glob("*.npz"))).version
+        assert again.version == made.version, "a result of the first run must find its basis"
         assert "principal components" not in stages
 
     def test_missing_truncated_and_altered_files_are_named(

@@ -11,6 +11,7 @@ import pytest
 from patina.core.capture import read_capture
 from patina.core.errors import InputError, PatinaError
 from patina.core.job import FitJob, inputs
+from patina.core.samples import Margins
 from tests import make_capture as made
 
 
@@ -219,3 +220,10 @@ def test_settings_of_the_other_method_are_told(tmp_path: Path) -> None:
     assert capture.fit.unused == ("samples", "eta")
     (said,) = inputs.unused_settings(capture)
     assert "samples, eta" in said and 'method = "paper"' in said
+
+
+def test_margins_of_the_caller_are_for_what_the_file_does_not_say(tmp_path: Path) -> None:
+    path = made.make_capture(tmp_path / "ball", photos=2, extra="[fit]\nmask_margin = 4")
+    told = Margins(silhouette=7, shadow=8, mask=9, cosine=0.3)
+    assert read_capture(path, told).fit.margins == Margins(7, 8, 4, 0.3)
+    assert read_capture(path).fit.margins == Margins(mask=4)

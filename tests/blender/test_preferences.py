@@ -1,0 +1,194 @@
+"""What the artist prefers, and that each preference changes something."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+from support import extension
+from test_workflow import folder, made
+
+
+@contextmanager
+def preferred(**told: object) -> Iterator[object]:
+    """The extension's preferences with these changed; a checkout is given an entry for the time."""
+    addons, package = bpy.context.preferences.addons, extension().__name__
+    before = addons.get(package)
+    entry = before
+    if entry is None:
+        entry = addons.new()
+        entry.module = package
+    for name, value in told.items():
+        setattr(entry.preferences, name, value)
+    try:
+        yield entry.preferences
+    finally:
+        for name in told:
+            entry.preferences.property_unset(name)
+        if before is None:
+            addons.remove(entry)
+
+
+class Silent:
+    """An operator that keeps what it reports."""
+
+    def __init__(self) -> None:
+        self.said: list[str] = []
+
+    def report(self, kind: set[str], text: str) -> None:
+        self.said.append(text)
+
+
+def imported(extra: str = ""):
+    path = made().make_capture(folder() / "ball", photos=2, extra=extra)
+    assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
+    return path
+
+
+def test_without_an_entry_all_is_as_usual() -> None:
+    read = extension("scene.preferences")
+    with preferred():
+        assert read.preferences() == read.Preferences()
+        assert read.preferences().margins == extension("core.samples").Margins()
+    assert read.preferences() == read.Preferences()
+
+
+def test_margins_are_for_captures_that_do_not_say() -> None:
+    fit, margins = extension("operators.fit"), extension("core.samples").Margins
+    scene = bpy.context.scene
+    imported("[fit]\nshadow_margin = 9")
+    told, operator = {"silhouette": 5, "shadow": 6, "mask": 7, "cosine": 0.25}, Silent()
+    with preferred(**told):
+        job = fit.fit_job(operator, scene)
+    assert job.capture.fit.margins == margins(silhouette=5, shadow=9, mask=7, cosine=0.25)
+    assert any("silhouette 5" in said for said in operator.said)
+    assert fit.fit_job(Silent(), scene).capture.fit.margins == margins(shadow=9)
+
+
+def test_wider_margins_leave_fewer_samples() -> None:
+    fit = extension("operators.fit")
+    imported("[fit]\nmethod = 'paper'\nheld_out = false\ntrials = 20")
+    found = []
+    for silhouette in (2, 8):
+        with preferred(silhouette=silhouette):
+            job = fit.fit_job(Silent(), bpy.context.scene)
+        job.portable = False
+        job.drain()
+        found.append(job.result.materials[0].samples)
+        described = vars(job.result.capture.fit.margins)
+        assert described["silhouette"] == silhouette
+    assert found[1] < 0.9 * found[0], found
+
+
+def test_lengths_are_told_in_the_preferred_unit() -> None:
+    lengths, stages = extension("scene.lengths"), extension("scene.stages")
+    imported()
+    said = "2 % of it spreads over 0.02 scan units, so that 1.5e+02 scan units away"
+    assert lengths.with_lengths(said) == said
+    assert "2 scan units long" in stages.stages(bpy.context.scene)["scan"].has[0]
+    for unit, ball, near in (
+        ("METRES", "2 m long", "2 cm, so that 150 m away"),
+        ("CENTIMETRES", "2 cm long", "so that 1.5 m away"),
+        ("MILLIMETRES", "2 mm long", "so that 15 cm away"),
+    ):
+        with preferred(unit=unit):
+            assert ball in stages.stages(bpy.context.scene)["scan"].has[0], unit
+            assert near in lengths.with_lengths(said), lengths.with_lengths(said)
+
+
+def test_the_cache_folder_takes_what_has_no_place() -> None:
+    folders, place = extension("scene.folders"), folder()
+    usual = folders.own_folder(), folders.cache_folder()
+    with preferred(cache_folder=str(place)):
+        assert folders.cache_folder() == place
+        assert folders.own_folder() == folders.blend_folder() == place / "files"
+        assert place in folders.rectified_folder(place / "x.capture.toml").parents
+        if extension("scene.materials").osl_missing() is None:
+            basis = extension("core.basis")
+            brdf = basis.PrincipalBRDF(basis.Basis.default(), np.full((3, 4), 0.01))
+            extension("scene.osl_files").ensure_files(brdf)
+            assert len(list((place / "files").glob("patina_*.exr"))) == 3
+    assert (folders.own_folder(), folders.cache_folder()) == usual
+
+
+def fill(place: Path) -> list[Path]:
+    """Files of every kind, oldest first, 1 MB each; the last two are none of the cache's."""
+    names = (
+        "files/patina_components_1.exr",
+        "files/rectified/ball-1/photo.exr",
+        "merl_basis_1.npz",
+        "files/patina_brdf_1.exr",
+        "files/masks/ball-1/painted.png",
+        "files/mine.exr",
+    )
+    for age, name in enumerate(names):
+        path = place / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(bytes(1_000_000))
+        os.utime(path, (1e9 + age, 1e9 + age))
+    return [place / name for name in names]
+
+
+def test_the_cache_is_emptied_but_for_what_is_shown() -> None:
+    place, cache = folder(), extension("scene.cache")
+    with preferred(cache_folder=str(place)):
+        assert not bpy.ops.patina.empty_cache.poll()
+        files = fill(place)
+        assert sum(cache.cached_files().values()) == 4_000_000
+        shown = bpy.data.images.new("shown", 4, 4)
+        shown.filepath = str(files[1])
+        assert bpy.ops.patina.empty_cache() == {"FINISHED"}
+        assert [p.exists() for p in files] == [False, True, False, False, True, True]
+        bpy.data.images.remove(shown)
+        bpy.ops.patina.empty_cache()
+        assert not files[1].exists() and not bpy.ops.patina.empty_cache.poll()
+
+
+def test_beyond_its_size_the_oldest_goes_when_a_file_is_opened() -> None:
+    place = folder()
+    blend = place / "x.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    files = fill(place)
+    with preferred(cache_folder=str(place), cache_size=4):
+        bpy.ops.wm.open_mainfile(filepath=str(blend))
+        assert all(p.exists() for p in files)
+        bpy.context.preferences.addons[extension().__name__].preferences.cache_size = 2
+        bpy.ops.wm.open_mainfile(filepath=str(blend))
+        assert [p.exists() for p in files] == [False, False, True, True, True, True]
+
+
+def test_materials_are_fitted_in_a_basis_of_ones_own_files() -> None:
+    """Three made-up 'genuine' files stand for the hundred; the export finds the basis again."""
+    basis, brdf = extension("core.basis"), extension("core.brdf")
+    merl, place, cache = extension("core.basis.merl_folder"), folder(), folder()
+    default = basis.Basis.default()
+    for k, name in enumerate("abcdefgh"):
+        own = basis.PrincipalBRDF(default, default.training[15 * k : 15 * k + 3])
+        table = brdf.TabulatedBRDF.from_function(own.evaluate)
+        brdf.merl_file.write(place / f"{name}.binary", table)
+    sums = {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in place.glob("*.binary")}
+    imported("[fit]\nmethod = 'paper'\nheld_out = false\ntrials = 20\nsamples = 3")
+    usual, merl.checksums = merl.checksums, lambda: sums
+    try:
+        with preferred(merl_folder=str(place), cache_folder=str(cache)):
+            assert bpy.ops.patina.fit() == {"FINISHED"}
+            scene, properties = bpy.context.scene, extension("scene.properties")
+            told = properties.stored_result(properties.capture_path(scene))["basis"]
+            assert told["columns"] == 3 * len(sums) and told["version"] != default.version
+            assert [p.name for p in cache.glob("merl_basis_*.npz")]
+            out = {"directory": str(place), "folder": "out", "formats": {"binary"}}
+            assert bpy.ops.patina.export(**out) == {"FINISHED"}
+        with preferred(merl_folder=str(cache), cache_folder=str(cache)):
+            try:
+                bpy.ops.patina.fit()
+            except RuntimeError as error:
+                assert "MERL files are missing" in str(error) and "Traceback" not in str(error)
+            else:
+                raise AssertionError("a folder without the files was taken")
+    finally:
+        merl.checksums = usual
