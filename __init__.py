@@ -42,7 +42,6 @@ MODULES: tuple[str, ...] = (
     "operators.empty_cache",
     "panels.sidebar",
     "panels.traits_box",
-    "operators.export",
     "panels.export_box",
 )
 
