@@ -236,7 +236,9 @@ MATERIALS = {
     "a\\tb": "file name",
     "x" * 300: "file name",
     "a\\u202Eb": "file name",
-    "shadow": "shadow masks",
+    "shadow": "leave something out",
+    "highlight": "leave something out",
+    "ignore": "leave something out",
 }
 
 

@@ -259,13 +259,22 @@ def too_long() -> None:
     end(1)
 
 
-# all panels closed, so that headers are where a click expects them
-sidebar = part("panels.sidebar")
-for panel in [c for c in sidebar.CLASSES if issubclass(c, bpy.types.Panel)]:
-    if not getattr(panel, "bl_parent_id", ""):
+def close_panels() -> None:
+    """All of them, before they were ever drawn: headers are then where a click expects them."""
+    panels = [c for c in bpy.types.Panel.__subclasses__() if c.__name__.startswith("PATINA_PT_")]
+    panels += [c for c in part("panels.sidebar").CLASSES if c.__name__.startswith("PATINA_PT_")]
+    panels = list(dict.fromkeys(panels))
+    inner = [panel for panel in panels if getattr(panel, "bl_parent_id", "")]
+    outer = [panel for panel in panels if panel not in inner]
+    for panel in (*inner, *outer):
         bpy.utils.unregister_class(panel)
+    outer.sort(key=lambda panel: STAGES.index(panel.stage))
+    for panel in (*outer, *inner):
         panel.bl_options = {"DEFAULT_CLOSED"}
         bpy.utils.register_class(panel)
+
+
+close_panels()
 OUT.mkdir(parents=True, exist_ok=True)
 bpy.app.timers.register(tick, first_interval=3)
 bpy.app.timers.register(too_long, first_interval=PATIENCE)
