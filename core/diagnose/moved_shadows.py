@@ -25,7 +25,9 @@ class MovedShadows:
         """effect: without shadows of its own."""
         pixels = setting.pixels
         towards = effect.before(Situation.of(pixels), x).light
-        return cls(x, part_lit(setting.rays, pixels, towards) - pixels.visible)
+        # of both in one way: what rays from parts of a pixel miss of a fold is the same
+        was, will = (part_lit(setting.rays, pixels, to) for to in (pixels.light, towards))
+        return cls(x, will - was)
 
     def on(self, now: Situation) -> Situation:
         """With these shadows."""

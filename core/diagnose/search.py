@@ -299,7 +299,10 @@ def _with_shadows(now: Fitted, costs: Costs, best: Trial, setting: Setting) -> T
         effect = best.effect.casting(setting, best.x)
         if effect is best.effect:
             break
-        best = replace(_try(now, costs, Asked(effect, best.gain, best.chance)), ties=best.ties)
+        again = _try(now, costs, Asked(effect, best.gain, best.chance))
+        if again.gain < best.gain:  # the mesh is too coarse to say where they end
+            break
+        best = replace(again, ties=best.ties)
     return best
 
 
