@@ -136,11 +136,13 @@ def _into_masks(
         new, old = found == number, masks.get((place, kind))
         if not new.any() and (old is None or not erased.any()):
             continue
-        mask = read_mask_image(old) if old is not None else np.zeros(camera_shape, bool)
-        mask = mask | _whole(new, mask.shape)
+        # the greys of a shadow's soft edge stay where nobody painted
+        grey = read_pixels(old)[..., 0] if old is not None else np.zeros(camera_shape, np.uint8)
+        grey[_whole(new, grey.shape)] = 255
         # what is painted as one kind is no longer another
         others = erased | ((found >= 0) & ~new & np.isin(found, _outs(kinds)))
-        store_mask(capture, place, name, kind, mask & ~_whole(others, mask.shape))
+        grey[_whole(others, grey.shape)] = 0
+        store_mask(capture, place, name, kind, grey)
 
 
 def _outs(kinds: Sequence[Paint]) -> list[int]:

@@ -14,6 +14,7 @@ from ..core.capture.model import LEFT_OUT
 from ..core.errors import InputError, PatinaError
 from ..core.scan import Scan
 from .apply import MEASURED
+from .properties import CAPTURE
 
 SLOTS = "patina_slots"  # the scan's face attribute while a fit runs
 PROPOSED = "patina_materials"  # face attribute of the mesh: what was proposed last
@@ -74,6 +75,23 @@ def new_slot(scene: bpy.types.Scene, capture: str, name: str) -> int:
     said = name or f"material_{number + 1}"
     data.materials.append(stand_in(said, COLOURS[number % len(COLOURS)], capture))
     return number
+
+
+def wear_again(mesh: bpy.types.Object, capture: str) -> None:
+    """What an earlier mesh of the same capture wore, on one that was imported anew: deleted objects
+    leave their mesh behind as long as the file is open."""
+    data = mesh.data
+    count = len(data.polygons)
+    for other in bpy.data.meshes:
+        if other.get(CAPTURE) == capture and len(other.polygons) == count and other.materials:
+            slots = np.empty(count, np.int32)
+            other.polygons.foreach_get("material_index", slots)
+            for material in other.materials:
+                data.materials.append(material)
+            data.polygons.foreach_set("material_index", slots)
+            data.update()
+            break
+    data[CAPTURE] = capture
 
 
 def with_painted_slots(capture: Capture, scene: bpy.types.Scene) -> tuple[Capture, Prepare | None]:

@@ -82,17 +82,17 @@ def read_mask_image(image: bpy.types.Image) -> NDArray[np.bool_]:
 
 
 def store_mask(
-    capture: str, place: int, name: str, kind: str, painted: NDArray[np.bool_]
+    capture: str, place: int, name: str, kind: str, grey: NDArray[np.uint8]
 ) -> bpy.types.Image:
     """A mask (h, w) of one photo, packed; that which is there gets the new pixels."""
     image = mask_images(capture).get((place, kind))
-    height, width = painted.shape
+    height, width = grey.shape
     if image is None:
         image = bpy.data.images.new(f"{WORDS[kind]}: {name}", width, height)
     elif tuple(image.size) != (width, height):
         image.scale(width, height)
     _mark(image, capture, place, name, kind)
-    write_pixels(image, np.repeat(painted[..., None] * np.uint8(255), 3, axis=2))
+    write_pixels(image, np.repeat(grey[..., None], 3, axis=2))
     image.pack()
     return image
 

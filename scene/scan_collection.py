@@ -18,6 +18,7 @@ from ..core.job.lights import Lights
 from ..core.photo.image import image_size
 from ..core.scan import Camera, Reconstruction, Scan
 from . import cameras, lights, meshes, photos
+from .face_slots import wear_again
 from .frame import frame_origin
 from .photo_list import LitPhoto, list_photos, mark_lit
 from .properties import CAPTURE
@@ -58,6 +59,7 @@ def create_scan_collection(
     centre = 0.5 * (used.min(axis=0) + used.max(axis=0)) - origin
     top["patina_origin"] = origin.tolist()
     mesh = meshes.create_mesh_object(name, scan.mesh, origin, top)
+    wear_again(mesh, str(capture.file))
     made = _cameras(scan.cameras, own, origin, centre, camera_room)
     listed = []
     for place, (camera, shown, photo) in enumerate(lit):

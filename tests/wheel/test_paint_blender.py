@@ -178,6 +178,34 @@ def test_masks_are_exported(scene, tmp_path: Path) -> None:  # noqa: F811
     assert np.array_equal(read_mask(tmp_path / "masks" / "001_lit_1_shadow.png"), where)
 
 
+def test_nothing_is_lost_by_importing_anew(scene) -> None:  # noqa: F811
+    from patina.scene.mask_images import mask_images
+    from patina.scene.properties import capture_path
+
+    assert bpy.ops.patina.shadow_masks() == {"FINISHED"}
+    image = mask_images(capture_path(scene))[0, "shadow"]
+    soft = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(soft)
+    greys = set(np.unique(np.round(255 * soft)).tolist())
+    _two_materials(scene)
+    mesh = scene.patina.mesh
+    true = truth(mesh)
+    mesh.data.polygons.foreach_set("material_index", true.astype(np.int32))
+    canvas = _canvas(scene, 0)
+    where = np.zeros((made.HEIGHT, made.WIDTH), bool)
+    where[:3, :3] = True
+    _paint(canvas, where, _colour(scene, "Shadow"))
+    assert bpy.ops.patina.take_paint() == {"FINISHED"}
+    image.pixels.foreach_get(soft)
+    assert set(np.unique(np.round(255 * soft)).tolist()) | {255} == greys | {255}
+    for gone in list(scene.objects):
+        bpy.data.objects.remove(gone)
+    assert bpy.ops.patina.import_capture(filepath=capture_path(scene)) == {"FINISHED"}
+    assert scene.patina.mesh is not mesh and np.array_equal(slots(scene.patina.mesh), true)
+    assert [m.name for m in scene.patina.mesh.data.materials] == ["surface", "blue half"]
+    assert len(mask_images(capture_path(scene))) == 5
+
+
 def test_reasons_are_said(scene) -> None:  # noqa: F811
     with pytest.raises(RuntimeError, match="one material only"):
         bpy.ops.patina.paint_mesh()
