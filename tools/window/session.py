@@ -90,10 +90,12 @@ def open_panel(stage: str) -> float:
     words: list[object] = []
     for number in [*opened, STAGES.index(stage)]:
         x, y = on_screen(region, 90, region.height - FIRST - HEADER * number)
-        words += ["mousemove", x, y, "sleep", 0.3, "click", 1, "sleep", 0.7]
+        # a region has to feel the mouse come before it takes a click
+        words += ["mousemove", x - 5, y, "sleep", 0.4, "mousemove", x, y, "sleep", 0.4]
+        words += ["click", 1, "sleep", 0.8]
     mouse(*words)
     opened[:] = [STAGES.index(stage)]
-    return 3 * DRAWN
+    return 2.5 * len(words) / 10 + DRAWN
 
 
 def until_done() -> Iterator[float]:
