@@ -116,6 +116,7 @@ def begin() -> Iterator[float]:
     yield DRAWN  # tabs are known once they were drawn
     region_of(area, "UI").active_panel_category = "Patina"
     area.tag_redraw()
+    mouse("mousemove", 700, 12, "sleep", 0.3, "click", 1)  # the first click only wakes the window
     yield DRAWN
     photograph("1_empty")
 
@@ -180,6 +181,7 @@ def materials_and_masks() -> Iterator[float]:
     found["faces painted on a photo"] = int((slots(mesh) != before).sum())
     masks = part("scene.mask_images")
     capture = part("scene.properties").capture_path(scene)
+    found["painted photo"] = scene.patina_photos.active
     found["pixels ignored"] = {
         kind: int(masks.read_mask_image(image).sum())
         for (place, kind), image in masks.mask_images(capture).items()
@@ -212,6 +214,11 @@ def fit_and_check() -> Iterator[float]:
     stored = part("scene.properties")
     result = stored.stored_result(stored.capture_path(bpy.context.scene))
     found["materials"] = {m["name"]: m["samples"]["used"] for m in result["materials"]}
+    scene = bpy.context.scene
+    found["photos"] = len(scene.patina_photos.photos)
+    found["lamps"] = sum(o.type == "LIGHT" for o in scene.objects)
+    slots = part("scene.paints").worn_slots(scene.patina.mesh)
+    found["faces"] = np.bincount(slots).tolist()
 
 
 def judge() -> None:

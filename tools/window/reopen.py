@@ -1,0 +1,64 @@
+"""Is all of a session still there in another Blender? Masks, lights, list of photos, results.
+
+python tools/window/reopen.py SESSION_FOLDER     (a Python with bpy: any version from the one that
+                                                  saved session.blend on)
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+
+import bpy
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def extension() -> None:
+    """The checkout, as package ``patina``."""
+    spec = importlib.util.spec_from_file_location(
+        "patina", ROOT / "__init__.py", submodule_search_locations=[str(ROOT)]
+    )
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["patina"] = module
+    spec.loader.exec_module(module)
+    module.register()
+
+
+def main() -> None:
+    """Open, compare with what the session found, say so."""
+    folder = Path(sys.argv[-1])
+    told = json.loads((folder / "session.json").read_text("utf-8"))
+    extension()
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "session.blend"))
+    from patina.scene.apply import measured_of
+    from patina.scene.mask_images import mask_images, read_mask_image
+    from patina.scene.paints import paints, worn_slots
+    from patina.scene.properties import DIAGNOSIS, capture_path, stored_result
+
+    scene = bpy.context.scene
+    capture = capture_path(scene)
+    result = stored_result(capture)
+    assert {m["name"]: m["samples"]["used"] for m in result["materials"]} == told["materials"]
+    assert sorted(measured_of(capture)) == sorted(told["materials"])
+    assert stored_result(capture, DIAGNOSIS) is not None
+    photos = scene.patina_photos
+    masks = {
+        kind: int(read_mask_image(image).sum())
+        for (where, kind), image in mask_images(capture).items()
+        if where == told["painted photo"]
+    }
+    assert masks == told["pixels ignored"], (masks, told)
+    assert len(photos.photos) == told["photos"] and all(p.camera for p in photos.photos)
+    lamps = [o for o in scene.objects if o.type == "LIGHT"]
+    assert len(lamps) == told["lamps"], [o.name for o in lamps]
+    materials = [paint for paint in paints(scene) if paint.kind == "material"]
+    counts = [int((worn_slots(scene.patina.mesh) == paint.slot).sum()) for paint in materials]
+    assert counts == told["faces"], (counts, told)
+    print(f"Blender {bpy.app.version_string}: all of the session is there")
+
+
+main()
