@@ -33,7 +33,8 @@ def running(scene: bpy.types.Scene) -> Running | None:
 
 
 def tell(state: Running | None) -> None:
-    """Set or clear what runs, and have every 3D viewport show it."""
+    """Set or clear what runs, and have the sidebar of every 3D viewport show it: what stands in the
+    viewport has not changed, and drawing that may take longer than a step of the job."""
     global _now
     _now = state
     redraw()
@@ -44,7 +45,8 @@ def redraw() -> None:
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
-                area.tag_redraw()
+                for region in (r for r in area.regions if r.type == "UI"):
+                    region.tag_redraw()
 
 
 def _time(seconds: float) -> str:

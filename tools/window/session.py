@@ -24,7 +24,7 @@ OUT = Path(sys.argv[sys.argv.index("--") + 1])
 PACKAGE = "bl_ext.user_default.patina"
 STAGES = ["scan", "photos", "masks", "fit", "check", "material"]
 HEADER, FIRST = 25, 18  # pixels: from one closed panel's header to the next, to the first's middle
-PATIENCE = 900  # seconds for all of it
+PATIENCE = 1500  # seconds for all of it
 DRAWN = 2.0  # seconds until a window has surely been drawn
 found: dict[str, object] = {}
 opened: list[int] = []
@@ -258,7 +258,8 @@ def tick() -> float | None:
         traceback.print_exc()
         photograph("failed")
         end(1)
-    area_of("VIEW_3D").tag_redraw()
+    if wait >= DRAWN:
+        area_of("VIEW_3D").tag_redraw()
     return wait
 
 
