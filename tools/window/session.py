@@ -133,7 +133,7 @@ def scan_and_photos() -> Iterator[float]:
 
 
 def materials_and_masks() -> Iterator[float]:
-    """Proposed, then mended by strokes on the mesh and on a photo."""
+    """Proposed; a stroke on the mesh, which is wrong there, and mended on a photo."""
     scene = bpy.context.scene
     mesh = scene.patina.mesh
     yield open_panel("masks")
@@ -159,6 +159,7 @@ def materials_and_masks() -> Iterator[float]:
     found["faces painted on the mesh"] = int((slots(mesh) != before).sum())
     before = slots(mesh)
     press("object.mode_set", mode="OBJECT")
+    press("patina.pick_paint", number=0)
     press("patina.paint_photo")
     yield DRAWN
     editor = area_of("IMAGE_EDITOR")
