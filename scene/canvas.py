@@ -71,14 +71,11 @@ def draw(scene: bpy.types.Scene, capture: str, image: bpy.types.Image) -> None:
     mesh = scene.patina.mesh
     if scene.patina.use_slots and len(mesh.material_slots) > 1:
         slots = _checked(found, mesh)
-        step = _step(found, place, picture)
-        worn = found.faces_of(place).image(slots)[::step, ::step].copy()
+        worn = _small(found.faces_of(place).image(slots), picture.shape).copy()
     masks = mask_images(capture)
     for number, paint in enumerate(there):
         if (place, paint.kind) in masks:
-            mask = read_mask_image(masks[place, paint.kind])
-            step = max(1, round(mask.shape[0] / picture.shape[0]))
-            worn[mask[::step, ::step][: worn.shape[0], : worn.shape[1]]] = number
+            worn[_small(read_mask_image(masks[place, paint.kind]), picture.shape)] = number
     shown = overlaid(picture, worn, palette(there), scene.patina_paint.opacity)
     write_pixels(image, shown)
     _drawn[image.name] = shown
@@ -151,13 +148,20 @@ def _outs(kinds: Sequence[Paint]) -> list[int]:
 
 def _whole(values: NDArray, shape: tuple[int, ...]) -> NDArray:
     """A canvas (h, w) at the size of its photo."""
-    step = max(1, -(-shape[0] // values.shape[0]))
+    step = _step(shape, values.shape)
     wide = np.repeat(np.repeat(values, step, axis=0), step, axis=1)
     return wide[: shape[0], : shape[1]]
 
 
-def _step(found: ScanRays, place: int, picture: NDArray[np.uint8]) -> int:
-    return max(1, -(-found.faces_of(place).shape[0] // picture.shape[0]))
+def _small(values: NDArray, shape: tuple[int, ...]) -> NDArray:
+    """What is as large as a photo at the size of its canvas."""
+    step = _step(values.shape, shape)
+    return values[::step, ::step]
+
+
+def _step(photo: tuple[int, ...], canvas: tuple[int, ...]) -> int:
+    """Pixels of a photo (h, w) for one of its canvas (h, w)."""
+    return -(-photo[0] // canvas[0])
 
 
 def _checked(found: ScanRays, mesh: bpy.types.Object) -> NDArray[np.int32]:

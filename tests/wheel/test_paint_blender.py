@@ -152,6 +152,30 @@ def test_vertex_paint_reaches_the_slots(scene) -> None:  # noqa: F811
     assert (slots(mesh) == 0).all()
 
 
+def test_a_large_photo_is_painted_on_in_a_smaller_size(scene, monkeypatch) -> None:  # noqa: F811
+    """Three of its pixels a pixel of the canvas, sides that are no multiple of it."""
+    from patina.scene import canvas
+    from patina.scene.mask_images import mask_images, read_mask_image
+    from patina.scene.properties import capture_path
+
+    monkeypatch.setattr(canvas, "LARGEST", 47)
+    _two_materials(scene)
+    image = _canvas(scene, 0)
+    assert tuple(image.size) == (40, 30)
+    where = np.zeros((30, 40), bool)
+    where[5:9, 10:15] = True
+    _paint(image, where, _colour(scene, "Ignore"))
+    where_blue = np.zeros((30, 40), bool)
+    where_blue[14:20, 15:25] = True
+    _paint(image, where_blue, _colour(scene, "blue half"))
+    assert bpy.ops.patina.take_paint() == {"FINISHED"}
+    mask = read_mask_image(mask_images(capture_path(scene))[0, "ignore"])
+    assert np.array_equal(mask, np.kron(where, np.ones((3, 3))).astype(bool))
+    assert (slots(scene.patina.mesh) == 1).any()
+    assert bpy.ops.patina.take_paint() == {"FINISHED"}
+    assert np.array_equal(read_mask_image(mask_images(capture_path(scene))[0, "ignore"]), mask)
+
+
 def test_face_sets_become_materials(scene) -> None:  # noqa: F811
     mesh = scene.patina.mesh
     true = truth(mesh)
