@@ -172,7 +172,7 @@ def materials_and_masks() -> Iterator[float]:
         ends = np.linspace(left, right, 24)
         return [on_screen(view, *view.view2d.view_to_region(x, height, clip=False)) for x in ends]
 
-    yield drag(across(0.42, 0.58, 0.5))
+    yield drag(across(0.4, 0.6, 0.46))
     press("patina.pick_paint", number=[p.kind for p in paints(scene)].index("ignore"))
     yield drag(across(0.3, 0.7, 0.2))
     photograph("6_painted_photo")
