@@ -78,6 +78,7 @@ def draw(scene: bpy.types.Scene, capture: str, image: bpy.types.Image) -> None:
             worn[_small(read_mask_image(masks[place, paint.kind]), picture.shape)] = number
     shown = overlaid(picture, worn, palette(there), scene.patina_paint.opacity)
     write_pixels(image, shown)
+    image.pack()  # else Blender may let its pixels go, and show black
     _drawn[image.name] = shown
 
 
@@ -87,7 +88,10 @@ def take_strokes(scene: bpy.types.Scene, capture: str) -> int:
     there = canvases(capture)
     kinds, painted = paints(scene), {}
     for place, image in there.items():
-        found = strokes(_drawn[image.name], read_pixels(image), palette(kinds))
+        now = read_pixels(image)
+        if not now.any():  # Blender let its pixels go, and nobody painted all of it black
+            continue
+        found = strokes(_drawn[image.name], now, palette(kinds))
         if (found >= 0).any():
             painted[place] = found
     if painted:

@@ -13,7 +13,7 @@ from ..core.report.display import srgb
 from .face_slots import COLOURS, shown_name
 
 OUT_COLOURS = {"shadow": (91, 42, 134), "highlight": (255, 255, 255), "ignore": (255, 0, 160)}
-ERASER = (0, 0, 0)
+ERASER = (0, 255, 255)  # never black: that is an image whose pixels Blender let go
 ERASE = "erase"
 DARKER = 0.4  # from one round of colours to the next
 

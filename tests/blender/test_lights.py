@@ -174,6 +174,6 @@ def test_the_panel_says_what_was_done_by_hand() -> None:
         {"name": "lamp", "refined": {}},
     ]  # fmt: skip
     extension("scene.properties").store_result(scene.camera["patina_capture"], {"lights": lights})
-    assert drawn() == ["Flash: flash", "Refined: right 0.4321"]
+    assert drawn() == ["Flash: flash", "Refined: right 0.432 scan units"]
     bpy.data.objects.remove(lamp("flash"))
     assert drawn() == ["flash: its lamp is gone"]

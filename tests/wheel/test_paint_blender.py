@@ -118,6 +118,26 @@ def test_what_is_left_out_is_a_mask_that_the_fit_heeds(scene, tmp_path: Path) ->
     assert np.array_equal(read_mask(again.photos[1].masks["highlight"]), bright & ~gone)
 
 
+def test_a_canvas_that_lost_its_pixels_erases_nothing(scene) -> None:  # noqa: F811
+    from patina.scene.mask_images import mask_images, read_mask_image
+    from patina.scene.properties import capture_path
+
+    image = _canvas(scene, 0)
+    where = np.zeros((made.HEIGHT, made.WIDTH), bool)
+    where[20:40, 30:50] = True
+    _paint(image, where, _colour(scene, "Ignore"))
+    assert bpy.ops.patina.take_paint() == {"FINISHED"}
+    pixels = np.zeros(len(image.pixels), np.float32)
+    image.pixels.foreach_set(pixels)
+    assert bpy.ops.patina.take_paint() == {"FINISHED"}
+    assert np.array_equal(read_mask_image(mask_images(capture_path(scene))[0, "ignore"]), where)
+    image.pixels.foreach_get(pixels)
+    assert pixels.max() > 0.5  # drawn anew
+    image.reload()  # as when Blender lets pixels go that nobody painted
+    assert bpy.ops.patina.take_paint() == {"FINISHED"}
+    assert np.array_equal(read_mask_image(mask_images(capture_path(scene))[0, "ignore"]), where)
+
+
 def test_a_fit_leaves_out_what_is_ignored(scene) -> None:  # noqa: F811
     """All of one photo painted out: none of its pixels is used, though nobody pressed Take."""
     from patina.scene.properties import capture_path, stored_result
