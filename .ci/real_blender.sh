@@ -76,10 +76,9 @@ session)
   { [ -x "$dir/usr/bin/import" ] && [ -x "$dir/usr/bin/xdotool" ]; } || inside "$dir" apt-get \
     install -y -qq --no-install-recommends xvfb xauth imagemagick xdotool fonts-dejavu-core >/dev/null
   BLENDER_USER_RESOURCES="$cache/blender-4.3-cp313" inside "$dir" /bin/bash -c '
-    cd "$0"; Xvfb :97 -screen 0 1600x1000x24 +extension GLX >/dev/null 2>&1 & screen=$!
-    export DISPLAY=:97 LIBGL_ALWAYS_SOFTWARE=1; sleep 2
-    blender --factory-startup --addons bl_ext.user_default.patina --window-geometry 0 0 1600 1000 \
-      -P tools/window/session.py -- "$1" && code=0 || code=$?
-    kill $screen; exit $code' "$here" "$out" ;;
+    cd "$0"; export LIBGL_ALWAYS_SOFTWARE=1
+    exec xvfb-run --auto-servernum -s "-screen 0 1600x1000x24 +extension GLX" timeout 1800 \
+      blender --factory-startup --addons bl_ext.user_default.patina --window-geometry 0 0 1600 1000 \
+      -P tools/window/session.py -- "$1"' "$here" "$out" ;;
 *) sed -n '2,9p' "$0"; exit 2 ;;
 esac

@@ -24,10 +24,10 @@ OUT = Path(sys.argv[sys.argv.index("--") + 1])
 PACKAGE = "bl_ext.user_default.patina"
 STAGES = ["scan", "photos", "masks", "fit", "check", "material"]
 HEADER, FIRST = 25, 18  # pixels: from one closed panel's header to the next, to the first's middle
-PATIENCE = 1500  # seconds for all of it
+PATIENCE = 1500  # seconds for all of it (real_blender.sh kills what goes on longer)
 DRAWN = 2.0  # seconds until a window has surely been drawn
 found: dict[str, object] = {}
-opened: list[int] = []
+drawn: set[str] = set()  # stages whose panels were open when the sidebar was drawn
 
 
 def window() -> bpy.types.Window:
@@ -84,18 +84,27 @@ def drag(places: list[tuple[int, int]]) -> float:
     return 3.0 + 0.06 * len(places)
 
 
-def open_panel(stage: str) -> float:
-    """Click the header of the open panel, then that of another one: all above it are closed."""
-    region = region_of(area_of("VIEW_3D"), "UI")
-    words: list[object] = []
-    for number in [*opened, STAGES.index(stage)]:
+def open_panel(stage: str) -> Iterator[float]:
+    """Click headers until this panel is open and no other: one click, then a look at what was drawn."""
+    area = area_of("VIEW_3D")
+    region, shading = region_of(area, "UI"), area.spaces.active.shading
+    look, shading.type = shading.type, "SOLID"  # a click waits for a viewport that is slow to draw
+    for _ in range(12):
+        drawn.clear()
+        area.tag_redraw()
+        yield DRAWN
+        if drawn == {stage}:
+            break
+        # the headers above the topmost open panel, and so its own, are where they are with all closed
+        number = STAGES.index(min(drawn or {stage}, key=STAGES.index))
         x, y = on_screen(region, 90, region.height - FIRST - HEADER * number)
         # a region has to feel the mouse come before it takes a click
-        words += ["mousemove", x - 5, y, "sleep", 0.4, "mousemove", x, y, "sleep", 0.4]
-        words += ["click", 1, "sleep", 0.8]
-    mouse(*words)
-    opened[:] = [STAGES.index(stage)]
-    return 2.5 * len(words) / 10 + DRAWN
+        mouse("mousemove", x - 5, y, "sleep", 0.4, "mousemove", x, y, "sleep", 0.4, "click", 1)
+        yield 1.5
+    else:
+        raise AssertionError(f"the panel of {stage} did not open: {drawn}")
+    shading.type = look
+    yield DRAWN
 
 
 def until_done() -> Iterator[float]:
@@ -128,7 +137,7 @@ def scan_and_photos() -> Iterator[float]:
     yield DRAWN
     photograph("2_scan")
     bpy.context.scene.patina_photos.active = 4
-    yield open_panel("photos")
+    yield from open_panel("photos")
     photograph("3_photos")
 
 
@@ -136,7 +145,7 @@ def materials_and_masks() -> Iterator[float]:
     """Proposed; a stroke on the mesh, which is wrong there, and mended on a photo."""
     scene = bpy.context.scene
     mesh = scene.patina.mesh
-    yield open_panel("masks")
+    yield from open_panel("masks")
     press("patina.propose_materials", "INVOKE_DEFAULT")
     yield from until_done()
     photograph("4_proposed")
@@ -195,7 +204,7 @@ def materials_and_masks() -> Iterator[float]:
 
 def fit_and_check() -> Iterator[float]:
     """To finished materials, marked as assets."""
-    yield open_panel("fit")
+    yield from open_panel("fit")
     area_of("VIEW_3D").spaces.active.shading.type = "MATERIAL"
     press("patina.fit", "INVOKE_DEFAULT")
     yield 6.0
@@ -203,12 +212,12 @@ def fit_and_check() -> Iterator[float]:
     yield from until_done()
     yield 10.0  # shaders
     photograph("9_fitted")
-    yield open_panel("check")
+    yield from open_panel("check")
     press("patina.check", "INVOKE_DEFAULT")
     yield from until_done()
     yield 10.0
     photograph("10_checked")
-    yield open_panel("material")
+    yield from open_panel("material")
     press("patina.mark_assets")
     yield DRAWN
     photograph("11_material")
@@ -270,6 +279,17 @@ def too_long() -> None:
     end(1)
 
 
+def noting(panel: type[bpy.types.Panel]) -> None:
+    """Let a panel tell that it is open: Blender draws the inside of those only."""
+    draw, stage = panel.draw, panel.stage
+
+    def noted(self: bpy.types.Panel, context: bpy.types.Context) -> None:
+        drawn.add(stage)
+        draw(self, context)
+
+    panel.draw = noted
+
+
 def close_panels() -> None:
     """All of them, before they were ever drawn: headers are then where a click expects them."""
     panels = [c for c in bpy.types.Panel.__subclasses__() if c.__name__.startswith("PATINA_PT_")]
@@ -280,12 +300,18 @@ def close_panels() -> None:
     for panel in (*inner, *outer):
         bpy.utils.unregister_class(panel)
     outer.sort(key=lambda panel: STAGES.index(panel.stage))
+    for panel in outer:
+        noting(panel)
     for panel in (*outer, *inner):
         panel.bl_options = {"DEFAULT_CLOSED"}
         bpy.utils.register_class(panel)
 
 
-close_panels()
 OUT.mkdir(parents=True, exist_ok=True)
+try:
+    close_panels()
+except BaseException:  # Blender itself would print it and stay open
+    traceback.print_exc()
+    end(1)
 bpy.app.timers.register(tick, first_interval=3)
 bpy.app.timers.register(too_long, first_interval=PATIENCE)
