@@ -85,7 +85,7 @@ def drag(places: list[tuple[int, int]]) -> float:
 
 
 def open_panel(stage: str) -> Iterator[float]:
-    """Click headers until this panel is open and no other: one click, then a look at what was drawn."""
+    """Click headers until this panel is open and no other: a click, then what was drawn tells."""
     area = area_of("VIEW_3D")
     region, shading = region_of(area, "UI"), area.spaces.active.shading
     look, shading.type = shading.type, "SOLID"  # a click waits for a viewport that is slow to draw
@@ -95,7 +95,7 @@ def open_panel(stage: str) -> Iterator[float]:
         yield DRAWN
         if drawn == {stage}:
             break
-        # the headers above the topmost open panel, and so its own, are where they are with all closed
+        # headers down to that of the topmost open panel are where they are with all closed
         number = STAGES.index(min(drawn or {stage}, key=STAGES.index))
         x, y = on_screen(region, 90, region.height - FIRST - HEADER * number)
         # a region has to feel the mouse come before it takes a click
