@@ -11,9 +11,9 @@ from ..core.errors import PatinaError
 from ..scene.brushes import ready_to_paint
 from ..scene.canvas import canvas_of, canvases, draw
 from ..scene.face_slots import leave_edit_mode, new_slot
+from ..scene.image_editor import show_canvas
 from ..scene.mask_files import write_masks
 from ..scene.mesh_paint import show_on_mesh, shown_on_mesh, slots_of_face_sets
-from ..scene.paint_editor import show_canvas
 from ..scene.painted import take_all
 from ..scene.paints import paints, take_up, wear
 from ..scene.photo_list import looked_at

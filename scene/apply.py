@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from datetime import date
 
@@ -10,10 +11,13 @@ import bpy
 from ..core.job import CaptureResult, Stage
 from ..core.report.result_json import describe
 from . import materials, meshes, osl_files
+from .charted import keep_earlier, keep_evidence
+from .face_slots import drop_stand_ins
+from .materials import MEASURED
 from .preview import show_sphere
 from .properties import CAPTURE, store_result
 
-MEASURED = "patina_measured"  # on the material: the name it has in its capture
+NUMBERED = re.compile(r"\.\d{3}$")  # as Blender keeps names apart
 DATE = "patina_date"  # on the material: when it was measured
 
 
@@ -44,7 +48,9 @@ def apply_result(
         new[MEASURED], new[CAPTURE] = fitted.name, capture
         new[DATE] = date.today().isoformat()
         show_sphere(new, brdf)
+        keep_evidence(new, fitted)
         if old is not None:
+            keep_earlier(new, old)
             name = old.name
             old.user_remap(new)
             bpy.data.materials.remove(old)
@@ -61,6 +67,11 @@ def apply_result(
         notes.append("the scanned mesh is not in this scene: materials were made, not assigned")
     elif not meshes.assign_materials(mesh, made, result.face_material):
         notes.append(f"{mesh.name} no longer has the scan's faces: all wear the first material")
+    drop_stand_ins(capture)
+    for material in made:  # what had its name made way; another name is the artist's
+        name = material[MEASURED]
+        if NUMBERED.sub("", material.name) == name and name not in bpy.data.materials:
+            material.name = name
     store_result(capture, describe(result, stages, notes))
     return notes
 

@@ -7,7 +7,8 @@ from typing import Any
 
 import bpy
 
-from .apply import DATE, MEASURED
+from .apply import DATE
+from .materials import MEASURED
 from .moved import movable, state
 
 PROVENANCE = "patina_provenance"  # on the material

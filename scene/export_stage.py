@@ -11,7 +11,7 @@ from ..core.appearance.principled_fit import PrincipledFit
 from ..core.errors import PatinaError
 from ..core.export.subject import Subject
 from . import materials, osl_files
-from .apply import MEASURED
+from .materials import MEASURED
 
 RINGS, SEGMENTS = 48, 96
 SPACING = 2.5  # between the centres of preview spheres of radius 1

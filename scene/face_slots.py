@@ -13,7 +13,7 @@ from ..core.capture import Capture, MaterialEntry
 from ..core.capture.model import LEFT_OUT
 from ..core.errors import InputError, PatinaError
 from ..core.scan import Scan
-from .apply import MEASURED
+from .materials import MEASURED
 from .properties import CAPTURE
 
 SLOTS = "patina_slots"  # the scan's face attribute while a fit runs
@@ -56,6 +56,11 @@ def show_proposal(
         data.materials.append(stand_in(name, COLOURS[number % len(COLOURS)], capture))
     data.polygons.foreach_set("material_index", labels.astype(np.int32))
     data.update()
+    drop_stand_ins(capture)
+
+
+def drop_stand_ins(capture: str) -> None:
+    """Of that capture those that nothing wears any more."""
     for material in [m for m in bpy.data.materials if m.get(STAND_IN) == capture and not m.users]:
         bpy.data.materials.remove(material)
 

@@ -23,9 +23,9 @@ from ..core.job import Stage
 from ..core.maps.maps_job import MapsResult
 from ..core.maps.write import BLEND, MapFile
 from . import osl_files
-from .apply import MEASURED, measured_materials
+from .apply import measured_materials
 from .blend_file import save, write_blend
-from .materials import fill_principled
+from .materials import MEASURED, fill_principled
 from .meshes import UV_LAYER
 
 BODY, BODY_SCALE = "body", "body_scale"  # inputs of the OSL shader: D (1/sr) and its factor

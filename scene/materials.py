@@ -34,6 +34,7 @@ from .worlds import update_worlds
 log = logging.getLogger(__name__)
 
 REASON_PROPERTY = "patina_without_osl"  # on the material: why it has no OSL branch
+MEASURED = "patina_measured"  # on the material: the name it has in its capture
 COEFFICIENTS = "patina_coefficients"  # on the material: all of them, R, then G, then B
 BASIS = "patina_basis"  # on the material: the version of the basis they are in
 SOCKET_TYPES = {

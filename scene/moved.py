@@ -7,6 +7,7 @@ what is added to them.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -22,8 +23,7 @@ from ..core.basis import Basis, PrincipalBRDF
 from ..core.errors import PatinaError
 from ..core.report.sphere import LitSphere
 from ..core.result.bases import basis_of_version
-from .apply import MEASURED
-from .materials import BASIS, COEFFICIENTS
+from .materials import BASIS, COEFFICIENTS, MEASURED
 from .preview import SMALL, Picture
 
 QUICK = 128  # pixels across the sphere that follows a slider
@@ -61,6 +61,12 @@ def state(material: bpy.types.Material) -> str:
 def measured_brdf(material: bpy.types.Material) -> PrincipalBRDF | None:
     """As measured; None where this computer lacks the basis it is in."""
     return _brdf(material[BASIS], _stored(material))
+
+
+def brdf_of(basis: str, coefficients: Sequence[float]) -> PrincipalBRDF | None:
+    """Of coefficients (3 · k,), R, then G, then B, in the basis of that version; None where this
+    computer lacks it."""
+    return _brdf(basis, np.array(coefficients, np.float64).tobytes())
 
 
 def moved_brdf(material: bpy.types.Material) -> PrincipalBRDF | None:

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import bpy
-
 from ..core.capture import Capture, read_capture
 from ..core.errors import InputError
 from ..core.geometry import RayScene
 from ..core.job import inputs
 from ..core.masks.carry import SeenFaces
 from ..core.scan import Scan
-from .handlers import attach, detach
+from .kept import Kept
 
 KEPT = 4  # photos of which it is known what they show: of 24 megapixels 200 MB each
 
@@ -39,39 +37,18 @@ class ScanRays:
         return self.seen[place]
 
 
-_last: ScanRays | None = None
+_last: Kept[ScanRays] = Kept()
 
 
 def scan_rays(path: str) -> ScanRays:
     """Of a capture file; the last one is kept. Raises InputError."""
-    global _last
     file = Path(path)
     if not file.is_file():
         raise InputError("is gone; import the capture again from where it is now", file=file)
-    changed = file.stat().st_mtime
-    if _last is None or _last.capture.file != file or _last.changed != changed:
+    changed, last = file.stat().st_mtime, _last.thing
+    if last is None or last.capture.file != file or last.changed != changed:
         capture = read_capture(file)
         scan = inputs.open_scan(capture)
-        _last = ScanRays(capture, scan, RayScene.build(scan.mesh), changed, {})
-    return _last
-
-
-@bpy.app.handlers.persistent
-def _forget(*_: object) -> None:
-    """Another file is opened."""
-    global _last
-    _last = None
-
-
-HANDLERS = (("load_pre", _forget),)
-
-
-def register() -> None:
-    """Watch for another file."""
-    attach(HANDLERS)
-
-
-def unregister() -> None:
-    """No more, and forget the scan."""
-    detach(HANDLERS)
-    _forget()
+        last = ScanRays(capture, scan, RayScene.build(scan.mesh), changed, {})
+        _last.thing = last
+    return last

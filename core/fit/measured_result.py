@@ -24,6 +24,12 @@ class Band:
     values: NDArray[np.float32]
 
     @staticmethod
+    def from_values(values: NDArray[np.floating], knee: float) -> Band:
+        """values: (n, 3) of a band; knee: of its BRDF's basis. Raises ValueError."""
+        grid = AngleGrid(*COARSE, knee)
+        return Band(grid, np.asarray(values, np.float32).reshape(grid.size, 3))
+
+    @staticmethod
     def of(fit: MeasuredFit) -> Band:
         """The fit's own, at the nodes of a coarser grid."""
         grid = AngleGrid(*COARSE, fit.brdf.basis.grid.knee)
@@ -37,6 +43,20 @@ class Band:
     def factor(self, angles: Angles) -> NDArray[np.float32]:
         """(n, 3) what ρ·cosMap + ε may be larger or smaller by, in nine of ten cases at most."""
         return np.exp(np.float32(NINETY) * self.deviation(angles))
+
+    def interval(
+        self, brdf: PrincipalBRDF, angles: Angles
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """(low, high) (n, 3) in 1/sr: the 90 % interval of the BRDF that the band is of, at n
+        directions."""
+        weight = mapping.cos_map(angles).astype(np.float32)[:, None]
+        level = brdf.evaluate(angles) * weight + np.float32(mapping.EPSILON)
+        factor = self.factor(angles)
+        low, high = level / factor, level * factor
+        return (
+            np.maximum(low - np.float32(mapping.EPSILON), 0) / weight,
+            np.maximum(high - np.float32(mapping.EPSILON), 0) / weight,
+        )
 
     def spread(self) -> Spread:
         """In three numbers."""
@@ -74,14 +94,7 @@ class MeasuredResult:
 
     def interval(self, angles: Angles) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """(low, high) (n, 3) in 1/sr: the 90 % interval at n directions."""
-        weight = mapping.cos_map(angles).astype(np.float32)[:, None]
-        level = self.brdf.evaluate(angles) * weight + np.float32(mapping.EPSILON)
-        factor = self.band.factor(angles)
-        low, high = level / factor, level * factor
-        return (
-            np.maximum(low - np.float32(mapping.EPSILON), 0) / weight,
-            np.maximum(high - np.float32(mapping.EPSILON), 0) / weight,
-        )
+        return self.band.interval(self.brdf, angles)
 
     def odd_gains(self, least: float) -> dict[int, float]:
         """The gains that differ from 1 by more than ``least``, photo → gain."""

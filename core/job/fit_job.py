@@ -19,7 +19,7 @@ from ..fit.held_out import HeldOut
 from ..fit.measured_result import MeasuredResult
 from ..fit.spread import Spread
 from ..geometry import RayScene
-from ..samples import SampleSink, SampleTable
+from ..samples import MeasuredPoints, SampleSink, SampleTable
 from ..samples.face_votes import FaceVotes
 from ..samples.level import at_typical_level
 from ..scan import Scan
@@ -41,7 +41,8 @@ LEAST_RHO, LARGEST_RHO = 1e-6, 1e4  # 1/sr: black velvet has 1e-3, mirrors' peak
 class MaterialResult:
     """One fitted material. fit: by the capture's method; samples: number taken from the photos;
     used: those that the fit was given, all unless there are too many; per_photo: taken of every
-    photo; scale: what the photos' reflectance was multiplied by, 1 where the irradiance is known.
+    photo; points: some of them, for charts; scale: what the photos' reflectance was multiplied by,
+    1 where the irradiance is known.
     portable: as others show it, None until somebody asks.
     """
 
@@ -50,6 +51,7 @@ class MaterialResult:
     samples: int
     used: int
     per_photo: tuple[int, ...]
+    points: MeasuredPoints
     held_out: HeldOut | None
     spread: Spread
     portable: Portable | None
@@ -255,6 +257,7 @@ class FitJob(Job):
             samples=int(counts.sum()),
             used=len(table),
             per_photo=tuple(counts.tolist()),
+            points=MeasuredPoints.of(table),
             held_out=found.held_out,
             spread=found.spread,
             portable=None,

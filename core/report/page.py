@@ -14,9 +14,11 @@ from ..geometry import PixelRays, bands, view_window
 from ..job import CaptureResult, MaterialResult, inputs
 from ..photo import write_png
 from ..predict.compose import predict_photo
+from ..views.polar import NEAR_PLANE, polar
+from ..views.subject import Subject
+from ..views.svg import svg
 from . import display
 from .figures import figures
-from .polar import Curve, polar_chart
 from .sphere import Reflector, write_sphere
 
 STYLE = Path(__file__).parents[2] / "assets" / "report" / "style.css"
@@ -58,9 +60,9 @@ def _material_section(folder: Path, material: MaterialResult, photos: Sequence[s
     fit, brdf = material.fit, material.fit.brdf
     interval = fit.interval if isinstance(fit, MeasuredResult) else None
     spheres = _spheres(folder, material)
+    subject = Subject("fit", brdf.evaluate, interval, material.points)
     charts = "".join(
-        f"<figure>{polar_chart([Curve('fit', brdf.evaluate, interval)], incidence)}</figure>"
-        for incidence in (15, 45, 70)
+        f"<figure>{svg(polar([subject], incidence))}</figure>" for incidence in (15, 45, 70)
     )
     warnings = "".join(f"<p class='warn'>{escape(w)}</p>" for w in material.warnings)
     rows = "".join(
@@ -73,7 +75,8 @@ def _material_section(folder: Path, material: MaterialResult, photos: Sequence[s
         f"<p class='sub'>Lit spheres, key light π at the upper left. Error: of the cube root of "
         f"ρ cos θ over all directions.</p><table>{rows}</table>"
         f"<div class='charts'>{charts}</div><p class='sub'>Reflectance in the plane of incidence, "
-        f"light from the left; a curve for each of red, green and blue{shaded}.</p>"
+        f"light from the left; a curve for each of red, green and blue{shaded}; dots: "
+        f"samples within {np.degrees(NEAR_PLANE):.0f}° of it.</p>"
     )
 
 

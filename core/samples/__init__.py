@@ -1,8 +1,16 @@
 """One table of reflectance samples: who saw what, under which angles, how reliable."""
 
+from .measured_points import MeasuredPoints
 from .reservoir import SampleReservoir
 from .sink import SampleSink
 from .table import SampleTable
 from .take import Margins, sample_photo
 
-__all__ = ["Margins", "SampleReservoir", "SampleSink", "SampleTable", "sample_photo"]
+__all__ = [
+    "Margins",
+    "MeasuredPoints",
+    "SampleReservoir",
+    "SampleSink",
+    "SampleTable",
+    "sample_photo",
+]

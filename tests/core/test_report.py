@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from patina.core.angles import Angles
 from patina.core.brdf import TabulatedBRDF, metrics
 from patina.core.capture import read_capture
 from patina.core.job import CaptureResult, FitJob
 from patina.core.job.warnings import black_photos
 from patina.core.photo import read_encoded
 from patina.core.report import display, figures, result_json, write_report
-from patina.core.report.polar import Curve, polar_chart, slice_angles
 from patina.core.report.sphere import lit_sphere
 from tests import make_capture as made
 from tests.sampled import sampled
@@ -120,43 +117,6 @@ def test_white_sphere_has_the_radiance_of_lambert() -> None:
     radiance, coverage = lit_sphere(lambda a: np.full((len(a.theta_h), 3), 1 / np.pi), 101)
     assert radiance.max() == pytest.approx(1.0, abs=0.02)
     assert coverage[50, 50] == 1 and coverage[0, 0] == 0
-
-
-def test_a_slice_stays_in_its_plane() -> None:
-    """At the mirror direction no azimuth is defined; the slice keeps the plane's own."""
-    for incidence in (15, 45, 70):
-        theta_o, angles = slice_angles(np.radians(incidence))
-        assert not angles.phi_d.any() and angles.theta_h.min() < 1e-6
-        half = np.abs(theta_o - np.radians(incidence)) / 2
-        assert np.allclose(angles.theta_h, half, atol=1e-6)
-        assert np.allclose(angles.theta_d, np.abs(theta_o + np.radians(incidence)) / 2, atol=1e-6)
-
-
-def test_polar_chart_is_wellformed_and_scaled() -> None:
-    from xml.etree import ElementTree
-
-    chart = polar_chart([Curve("x", lambda a: np.full((len(a.theta_h), 3), 0.3))], 45)
-    tree = ElementTree.fromstring(chart)
-    lines = [e for e in tree.iter() if e.tag.endswith("polyline")]
-    assert len(lines) == 3
-    tops = [min(float(p.split(",")[1]) for p in e.get("points").split()) for e in lines]
-    assert np.allclose(tops, 172 - 150 * np.cbrt(0.3 / 0.5), atol=0.2)
-
-
-def test_the_shaded_interval_lies_around_the_curve() -> None:
-    from xml.etree import ElementTree
-
-    def flat(rho: float) -> Callable[[Angles], np.ndarray]:
-        return lambda a: np.full((len(a.theta_h), 3), rho)
-
-    curve = Curve("x", flat(0.3), lambda a: (flat(0.2)(a), flat(9.0)(a)))
-    tree = ElementTree.fromstring(polar_chart([curve], 45))
-    shapes = [e for e in tree.iter() if e.tag.endswith("polygon")]
-    assert len(shapes) == 3
-    height = [172 - float(p.split(",")[1]) for p in shapes[0].get("points").split()]
-    assert max(height) == pytest.approx(150, abs=0.1)  # as far as the chart reaches
-    n = len(height) // 2
-    assert max(height[:n]) == pytest.approx(150 * np.cbrt(0.2 / 0.5), abs=0.1)
 
 
 def test_metrics_of_known_differences() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from patina.core.basis import PrincipalBRDF
 from patina.core.fit import PaperSettings, fit_paper
-from patina.core.report.polar import slice_angles
+from patina.core.views.polar import slice_angles
 
 from . import estimators, materials, metrics, scenes
 from .runs import Records

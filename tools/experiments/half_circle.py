@@ -8,7 +8,8 @@ from xml.sax.saxutils import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from patina.core.report.polar import COLOURS, round_up, slice_angles
+from patina.core.views.polar import slice_angles
+from patina.core.views.subject import COLOURS, round_up
 
 from .svg import FAINT
 

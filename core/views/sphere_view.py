@@ -1,0 +1,42 @@
+"""The lit sphere large, and beside it another fit's and what differs."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..report import display
+from ..report.sphere import lit_sphere
+from .drawing import INK, Drawing, Label, Part, Picture
+from .raster import PAPER
+from .subject import Subject
+
+ACROSS, TOP, GAP, PIXELS = 200.0, 20.0, 14.0, 400
+FULL = 0.30  # of white, for a difference's full colour
+
+
+def sphere_view(subject: Subject, other: Subject | None = None, exposure: float = 0.0) -> Drawing:
+    """Under a key light of irradiance π and a rim light; exposure: in stops."""
+    gain = 2.0**exposure
+    mine, coverage = lit_sphere(subject.evaluate, PIXELS)
+    shown = [(subject.label, display.srgb(mine * gain))]
+    if other is not None:
+        its, _ = lit_sphere(other.evaluate, PIXELS)
+        difference = display.difference_picture(its * gain, mine * gain, FULL)
+        shown += [(other.label, display.srgb(its * gain)), ("difference", difference)]
+    parts: list[Part] = []
+    for place, (label, pixels) in enumerate(shown):
+        left = GAP + place * (ACROSS + GAP)
+        parts.append(Label(left + ACROSS / 2, TOP - 7, label, "middle", INK))
+        parts.append(Picture(left, TOP, ACROSS, ACROSS, _on_paper(pixels, coverage)))
+    told = f"exposure {exposure:+.1f} stops"
+    if other is not None:
+        told += f" · difference: blue darker, red brighter, full at {100 * FULL:.0f} % of white"
+    parts.append(Label(GAP, TOP + ACROSS + 16, told))
+    width = GAP + len(shown) * (ACROSS + GAP)
+    return Drawing(width, TOP + ACROSS + 26, "lit sphere", tuple(parts))
+
+
+def _on_paper(pixels: NDArray[np.uint8], coverage: NDArray[np.floating]) -> NDArray[np.uint8]:
+    paper = np.array([int(PAPER[k : k + 2], 16) for k in (1, 3, 5)], np.float32)
+    return (paper + coverage[..., None] * (pixels - paper) + 0.5).astype(np.uint8)

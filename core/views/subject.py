@@ -1,0 +1,102 @@
+"""What charts are drawn of, and how they show it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import Angles
+from ..samples import MeasuredPoints
+
+Evaluate = Callable[[Angles], NDArray[np.floating]]
+Channels = Literal["rgb", "r", "g", "b", "mean"]
+Scale = Literal["cube_root", "linear", "log"]
+
+COLOURS = ("#d62728", "#2a9d3a", "#1f5fd6")
+MEAN = "#333944"
+DECADES = 3.0  # below the top, of a logarithmic scale
+OTHER_DASH = (5.0, 3.0)
+RINGS = {"cube_root": (1.0, 0.3, 0.1, 0.03, 0.01), "linear": (1.0, 0.75, 0.5, 0.25),
+         "log": (1.0, 0.1, 0.01)}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One fit. evaluate(angles) → ρ (n, 3) in 1/sr. interval(angles) → (low, high) (n, 3), the 90 %
+    one. points: what was measured."""
+
+    label: str
+    evaluate: Evaluate
+    interval: Callable[[Angles], tuple[NDArray[np.floating], NDArray[np.floating]]] | None = None
+    points: MeasuredPoints | None = None
+
+
+@dataclass(frozen=True)
+class Show:
+    """scale: of reflectance. cosine: times cos θi, what a surface sends out for a light. channels:
+    each of R, G and B, one of them, or their mean."""
+
+    scale: Scale = "cube_root"
+    cosine: bool = False
+    channels: Channels = "rgb"
+
+    @property
+    def colours(self) -> tuple[str, ...]:
+        """Of the curves."""
+        if self.channels == "mean":
+            return (MEAN,)
+        return COLOURS if self.channels == "rgb" else (COLOURS["rgb".index(self.channels)],)
+
+    @property
+    def unit(self) -> str:
+        """What is shown."""
+        return "ρ cos θi, 1/sr" if self.cosine else "ρ, 1/sr"
+
+    @property
+    def way(self) -> str:
+        """How lengths stand for it."""
+        return {"cube_root": "cube root", "linear": "linear", "log": "logarithmic"}[self.scale]
+
+    def channelled(self, rho: NDArray[np.floating]) -> NDArray[np.float64]:
+        """(n, 3) → (n, c) of the channels that are shown."""
+        if self.channels == "mean":
+            return np.asarray(rho, np.float64).mean(axis=1, keepdims=True)
+        if self.channels == "rgb":
+            return np.asarray(rho, np.float64)
+        place = "rgb".index(self.channels)
+        return np.asarray(rho, np.float64)[:, place : place + 1]
+
+    def values(
+        self, rho: NDArray[np.floating], cos_i: NDArray[np.floating] | float
+    ) -> NDArray[np.float64]:
+        """(n, 3) ρ → (n, c) what is shown, not below 0; cos_i: (n,) or one."""
+        found = np.maximum(self.channelled(rho), 0.0)
+        return found * np.broadcast_to(cos_i, len(found))[:, None] if self.cosine else found
+
+    def length(self, value: NDArray[np.floating] | float, top: float) -> NDArray[np.float64]:
+        """0 … 1 of a scale that ends at ``top``."""
+        part = np.clip(np.asarray(value, np.float64) / top, 0.0, None)
+        if self.scale == "linear":
+            return part
+        if self.scale == "log":
+            return np.maximum(1 + np.log10(np.maximum(part, 1e-12)) / DECADES, 0.0)
+        return np.cbrt(part)
+
+    def rings(self) -> tuple[float, ...]:
+        """Parts of the top where the scale has a line."""
+        return RINGS[self.scale]
+
+
+def round_up(x: float) -> float:
+    """The next of 1, 2, 5 × 10ⁿ."""
+    power = 10.0 ** np.floor(np.log10(max(x, 1e-9)))
+    return float(next(m * power for m in (1, 2, 5, 10) if m * power >= x * (1 - 1e-9)))
+
+
+def dark(colour: str) -> NDArray[np.uint8]:
+    """(3,) the colour of the points over a curve of that colour."""
+    return np.array([int(colour[k : k + 2], 16) * 2 // 3 for k in (1, 3, 5)], np.uint8)

@@ -1,0 +1,64 @@
+"""Below the fit: views of a measured material, and how to look at them."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..operators.views import ITEMS
+from ..scene.views import FILE, MATERIAL, looked_at
+
+ICONS = {
+    "sphere": "MATERIAL", "polar": "LIGHT_SPOT", "highlight": "FCURVE", "slice": "IMAGE_DATA",
+    "interval": "MOD_NOISE", "ratio": "MOD_MIRROR",
+}  # fmt: skip
+ANGLES = {"polar": "incidence", "highlight": "theta_d", "slice": "phi_d", "interval": "phi_d",
+          "ratio": "phi_d"}  # fmt: skip
+
+
+class PATINA_PT_views(bpy.types.Panel):
+    bl_idname = "PATINA_PT_views"
+    bl_label = "Views"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Patina"
+    bl_parent_id = "PATINA_PT_fit"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return looked_at(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, views = self.layout, context.scene.patina_views
+        layout.label(text=looked_at(context).name, icon="MATERIAL")
+        layout.prop(views, "material", text="Instead")
+        layout.prop(views, "against")
+        if views.against == MATERIAL:
+            layout.prop(views, "other", text="")
+        elif views.against == FILE:
+            layout.prop(views, "file", text="")
+        grid = layout.grid_flow(columns=2, even_columns=True, align=True, row_major=True)
+        for kind, name, _ in ITEMS:
+            depressed = views.shown == kind
+            grid.operator(
+                "patina.show_chart", text=name, icon=ICONS[kind], depress=depressed
+            ).kind = kind
+        if views.shown == "sphere":
+            layout.prop(views, "exposure", slider=True)
+            return
+        column = layout.column()
+        column.active = bool(views.shown)
+        column.row().prop(views, "scale", expand=True)
+        column.row().prop(views, "channels", expand=True)
+        row = column.row()
+        row.prop(views, "cosine")
+        if views.shown in ANGLES:
+            row.prop(views, ANGLES[views.shown])
+
+
+def register() -> None:
+    bpy.utils.register_class(PATINA_PT_views)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(PATINA_PT_views)

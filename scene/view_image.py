@@ -1,0 +1,33 @@
+"""Pictures that Patina makes, as images that an Image Editor shows."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+VIEW = "patina_view"  # on the image: which view it is
+
+
+def put_view(kind: str, pixels: NDArray[np.uint8]) -> bpy.types.Image:
+    """Show (h, w, 3) display pixels as the image of that view; it stays in the .blend."""
+    height, width, _ = pixels.shape
+    image = view_image(kind)
+    if image is None:
+        image = bpy.data.images.new(f"Patina: {kind}", width, height)
+        image[VIEW] = kind
+        image.use_fake_user = True  # editors that show it are no users that a file counts
+    elif tuple(image.size) != (width, height):
+        image.scale(width, height)
+    rgba = np.ones((height, width, 4), np.float32)
+    rgba[..., :3] = pixels[::-1] / np.float32(255)  # Blender's rows go up
+    image.pixels.foreach_set(rgba.ravel())
+    image.update()
+    image.pack()  # or Blender would ask to save it, and a reload would lose it
+    return image
+
+
+def view_image(kind: str) -> bpy.types.Image | None:
+    """That of a view where it was shown before."""
+    mine = (i for i in bpy.data.images if i.get(VIEW) == kind and i.library is None)
+    return next(mine, None)

@@ -1,0 +1,109 @@
+"""Charts of a measured material: they are in the .blend, show what was measured, and follow."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from support import extension
+from test_workflow import folder, made
+
+FIT = "[fit]\nheld_out = false"
+
+
+def fitted(photos: int = 3) -> bpy.types.Material:
+    path = made().make_capture(folder() / "ball", photos=photos, extra=FIT)
+    assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
+    assert bpy.ops.patina.fit() == {"FINISHED"}
+    return bpy.data.materials["surface"]
+
+
+def pixels(image: bpy.types.Image) -> np.ndarray:
+    found = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(found)
+    return found.reshape(image.size[1], image.size[0], 4)
+
+
+def view(kind: str) -> bpy.types.Image:
+    assert bpy.ops.patina.show_chart(kind=kind) == {"FINISHED"}
+    return extension("scene.view_image").view_image(kind)
+
+
+def test_every_chart_is_shown_and_survives_a_reload() -> None:
+    views, kept = bpy.context.scene.patina_views, extension("scene.charted")
+    assert not bpy.ops.patina.show_chart.poll(), "there is nothing to show yet"
+    material = fitted()
+    subject = kept.subject_of(material)
+    assert 100 < len(subject.points) <= 6000 and subject.interval is not None
+    job = extension("scene.last_fit").kept_fit(
+        material["patina_capture"],
+        extension("scene.properties").stored_result(material["patina_capture"]),
+    )
+    kept_points, points = job.materials[0].points, subject.points
+    assert np.array_equal(points.rho, kept_points.rho)
+    low, high = subject.interval(points.angles)
+    mine = job.materials[0].fit.interval(points.angles)
+    assert np.allclose(low, mine[0], rtol=1e-5) and np.allclose(high, mine[1], rtol=1e-5)
+    inside = ((points.rho > 0.5 * low) & (points.rho < 2 * high)).mean()
+    assert inside > 0.5, f"{inside:.2f} of the samples are near the interval of the fit to them"
+    pictures = {}
+    for kind in ("sphere", "polar", "highlight", "slice", "interval"):
+        pictures[kind] = pixels(view(kind))
+        assert pictures[kind][..., :3].std() > 0.02, kind
+    views = bpy.context.scene.patina_views
+    assert views.shown == "interval"
+    path = str(folder() / "views.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    find = extension("scene.view_image").view_image
+    assert np.array_equal(pixels(find("slice")), pictures["slice"]), "the image was not packed"
+    assert np.array_equal(pixels(view("highlight")), pictures["highlight"])
+
+
+def test_a_chart_follows_its_settings() -> None:
+    fitted()
+    views = bpy.context.scene.patina_views
+    image = view("polar")
+    before = pixels(image)
+    for name, value in (("scale", "log"), ("channels", "g"), ("cosine", True), ("incidence", 1.0)):
+        setattr(views, name, value)
+        after = pixels(image)
+        assert not np.array_equal(after, before), name
+        before = after
+    assert len([i for i in bpy.data.images if "patina_view" in i]) == 1
+
+
+def test_fits_are_compared() -> None:
+    material = fitted()
+    charted, views = extension("scene.charted"), bpy.context.scene.patina_views
+    views.against = "EARLIER"
+    assert not charted.has_earlier(material)
+    try:
+        bpy.ops.patina.show_chart(kind="ratio")
+    except RuntimeError as error:
+        assert "fitted once" in str(error)
+    else:
+        raise AssertionError("a ratio to nothing")
+    assert bpy.ops.patina.fit() == {"FINISHED"}
+    material = bpy.data.materials["surface"]
+    assert not charted.has_earlier(material), "it found the same again"
+    material["patina_coefficients"] = [1.2 * c for c in material["patina_coefficients"]]
+    changed = list(material["patina_coefficients"])
+    assert bpy.ops.patina.fit() == {"FINISHED"}
+    material = bpy.data.materials["surface"]
+    assert material.name == "surface" and list(material["patina_earlier_coefficients"]) == changed
+    alone = pixels(view("ratio"))
+    views.against = "CHANGED"
+    assert not np.array_equal(pixels(view("ratio")), alone), "unmoved traits are the fit itself"
+    views.against = "MATERIAL"
+    views.other = material
+    same = pixels(view("ratio"))[150, 400, :3]
+    assert np.allclose(same, same[0], atol=0.01), "a material differs from itself"
+    views.against = "FILE"
+    path = folder() / "itself.binary"
+    extension("core.brdf.merl_file").write(
+        path,
+        extension("core.brdf").TabulatedBRDF.from_function(charted.subject_of(material).evaluate),
+    )
+    views.file = str(path)
+    same = pixels(view("ratio"))[150, 400, :3]
+    assert np.allclose(same, same[0], atol=0.05), "its own table differs"
