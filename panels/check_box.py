@@ -19,17 +19,16 @@ def draw_check(
     causes: bpy.types.bpy_prop_collection,
 ) -> None:
     """diagnosis: the content of diagnosis.json; causes: PatinaCause, what can be switched off."""
-    told = [
-        ("Left-out parts", diagnosis["baseline"]["held_out"], diagnosis["extended"]["held_out"])
-    ]
-    for one in diagnosis["materials"]:
-        told.append(
-            (f"{one['name']}: unseen photos", one["held_out_before"], one["held_out_after"])
-        )
-    for label, before, after in told:
+    base, extended = diagnosis["baseline"], diagnosis["extended"]
+    told = [("Left-out parts, RMS", base["held_out"], extended["held_out"])]
+    for one in diagnosis["materials"]:  # of a file that an earlier version checked: no typical ones
+        told.append((one["name"], one.get("typical_before"), one.get("typical_after")))
+    for place, (label, before, after) in enumerate(told):
         if before is not None and after is not None:
+            if place == 1:
+                layout.label(text="Unseen photos, typical pixel:")
             row = layout.row()
-            row.label(text=label)
+            row.label(text=label, icon="MATERIAL" if place else "NONE")
             row.label(text=f"{100 * before:.1f} → {100 * after:.1f} %")
     show = layout.operator("patina.show_evidence", text="What is Missed", icon="OVERLAY")
     show.cause = MISSED

@@ -152,7 +152,7 @@ def _worse(before: Sequence[MaterialResult], after: Sequence[Again]) -> str | No
     if grown < MORE:
         return None
     said = ", ".join(f"{100 * a:.1f} to {100 * b:.1f} %" for a, b in known)
-    return f"with it, errors of unseen photos grow from {said}"
+    return f"with it, RMS errors of unseen photos grow from {said}"
 
 
 def _applied(trial: Trial, model: Model) -> Applied:

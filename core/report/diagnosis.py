@@ -135,7 +135,11 @@ def _materials(folder: Path, before: CaptureResult, after: CaptureResult) -> str
             name = f"sphere_{one.name}_{suffix}.png"
             write_sphere(folder / name, material.fit.brdf.evaluate)
             held = material.held_out
-            told = "" if held is None else f": unseen photos to {100 * held.error:.1f} % RMS"
+            told = (
+                ""
+                if held is None
+                else f": unseen photos to {100 * held.typical:.1f} % (RMS {100 * held.error:.1f} %)"
+            )
             cells += (
                 f"<figure><img src='{escape(quote(name))}' alt='lit sphere, {said}'>"
                 f"<figcaption>{escape(one.name)}, {said}{told}</figcaption></figure>"

@@ -16,7 +16,7 @@ FORMAT = 2
 
 def describe(found: Found, before: CaptureResult, after: CaptureResult) -> dict[str, Any]:
     """The content of diagnosis.json; before, after: the fits without and with what was named.
-    Gains are nats; angles are radians."""
+    Gains are nats; angles are radians; held_out of materials is RMS, typical the median pixel."""
     tried = {t.effect.cause for trials in found.rounds for t in trials}
     return {
         "format": FORMAT,
@@ -41,6 +41,8 @@ def describe(found: Found, before: CaptureResult, after: CaptureResult) -> dict[
                 "coefficients_after": other.fit.brdf.coefficients.tolist(),
                 "held_out_before": None if one.held_out is None else one.held_out.error,
                 "held_out_after": None if other.held_out is None else other.held_out.error,
+                "typical_before": None if one.held_out is None else one.held_out.typical,
+                "typical_after": None if other.held_out is None else other.held_out.typical,
             }
             for one, other in zip(before.materials, after.materials, strict=True)
         ],
