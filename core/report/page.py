@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from html import escape
 from pathlib import Path
-from urllib.parse import quote
 
 import numpy as np
 
-from ..fit.measured_result import MeasuredResult
 from ..geometry import PixelRays, bands, view_window
-from ..job import CaptureResult, MaterialResult, inputs
+from ..job import CaptureResult, inputs
 from ..photo import write_png
 from ..predict.compose import predict_photo
-from ..views.polar import NEAR_PLANE, polar
-from ..views.subject import Subject
-from ..views.svg import svg
 from . import display
-from .figures import figures
-from .sphere import Reflector, write_sphere
+from .material_section import material_section
 
 STYLE = Path(__file__).parents[2] / "assets" / "report" / "style.css"
 LONGEST = 640
@@ -34,7 +28,7 @@ def write_report(folder: Path, result: CaptureResult) -> Iterator[float]:
     count = len(result.materials) + len(result.capture.photos)
     for done, material in enumerate(result.materials):
         yield done / count
-        body.append(_material_section(folder, material, photos))
+        body.append(material_section(folder, material, photos))
     if not result.effects:  # these predictions know the capture's own light and camera only
         yield from _photo_rows(folder, result, body)
     head = (
@@ -54,53 +48,6 @@ def page(name: str, body: str, head: str = "") -> str:
         f"<style>{STYLE.read_text('utf-8')}</style><h1>Patina report</h1><p class='sub'>{told}</p>"
         f"{body}</html>"
     )
-
-
-def _material_section(folder: Path, material: MaterialResult, photos: Sequence[str]) -> str:
-    fit, brdf = material.fit, material.fit.brdf
-    interval = fit.interval if isinstance(fit, MeasuredResult) else None
-    spheres = _spheres(folder, material)
-    subject = Subject("fit", brdf.evaluate, interval, material.points)
-    charts = "".join(
-        f"<figure>{svg(polar([subject], incidence))}</figure>" for incidence in (15, 45, 70)
-    )
-    warnings = "".join(f"<p class='warn'>{escape(w)}</p>" for w in material.warnings)
-    rows = "".join(
-        f"<tr><th>{escape(key)}</th><td>{escape(value)}</td></tr>"
-        for key, value in figures(material, photos)
-    )
-    shaded = "" if interval is None else "; shaded: the 90 % interval"
-    return (
-        f"<h2>{escape(material.name)}</h2>{warnings}<div class='triple'>{spheres}</div>"
-        f"<p class='sub'>Lit spheres, key light π at the upper left. Error: of the cube root of "
-        f"ρ cos θ over all directions.</p><table>{rows}</table>"
-        f"<div class='charts'>{charts}</div><p class='sub'>Reflectance in the plane of incidence, "
-        f"light from the left; a curve for each of red, green and blue{shaded}; dots: "
-        f"samples within {np.degrees(NEAR_PLANE):.0f}° of it.</p>"
-    )
-
-
-def _spheres(folder: Path, material: MaterialResult) -> str:
-    """Figures of the measured BRDF, its lobe stack and its Principled, side by side."""
-    lobes, principled = material.lobes, material.principled
-    shown: list[tuple[str, str, Reflector]] = [
-        ("", "measured: Cycles with OSL", material.fit.brdf.evaluate),
-        ("_lobes", f"lobe stack: EEVEE, error {100 * lobes.error:.1f} %", lobes.stack),
-        (
-            "_principled",
-            f"Principled: exports, error {100 * principled.error:.1f} %",
-            principled.principled,
-        ),
-    ]
-    cells = []
-    for suffix, label, reflector in shown:
-        name = f"sphere_{material.name}{suffix}.png"
-        write_sphere(folder / name, reflector)
-        cells.append(
-            f"<figure><img src='{escape(quote(name))}' alt='lit sphere, {label}'>"
-            f"<figcaption>{label}</figcaption></figure>"
-        )
-    return "".join(cells)
 
 
 def _photo_rows(folder: Path, result: CaptureResult, body: list[str]) -> Iterator[float]:

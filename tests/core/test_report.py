@@ -39,7 +39,7 @@ def test_the_page_shows_every_picture_it_names(result: CaptureResult, tmp_path: 
     assert fractions == sorted(fractions) and len(fractions) == 4
     page = (tmp_path / "report" / "index.html").read_text()
     pictures = {p.name for p in (tmp_path / "report").glob("*.png")}
-    assert len(pictures) == 3 * 3 + 3
+    assert len(pictures) == 3 * 3 + 3 + 2  # photos, spheres, slices
     assert all(f"src='{name}'" in page for name in pictures)
     assert "http" not in page.replace("http://www.w3.org/2000/svg", "")
     assert read_encoded(tmp_path / "report" / "photo_00_predicted.png").mean() > 0.05
@@ -102,7 +102,7 @@ def test_samples_left_out_are_told(result: CaptureResult) -> None:
 def test_the_page_says_how_sure_it_is(result: CaptureResult, tmp_path: Path) -> None:
     list(write_report(tmp_path / "report", result))
     page = (tmp_path / "report" / "index.html").read_text()
-    assert page.count("<polygon") == 9  # three charts, three channels
+    assert page.count("<polygon") == 12  # four charts, three channels
     assert "90 % interval" in page and "every one of them used" in page
 
 
