@@ -1,13 +1,19 @@
-"""Charts of a measured material, shown in an Image Editor."""
+"""Charts of a measured material and looks at a photo, shown in an Image Editor."""
 
 from __future__ import annotations
 
 import bpy
 
 from ..core.errors import PatinaError
+from ..scene.apply import measured_of
 from ..scene.image_editor import show_image
+from ..scene.photo_list import looked_at as photo_of
+from ..scene.photo_looked import look_job, show_photo_view
+from ..scene.properties import capture_path
 from ..scene.views import looked_at, show_chart
+from .fit import fit_job
 from .report_errors import refuse
+from .stepped import Stepped
 
 ITEMS = (
     ("sphere", "Lit Sphere", "Under a key light and a rim light"),
@@ -17,6 +23,13 @@ ITEMS = (
     ("slice", "Image Slice", "The BRDF over half and difference angle, and the samples"),
     ("interval", "Certainty", "How far off the BRDF may be, over half and difference angle"),
     ("ratio", "Ratio", "The BRDF that it is compared with, divided by this one"),
+)  # fmt: skip
+
+PHOTO_ITEMS = (
+    ("comparison", "Photo and Prediction", "The photo, what the materials predict for it, and the "
+     "signed difference"),
+    ("samples", "Where Samples Came From", "Which pixels were measured, and by which criterion the "
+     "others were left out"),
 )  # fmt: skip
 
 
@@ -50,9 +63,54 @@ an Image Editor"""
         return {"FINISHED"}
 
 
+class PATINA_OT_look_at_photo(Stepped, bpy.types.Operator):
+    """Look at the photo whose camera is looked through: beside its prediction, or where samples \
+came from"""
+
+    bl_idname = "patina.look_at_photo"
+    bl_label = "Look at Photo"
+    PANEL = "fit"
+    bl_options = {"REGISTER", "UNDO"}
+
+    kind: bpy.props.EnumProperty(name="View", items=PHOTO_ITEMS)  # type: ignore[valid-type]
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, properties: object) -> str:
+        return next(said for key, _, said in PHOTO_ITEMS if key == properties.kind)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if photo_of(context.scene) is None:
+            cls.poll_message_set("Look through a lit photo's camera first: Photos & Light")
+            return False
+        if not measured_of(capture_path(context.scene)):
+            cls.poll_message_set("Fit first: this capture has no measured material in this file")
+            return False
+        return cls.idle(context)
+
+    def _start(self, context: bpy.types.Context) -> None:
+        scene = context.scene
+        self._job = look_job(scene, fit_job(self, scene), photo_of(scene).place)
+        self._scene = scene.name
+
+    def _finish(self, context: bpy.types.Context) -> None:
+        scene = bpy.data.scenes.get(self._scene)
+        if scene is None or self._job.view is None:
+            self.report({"WARNING"}, "The scene is gone; the photo was not looked at")
+            return
+        image = show_photo_view(self._job.view, self.kind, scene.patina_views.exposure)
+        scene.patina_views.shown = self.kind
+        show_image(context, image)
+
+
+CLASSES = (PATINA_OT_show_chart, PATINA_OT_look_at_photo)
+
+
 def register() -> None:
-    bpy.utils.register_class(PATINA_OT_show_chart)
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
 
 
 def unregister() -> None:
-    bpy.utils.unregister_class(PATINA_OT_show_chart)
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import bpy
 
-from ..operators.views import ITEMS
+from ..operators.views import ITEMS, PHOTO_ITEMS
 from ..scene.views import FILE, MATERIAL, looked_at
 
 ICONS = {
     "sphere": "MATERIAL", "polar": "LIGHT_SPOT", "highlight": "FCURVE", "slice": "IMAGE_DATA",
-    "interval": "MOD_NOISE", "ratio": "MOD_MIRROR",
+    "interval": "MOD_NOISE", "ratio": "MOD_MIRROR", "comparison": "IMAGE_REFERENCE",
+    "samples": "EYEDROPPER",
 }  # fmt: skip
 ANGLES = {"polar": "incidence", "highlight": "theta_d", "slice": "phi_d", "interval": "phi_d",
           "ratio": "phi_d"}  # fmt: skip
+EXPOSED = ("sphere", "comparison")
 
 
 class PATINA_PT_views(bpy.types.Panel):
@@ -43,17 +45,23 @@ class PATINA_PT_views(bpy.types.Panel):
             grid.operator(
                 "patina.show_chart", text=name, icon=ICONS[kind], depress=depressed
             ).kind = kind
-        if views.shown == "sphere":
+        layout.separator()
+        column = layout.column(align=True)
+        for kind, name, _ in PHOTO_ITEMS:
+            depressed = views.shown == kind
+            column.operator(
+                "patina.look_at_photo", text=name, icon=ICONS[kind], depress=depressed
+            ).kind = kind
+        if views.shown in EXPOSED:
             layout.prop(views, "exposure", slider=True)
+        if views.shown not in ANGLES:
             return
         column = layout.column()
-        column.active = bool(views.shown)
         column.row().prop(views, "scale", expand=True)
         column.row().prop(views, "channels", expand=True)
         row = column.row()
         row.prop(views, "cosine")
-        if views.shown in ANGLES:
-            row.prop(views, ANGLES[views.shown])
+        row.prop(views, ANGLES[views.shown])
 
 
 def register() -> None:

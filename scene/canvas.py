@@ -19,7 +19,7 @@ from ..core.errors import PatinaError
 from ..core.job.photos import LitPhotos
 from ..core.masks.carry import NONE, carried
 from ..core.masks.strokes import overlaid, strokes
-from ..core.report.display import srgb, white_level
+from ..core.views.display import srgb, white_level
 from .handlers import attach, detach
 from .mask_images import mask_images, read_mask_image, read_pixels, store_mask, write_pixels
 from .paints import ERASE, Paint, paints, palette, wear, worn_slots

@@ -21,8 +21,8 @@ from ..core.appearance.osl_atlas import TRAITS, traits
 from ..core.appearance.traits import Looked, Movable, MovableAlbedo, beyond_measured, excess, moved
 from ..core.basis import Basis, PrincipalBRDF
 from ..core.errors import PatinaError
-from ..core.report.sphere import LitSphere
 from ..core.result.bases import basis_of_version
+from ..core.views.sphere import LitSphere
 from .materials import BASIS, COEFFICIENTS, MEASURED
 from .preview import SMALL, Picture
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.capture.model import LEFT_OUT
-from ..core.report.display import srgb
+from ..core.views.display import srgb
 from .face_slots import COLOURS, shown_name
 
 OUT_COLOURS = {"shadow": (91, 42, 134), "highlight": (255, 255, 255), "ignore": (255, 0, 160)}

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.basis import PrincipalBRDF
-from ..core.report import display
-from ..core.report.sphere import lit_sphere
+from ..core.views import display
+from ..core.views.sphere import lit_sphere
 
 SIZE, SMALL = 256, 32  # pixels across a preview, and an icon
 

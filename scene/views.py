@@ -12,11 +12,13 @@ import bpy
 from ..core.brdf import merl_file
 from ..core.errors import PatinaError
 from ..core.views.charts import CHARTS, View, chart, most_measured
+from ..core.views.photo_drawing import KINDS
 from ..core.views.raster import raster
 from ..core.views.subject import Show, Subject
 from .charted import earlier_subject, subject_of
 from .materials import MEASURED
 from .moved import moved_brdf
+from .photo_looked import show_again
 from .traits import shown_material
 from .view_image import put_view, view_image
 
@@ -45,8 +47,12 @@ CHANNELS = (
 
 
 def _changed(views: PatinaViews, context: bpy.types.Context) -> None:
-    """The chart that was shown last follows."""
-    if views.shown in CHARTS and view_image(views.shown) is not None:
+    """What was shown last follows."""
+    if view_image(views.shown) is None:
+        return
+    if views.shown in KINDS:
+        show_again(views.shown, views.exposure)
+    elif views.shown in CHARTS:
         try:
             show_chart(context, views.shown)
         except PatinaError as error:

@@ -22,8 +22,8 @@ def run(data: Path) -> None:
     from patina.core.appearance.osl_atlas import TRAITS
     from patina.core.appearance.traits import Looked, Movable, MovableAlbedo
     from patina.core.basis import Basis, PrincipalBRDF
-    from patina.core.report import display
-    from patina.core.report.sphere import LitSphere
+    from patina.core.views import display
+    from patina.core.views.sphere import LitSphere
 
     basis = Basis.default()
     text = DOCUMENT.read_text(encoding="utf-8")

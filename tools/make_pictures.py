@@ -33,7 +33,7 @@ def main() -> int:
     from patina.commands.fit import fit_to_folder
     from patina.core.geometry import view_surface
     from patina.core.job import inputs
-    from patina.core.report import display
+    from patina.core.views import display
 
     from .hunt.picture import make as diagnosis_picture
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..report.sphere import KEY
 from ..result import FittedMaterial
+from ..views.sphere import KEY
 from .file_names import identifier
 from .table_files import log_table_arrays, write_npz
 

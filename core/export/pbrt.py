@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..report.sphere import KEY
+from ..views.sphere import KEY
 from .mitsuba import IRRADIANCE
 
 SCENE = """# A unit sphere of {title}, seen along -z, under one distant light; pbrt NAME.pbrt

@@ -66,7 +66,9 @@ def fit_paper(
     s = settings or PaperSettings()
     warnings: list[str] = []
     reliable = np.flatnonzero(
-        np.ones(len(table), bool) if s.curvature is None else reliability.calm(table, s.curvature)
+        np.ones(len(table), bool)
+        if s.curvature is None
+        else reliability.calm(table.curvature, s.curvature)
     )
     if len(reliable) < 4 * s.samples:
         raise FitError(

@@ -9,10 +9,11 @@ from ..angles import half_difference
 from ..samples import SampleTable
 
 
-def calm(table: SampleTable, threshold: float) -> NDArray[np.bool_]:
-    """(n,) samples where the screen-space mean curvature is known and at most the threshold."""
+def calm(curvature: NDArray[np.floating], threshold: float) -> NDArray[np.bool_]:
+    """(n,) where the screen-space mean curvature (n,), 1/pixel, is known and at most the
+    threshold."""
     with np.errstate(invalid="ignore"):
-        return np.abs(table.curvature) <= threshold
+        return np.abs(curvature) <= threshold
 
 
 def monotone_with(

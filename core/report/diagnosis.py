@@ -13,9 +13,9 @@ from ..diagnose.effect import Setting
 from ..diagnose.search import Found, Trial
 from ..job import CaptureResult
 from ..photo import write_png
+from ..views.sphere import write_sphere
 from .page import page
 from .residual_picture import photo_most_changed, residual_picture
-from .sphere import write_sphere
 from .trend_chart import trend_chart
 
 MOST_SHOWN = 6  # charts: those along which the residual changes most

@@ -15,10 +15,10 @@ from ..photo import write_png
 from ..views.charts import View, chart, most_measured
 from ..views.polar import NEAR_PLANE, polar
 from ..views.raster import raster
+from ..views.sphere import Reflector, write_sphere
 from ..views.subject import Subject
 from ..views.svg import svg
 from .figures import figures
-from .sphere import Reflector, write_sphere
 
 
 def material_section(folder: Path, material: MaterialResult, photos: Sequence[str]) -> str:

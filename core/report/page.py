@@ -6,18 +6,17 @@ from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
-import numpy as np
-
-from ..geometry import PixelRays, bands, view_window
-from ..job import CaptureResult, inputs
+from ..fit import PaperFit
+from ..job import CaptureResult
 from ..photo import write_png
-from ..predict.compose import predict_photo
-from . import display
+from ..samples import Criterion
+from ..steps import drained
+from ..views import photo_pictures, photo_view
+from ..views.criteria import LOOKS, Look
 from .material_section import material_section
 
 STYLE = Path(__file__).parents[2] / "assets" / "report" / "style.css"
 LONGEST = 640
-ROWS = 256  # of a photo at a time
 
 
 def write_report(folder: Path, result: CaptureResult) -> Iterator[float]:
@@ -53,61 +52,86 @@ def page(name: str, body: str, head: str = "") -> str:
 def _photo_rows(folder: Path, result: CaptureResult, body: list[str]) -> Iterator[float]:
     """Add all photos to the page; yields the fraction done of the whole."""
     count = len(result.materials) + len(result.capture.photos)
-    body.append(
-        "<h2>Photo, prediction, difference</h2><p class='sub'>Each prediction is made from the "
-        "scanned mesh, the light and the fitted materials: direct light and cast shadows. "
-        "Difference: <span class='key'></span> prediction too dark … too bright, full colour at "
-        "± 30 % of the photo's white. Dark grey: no surface or no material.</p>"
-    )
+    body.append("")  # what explains the rows comes once they are known
+    place_of_head, met = len(body) - 1, set[Criterion]()
     for place in range(len(result.capture.photos)):
         yield (len(result.materials) + place) / count
-        body.append(_photo_row(folder, result, place))
+        view = drained(
+            photo_view.look_at_photo(
+                result.capture,
+                result.scan,
+                result.rays,
+                result.photos,
+                result.lights,
+                [(m.name, m.fit.brdf, m.scale) for m in result.materials],
+                place,
+                photo_view.chosen_pixels([m.fit for m in result.materials], place),
+            )
+        )
+        met.update(view.shares)
+        body.append(_photo_row(folder, view))
+    paper = any(isinstance(m.fit, PaperFit) for m in result.materials)
+    body[place_of_head] = _head_of_photos(met, paper)
 
 
-def _photo_row(folder: Path, result: CaptureResult, place: int) -> str:
-    capture = result.capture
-    camera = inputs.camera_of(capture, result.scan, place)
-    light = result.lights.of(capture, place)
-    masks = inputs.photo_masks(capture, place)
-    lines = PixelRays.of(camera)
-    seen = np.zeros((camera.height, camera.width), bool)
-    predicted = np.full((*seen.shape, 3), np.nan, np.float32)
-    for window in bands(camera, halo=0, columns=result.rays.cover.columns(camera)):
-        view = view_window(result.rays, lines, window)
-        where, _ = inputs.material_pixels(capture, result.scan, view, place, masks)
-        parts = [(where[m.name], m.fit.brdf, m.scale) for m in result.materials]
-        target = slice(window.first, window.last), slice(window.left, window.right)
-        predicted[target] = predict_photo(result.rays, view, light, camera, parts).radiance
-        seen[target] = view.seen
-    measured = result.photos.read(place).radiance
-    box = display.crop_box(seen, margin=12)
-    a = display.shrink(measured[box], LONGEST)
-    b = display.shrink(predicted[box], LONGEST)
-    white = display.white_level(measured[box][seen[box]])
-    names = [f"photo_{place:02d}_{kind}.png" for kind in ("measured", "predicted", "difference")]
-    write_png(folder / names[0], display.photo_picture(a, white))
-    write_png(folder / names[1], display.photo_picture(b, white))
-    write_png(folder / names[2], display.difference_picture(b, a, 0.3 * white))
-    error = _relative_error(predicted, measured)
+def _head_of_photos(met: set[Criterion], ringed: bool) -> str:
+    """What the four pictures are; met: the criteria that some photo shows."""
+    rings = " Rings: the pixels that the fit rests on." if ringed else ""
+    looks = [LOOKS[criterion] for criterion in sorted(met)]
+    rows = "".join(
+        f"<tr><th>{_chip(look)}&nbsp;{escape(look.word)}</th><td>{escape(look.advice)}</td></tr>"
+        for look in looks
+    )
+    return (
+        "<h2>Photo, prediction, difference, where samples came from</h2><p class='sub'>Each "
+        "prediction is made from the scanned mesh, the light and the fitted materials: direct "
+        "light and cast shadows. Difference: <span class='key'></span> prediction too dark … too "
+        "bright, full colour at ± 30 % of the photo's white. Dark grey: no surface or no material. "
+        "The last picture says what decided about each pixel, the figures below it what part of "
+        f"the surface that is.{rings}</p><details><summary>What decides about a pixel, and what to "
+        f"do</summary><table>{rows}</table></details>"
+    )
+
+
+def _photo_row(folder: Path, view: photo_view.PhotoView) -> str:
+    pictures = {
+        **photo_pictures.compared(view, LONGEST)._asdict(),
+        "samples": photo_pictures.criteria_picture(view, LONGEST),
+    }
+    name = escape(view.name)
     labels = (
-        f"{escape(capture.photo_name(place))}: photo",
+        f"{name}: photo",
         "prediction",
-        f"difference, relative RMS {100 * error:.1f} %",
+        f"difference, relative RMS {100 * view.error:.1f} %",
+        "where samples came from",
     )
-    cells = "".join(
-        f"<figure><img src='{name}' alt='{label}' loading='lazy'><figcaption>{label}</figcaption>"
-        "</figure>"
-        for name, label in zip(names, labels, strict=True)
-    )
-    return f"<div class='triple'>{cells}</div>"
+    cells = ""
+    for (kind, picture), label in zip(pictures.items(), labels, strict=True):
+        file = f"photo_{view.place:02d}_{kind}.png"
+        write_png(folder / file, picture)
+        told = _counts(view) if kind == "samples" else ""
+        cells += (
+            f"<figure><img src='{file}' alt='{label}' loading='lazy'><figcaption>{label}{told}"
+            "</figcaption></figure>"
+        )
+    return f"<div class='quadruple'>{cells}</div>"
 
 
-def _relative_error(predicted: np.ndarray, measured: np.ndarray) -> float:
-    """‖L̂ − L‖ / ‖L‖ over all pixels with a prediction, edges and shadows included."""
-    missed = size = 0.0
-    for top in range(0, len(predicted), ROWS):
-        ours, photo = predicted[top : top + ROWS], measured[top : top + ROWS]
-        known = np.isfinite(ours[..., 0])
-        missed += float(np.sum(np.square((ours - photo)[known], dtype=np.float64)))
-        size += float(np.sum(np.square(photo[known], dtype=np.float64)))
-    return (missed / max(size, 1e-300)) ** 0.5
+def _counts(view: photo_view.PhotoView) -> str:
+    """Which part of the surface each criterion decided about, the largest first."""
+    shares = sorted(view.shares.items(), key=lambda item: -item[1])
+    rows = "".join(
+        f"<li title='{escape(LOOKS[c].advice, quote=True)}'>{_chip(LOOKS[c])}{_percent(share)} "
+        f"{escape(LOOKS[c].word)}</li>"
+        for c, share in shares
+    )
+    return f"<ul class='counts'>{rows}</ul>"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if share >= 0.01 else "&lt; 1 %"
+
+
+def _chip(look: Look) -> str:
+    red, green, blue = look.colour
+    return f"<span class='chip' style='background:rgb({red},{green},{blue})'></span>"

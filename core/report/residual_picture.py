@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..diagnose.pixels import Pixels
-from . import display
+from ..views import display
 
 LONGEST = 260
 WITHIN = 3.0  # typical distances between the pixels that were looked at

@@ -1,5 +1,6 @@
 """One table of reflectance samples: who saw what, under which angles, how reliable."""
 
+from .criterion import Criterion
 from .measured_points import MeasuredPoints
 from .reservoir import SampleReservoir
 from .sink import SampleSink
@@ -7,6 +8,7 @@ from .table import SampleTable
 from .take import Margins, sample_photo
 
 __all__ = [
+    "Criterion",
     "Margins",
     "MeasuredPoints",
     "SampleReservoir",

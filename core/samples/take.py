@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..geometry import RayScene, SurfaceView, edges
 from ..geometry.view import cast_shadow
 from ..light import Incidence, Light
 from ..scan import Camera
+from .criterion import Criterion, against
 from .table import SampleTable
 
 DARKEST = 1e-30  # irradiance
@@ -58,21 +60,31 @@ def halo(margins: Margins) -> int:
     return max(1, margins.silhouette, margins.shadow, margins.mask)
 
 
-def trusted_pixels(view: SurfaceView, lighting: Lighting, margins: Margins) -> NDArray[np.bool_]:
-    """(n,) lit pixels away from outlines, shadow edges and grazing angles."""
-    cos_o = dot(view.normal, view.view)
-    near = np.zeros(view.shape, bool)
+def light_criteria(view: SurfaceView, lighting: Lighting, margins: Margins) -> NDArray[np.uint8]:
+    """(n,) the Criterion that decides about each pixel as far as the light and the view go:
+    shadows and their edges, outlines, grazing angles; RELIABLE elsewhere."""
+    near = np.full(view.shape, Criterion.RELIABLE, np.uint8)
     if margins.silhouette > 0:
-        near = edges.widen(view.silhouette, margins.silhouette - 1)
+        outline = edges.widen(view.silhouette, margins.silhouette - 1)
+        near = against(Criterion.OUTLINE, outline)
     if margins.shadow > 0:
         lit = view.image(~lighting.shadowed, fill=0)
-        near = near | edges.widen(edges.shadow_edge(lit, view.seen), margins.shadow - 1)
-    return (
-        ~lighting.shadowed
-        & (lighting.cos_i > margins.cosine)
-        & (cos_o > margins.cosine)
-        & ~view.at(near)
-    )
+        edge = edges.widen(edges.shadow_edge(lit, view.seen), margins.shadow - 1)
+        np.minimum(near, against(Criterion.SHADOW_EDGE, edge), out=near)
+    found = view.at(near)
+    steep = (lighting.cos_i > margins.cosine) & (dot(view.normal, view.view) > margins.cosine)
+    for criterion, pixels in (
+        (Criterion.GRAZING, ~steep),
+        (Criterion.CAST_SHADOW, lighting.shadowed),
+        (Criterion.TURNED_AWAY, lighting.cos_i <= 0),
+    ):
+        np.minimum(found, against(criterion, pixels), out=found)
+    return found
+
+
+def trusted_pixels(view: SurfaceView, lighting: Lighting, margins: Margins) -> NDArray[np.bool_]:
+    """(n,) lit pixels away from outlines, shadow edges and grazing angles."""
+    return light_criteria(view, lighting, margins) == Criterion.RELIABLE
 
 
 def inner_pixels(
@@ -83,6 +95,42 @@ def inner_pixels(
         return pixels
     part = view.image(pixels, fill=0)
     return view.at(edges.inside(part, view.seen, margins.mask))
+
+
+def deciding_criteria(
+    view: SurfaceView,
+    lighting: Lighting,
+    margins: Margins,
+    materials: Sequence[NDArray[np.bool_]],
+    left_out: Sequence[tuple[Criterion, NDArray[np.bool_]]],
+    usable: NDArray[np.bool_],
+    calm: NDArray[np.bool_] | None = None,
+) -> NDArray[np.uint8]:
+    """(n,) the Criterion that decides about each pixel of a view.
+
+    materials: (n,) pixels of each; left_out: (criterion, (n,) pixels) of masks;
+    usable: (n,) of the photo; calm: (n,) where the fit believes no others, else None. A
+    pixel of several materials is at a mask's border where it is so in all of them.
+    """
+    some = np.zeros(len(view.pixel), bool)
+    inner = some.copy()
+    for pixels in materials:
+        some |= pixels
+        inner |= inner_pixels(view, pixels, margins)
+    reached = _reached(_single(lighting.incidence.irradiance))
+    doubts = [
+        (Criterion.NO_MATERIAL, ~some),
+        *left_out,
+        (Criterion.MASK_BORDER, ~inner),
+        (Criterion.UNUSABLE, ~usable),
+        (Criterion.MISSED, ~reached),
+    ]
+    if calm is not None:
+        doubts.append((Criterion.CURVED, ~calm))
+    found = light_criteria(view, lighting, margins)
+    for criterion, pixels in doubts:
+        np.minimum(found, against(criterion, pixels), out=found)
+    return found
 
 
 def sample_photo(
@@ -102,7 +150,7 @@ def sample_photo(
     normal, towards = (_kept(_single(v), rows) for v in (view.normal, view.view))
     incidence = lighting.incidence.select(rows)
     light, irradiance = _single(incidence.towards), _single(incidence.irradiance)
-    reached = (irradiance > DARKEST).all(axis=1)
+    reached = _reached(irradiance)
     if len(rows) and not reached.all():
         kept = np.zeros(len(keep), bool)
         kept[rows] = reached
@@ -133,6 +181,11 @@ def sample_photo(
         irradiance=np.broadcast_to(irradiance, (n, 3)),
         weight=np.broadcast_to(np.float32(1), n),
     )
+
+
+def _reached(irradiance: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """(n,), or (1,) for all: where single precision holds a reflectance under this irradiance."""
+    return (irradiance > DARKEST).all(axis=1)
 
 
 def _single(values: NDArray[np.floating]) -> NDArray[np.float32]:

@@ -1,1 +1,2 @@
-"""Pictures of a measurement: its charts, and what the photos say of it."""
+"""What a person sees of a capture and its fit: pictures and figures, the same in the report and in
+Blender."""

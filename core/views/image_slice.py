@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import Angles, cosines
-from ..report import display
 from ..samples import MeasuredPoints
+from . import display
 from .drawing import INK, Dots, Drawing, Label, Part, Picture, box
 from .subject import Show, Subject, round_up
 

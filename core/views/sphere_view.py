@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..report import display
-from ..report.sphere import lit_sphere
+from . import display
 from .drawing import INK, Drawing, Label, Part, Picture
 from .raster import PAPER
+from .sphere import lit_sphere
 from .subject import Subject
 
 ACROSS, TOP, GAP, PIXELS = 200.0, 20.0, 14.0, 400

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,8 +15,9 @@ from patina.core.capture import read_capture
 from patina.core.job import CaptureResult, FitJob
 from patina.core.job.warnings import black_photos
 from patina.core.photo import read_encoded
-from patina.core.report import display, figures, result_json, write_report
-from patina.core.report.sphere import lit_sphere
+from patina.core.report import figures, result_json, write_report
+from patina.core.views import display
+from patina.core.views.sphere import lit_sphere
 from tests import make_capture as made
 from tests.sampled import sampled
 
@@ -39,10 +41,10 @@ def test_the_page_shows_every_picture_it_names(result: CaptureResult, tmp_path: 
     assert fractions == sorted(fractions) and len(fractions) == 4
     page = (tmp_path / "report" / "index.html").read_text()
     pictures = {p.name for p in (tmp_path / "report").glob("*.png")}
-    assert len(pictures) == 3 * 3 + 3 + 2  # photos, spheres, slices
+    assert len(pictures) == 4 * 3 + 3 + 2  # photos, spheres, slices
     assert all(f"src='{name}'" in page for name in pictures)
     assert "http" not in page.replace("http://www.w3.org/2000/svg", "")
-    assert read_encoded(tmp_path / "report" / "photo_00_predicted.png").mean() > 0.05
+    assert read_encoded(tmp_path / "report" / "photo_00_prediction.png").mean() > 0.05
 
 
 def test_result_json_says_what_was_measured(result: CaptureResult, job: FitJob) -> None:
@@ -86,6 +88,25 @@ def test_the_papers_result_says_which_pixels_it_chose(tmp_path: Path) -> None:
     list(write_report(tmp_path / "report", job.result))
     page = (tmp_path / "report" / "index.html").read_text()
     assert "6 chosen" in page and "shaded" not in page
+    assert "Rings: the pixels" in page and "too curved" in page
+
+
+def test_the_page_says_where_samples_came_from(result: CaptureResult, tmp_path: Path) -> None:
+    """A legend of what was met, and what part of each photo's surface that is."""
+    list(write_report(tmp_path / "report", result))
+    page = (tmp_path / "report" / "index.html").read_text()
+    counts = re.findall(r"<ul class='counts'>(.*?)</ul>", page)
+    assert len(counts) == 3 and "Rings" not in page
+    for place, told in enumerate(counts):
+        percent = int(re.search(r"(\d+) % reliable", told).group(1))
+        assert 20 < percent < 100
+        sure = result.materials[0].per_photo[place]
+        others = sum(int(n) for n in re.findall(r"(\d+) %", told)) - percent
+        assert sure > 500 and percent + others == pytest.approx(100, abs=5)
+    head = page[page.index("<details>") : page.index("</details>")]
+    assert "in shadow: turned away" in head and "too curved" not in head and "clipped" not in head
+    legend = set(re.findall(r"rgb\(\d+,\d+,\d+\)", head))
+    assert legend == set(re.findall(r"rgb\(\d+,\d+,\d+\)", "".join(counts)))
 
 
 def test_wide_intervals_are_told_as_factors() -> None:

@@ -15,7 +15,7 @@ from patina.core.appearance.energy import directional_albedo
 from patina.core.appearance.hemisphere import Hemisphere
 from patina.core.appearance.trait_words import Effect
 from patina.core.basis import Basis, PrincipalBRDF, mapping
-from patina.core.report.sphere import LitSphere, lit_sphere
+from patina.core.views.sphere import LitSphere, lit_sphere
 
 
 @pytest.fixture(scope="module")

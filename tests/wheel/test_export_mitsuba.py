@@ -13,8 +13,8 @@ import pytest
 from patina.core.angles import half_difference
 from patina.core.export import renderer_formats
 from patina.core.export.subject import Subject
-from patina.core.report.sphere import KEY
 from patina.core.result import read_result
+from patina.core.views.sphere import KEY
 from tests import make_result as made
 
 SIZE = 48

@@ -16,7 +16,7 @@ from patina.core.appearance.lobe_fit import fit_lobe_stack
 from patina.core.appearance.principled import Principled
 from patina.core.appearance.principled_fit import fit_principled
 from patina.core.photo import write_png
-from patina.core.report.display import srgb
+from patina.core.views.display import srgb
 
 from ..common import ROOT
 from . import materials, spheres

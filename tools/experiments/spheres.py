@@ -19,7 +19,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from patina.core.angles import Angles, half_difference
-from patina.core.report.display import srgb
+from patina.core.views.display import srgb
 
 Evaluate = Callable[[Angles], NDArray[np.floating]]
 

@@ -40,8 +40,8 @@ def _row(folder: Path, cause: str, seed: int) -> Array:
     from patina.core.capture import read_capture
     from patina.core.job import FitJob, finished
     from patina.core.job.diagnose_job import DiagnoseJob
-    from patina.core.report import display
     from patina.core.report.residual_picture import photo_most_changed, residual_picture
+    from patina.core.views import display
 
     from .make import make as hide
 

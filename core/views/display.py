@@ -56,9 +56,14 @@ def crop_box(known: NDArray[np.bool_], margin: int) -> tuple[slice, slice]:
     )
 
 
-def shrink(pixels: NDArray[np.floating], longest: int) -> NDArray[np.floating]:
+def shrink_factor(shape: tuple[int, ...], longest: int) -> int:
+    """Pixels of (h, w, …) to one, along each side, so that no side exceeds ``longest``."""
+    return max(1, -(-max(shape[:2]) // longest))
+
+
+def shrink(pixels: NDArray[np.number], longest: int) -> NDArray:
     """Mean over blocks of whole pixels so that no side exceeds ``longest``; NaN does not spread."""
-    factor = max(1, -(-max(pixels.shape[:2]) // longest))
+    factor = shrink_factor(pixels.shape, longest)
     if factor == 1:
         return pixels
     rows, columns = (n // factor for n in pixels.shape[:2])

@@ -1,0 +1,65 @@
+"""A PhotoView as a drawing with words: beside its prediction, or where samples came from."""
+
+from __future__ import annotations
+
+import textwrap
+
+from .criteria import LOOKS
+from .drawing import INK, Drawing, Label, Part, Picture, box
+from .photo_pictures import FULL_COLOUR, compared, criteria_picture
+from .photo_view import PhotoView
+
+KINDS = ("comparison", "samples")
+ACROSS, WIDE = 300.0, 460.0  # of a picture, along its longer side: three of them, or one
+TOP, GAP, LINE = 20.0, 10.0, 15.0
+PIXELS = 2  # of a picture to one of the drawing's
+KEY, LETTERS = 250.0, 44  # width of the key, letters to a line of advice
+
+
+def photo_drawing(view: PhotoView, kind: str, exposure: float = 0.0) -> Drawing:
+    """kind: of KINDS; exposure: in stops, of the comparison."""
+    return _comparison(view, exposure) if kind == "comparison" else _samples(view)
+
+
+def _comparison(view: PhotoView, exposure: float) -> Drawing:
+    pictures = compared(view, round(ACROSS * PIXELS), exposure)
+    titles = (f"{view.name}: photo", "prediction", "difference")
+    parts: list[Part] = []
+    left = GAP
+    for title, pixels in zip(titles, pictures, strict=True):
+        height, width = (n / PIXELS for n in pixels.shape[:2])
+        parts.append(Label(left, TOP - 7, title, colour=INK))
+        parts.append(Picture(left, TOP, width, height, pixels))
+        left += width + GAP
+    bottom = TOP + pictures[0].shape[0] / PIXELS + LINE
+    told = f"RMS {100 * view.error:.1f} % of the photo · exposure {exposure:+.1f} stops"
+    parts.append(Label(GAP, bottom, told))
+    full = f"blue: prediction too dark, red: too bright, full at {100 * FULL_COLOUR:.0f} % of white"
+    parts.append(Label(left - GAP, bottom, full, "end"))
+    return Drawing(left, bottom + 8, f"{view.name} and its prediction", tuple(parts))
+
+
+def _samples(view: PhotoView) -> Drawing:
+    """The key beside it: the largest share first, and what to do about each."""
+    pixels = criteria_picture(view, round(WIDE * PIXELS))
+    height, width = (n / PIXELS for n in pixels.shape[:2])
+    parts: list[Part] = [
+        Label(GAP, TOP - 7, f"{view.name}: where samples came from", colour=INK),
+        Picture(GAP, TOP, width, height, pixels),
+    ]
+    left, y = width + 2 * GAP, TOP + 10
+    for criterion, share in sorted(view.shares.items(), key=lambda item: -item[1]):
+        look = LOOKS[criterion]
+        shade = "#" + "".join(f"{c:02x}" for c in look.colour)
+        told = f"{100 * share:.0f} %" if share >= 0.01 else "< 1 %"
+        parts.append(box(left, y - 9, left + 10, y + 1, shade))
+        parts.append(Label(left + 15, y, f"{told} {look.word}", colour=INK))
+        for line in textwrap.wrap(look.advice, LETTERS):
+            y += LINE - 3
+            parts.append(Label(left + 15, y, line, size=8.5))
+        y += LINE + 5
+    if len(view.chosen):
+        told = f"{len(view.chosen)} pixels that the fit rests on: ringed"
+        parts.append(Label(left, y, told, colour=INK))
+        y += LINE
+    return Drawing(left + KEY, max(TOP + height, y) + GAP, "where samples came from", tuple(parts))

@@ -1,0 +1,236 @@
+"""One lit photo beside its prediction, and why which of its pixels became samples."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..basis import PrincipalBRDF
+from ..capture import Capture
+from ..capture.model import HIGHLIGHT_MASK, IGNORE_MASK, SHADOW_MASK
+from ..fit import PaperFit
+from ..fit.measured_result import MeasuredResult
+from ..fit.reliability import calm
+from ..geometry import PixelRays, RayScene, SurfaceView, Window, bands, view_window
+from ..job import inputs
+from ..job.lights import Lights
+from ..job.photos import LitPhoto, LitPhotos
+from ..predict.compose import predict_photo
+from ..samples import Criterion
+from ..samples.take import deciding_criteria, halo, light_surface
+from ..scan import Camera, Scan
+from . import display
+
+MARGIN = 12  # pixels around the object
+PIXELS = 1 << 15  # of a band: a tenth of a second with its prediction
+ROWS = 256  # of a photo at a time
+MASK_CRITERIA = {
+    SHADOW_MASK: Criterion.SHADOW_MASK,
+    HIGHLIGHT_MASK: Criterion.HIGHLIGHT_MASK,
+    IGNORE_MASK: Criterion.IGNORE_MASK,
+}
+
+Fitted = tuple[str, PrincipalBRDF, float]
+"""(material, its BRDF, what the BRDF is too large by where the irradiance is unknown)."""
+
+
+@dataclass(frozen=True)
+class PhotoView:
+    """One photo of a capture, cut to ``box`` (rows, columns of the whole photo): h × w pixels.
+
+    measured: (h, w, 3) linear radiance; predicted: (h, w, 3), NaN where there is no BRDF, 0 in
+    shadow; criteria: (h, w) uint8, the Criterion of each; material: (h, w) int16, its place in the
+    capture, −1 none (masks overlap: the last); chosen: (k, 2) int, row and column in the box of
+    the pixels that a fit rests on, where they are known; white: radiance to be shown as white;
+    error: ‖predicted − measured‖ / ‖measured‖ where there is a prediction, edges and shadows
+    included; counts: (criteria,) pixels of the surface that each decided about.
+    """
+
+    place: int
+    name: str
+    box: tuple[slice, slice]
+    measured: NDArray[np.float32]
+    predicted: NDArray[np.float32]
+    criteria: NDArray[np.uint8]
+    material: NDArray[np.int16]
+    chosen: NDArray[np.intp]
+    white: float
+    error: float
+    counts: NDArray[np.int64]
+
+    @property
+    def surface(self) -> int:
+        """Pixels that see the mesh."""
+        return int(self.counts.sum())
+
+    @property
+    def shares(self) -> dict[Criterion, float]:
+        """The criteria that decided about some of the surface, and about which part of it."""
+        some = {c: int(self.counts[c]) for c in Criterion}
+        return {c: count / self.surface for c, count in some.items() if count}
+
+
+@dataclass(frozen=True)
+class _Canvas:
+    """What the bands of a photo fill in: some of its rows and columns."""
+
+    top: int
+    left: int
+    predicted: NDArray[np.float32]
+    criteria: NDArray[np.uint8]
+    material: NDArray[np.int16]
+
+    @classmethod
+    def around(cls, windows: Sequence[Window], camera: Camera) -> _Canvas:
+        """Large enough for the bands and a margin; the whole photo where there are none."""
+        top = left = 0
+        bottom, right = camera.height, camera.width
+        if windows:
+            top = max(0, min(w.first for w in windows) - MARGIN)
+            left = max(0, min(w.left for w in windows) - MARGIN)
+            bottom = min(bottom, max(w.last for w in windows) + MARGIN)
+            right = min(right, max(w.right for w in windows) + MARGIN)
+        shape = bottom - top, right - left
+        return cls(
+            top,
+            left,
+            np.full((*shape, 3), np.nan, np.float32),
+            np.full(shape, Criterion.NO_SURFACE, np.uint8),
+            np.full(shape, -1, np.int16),
+        )
+
+    def places(self, view: SurfaceView, camera: Camera) -> NDArray[np.intp]:
+        """Flat indices of the wanted pixels of a view."""
+        row, column = np.divmod(view.pixel[view.wanted].astype(np.intp), camera.width)
+        return (row - self.top) * self.criteria.shape[1] + column - self.left
+
+
+def look_at_photo(
+    capture: Capture,
+    scan: Scan,
+    rays: RayScene,
+    photos: LitPhotos,
+    lights: Lights,
+    brdfs: Sequence[Fitted],
+    place: int,
+    used: NDArray[np.integer] | None = None,
+) -> Generator[float, None, PhotoView]:
+    """Look at one photo a band at a time; yields the fraction done. Raises InputError.
+
+    brdfs: of some or all of the capture's materials, of whatever fit. used: (k,) flat indices in
+    the photo of pixels that a fit rests on (see chosen_pixels).
+    """
+    camera = inputs.camera_of(capture, scan, place)
+    masks = inputs.photo_masks(capture, place)
+    light = lights.of(capture, place)
+    yield 0.0
+    photo = photos.read(place)
+    lines = PixelRays.of(camera)
+    margins, limit = capture.fit.margins, _curvature_limit(capture)
+    numbers = {material.name: index for index, material in enumerate(capture.materials)}
+    windows = list(bands(camera, halo(margins), rays.cover.columns(camera), PIXELS))
+    canvas = _Canvas.around(windows, camera)
+    for done, window in enumerate(windows):
+        yield (1 + done) / (2 + len(windows))
+        view = view_window(rays, lines, window)
+        lighting = light_surface(rays, view, light, camera)
+        where, _ = inputs.material_pixels(capture, scan, view, place, masks)
+        criteria = deciding_criteria(
+            view,
+            lighting,
+            margins,
+            list(where.values()),
+            _left_out(masks, view),
+            photo.usable.ravel().take(view.pixel),
+            None if limit is None else calm(view.curvature, limit),
+        )
+        material = np.full(len(view.pixel), -1, np.int16)
+        for index, pixels in enumerate(where.values()):
+            material[pixels] = index
+        own = np.full_like(material, -1)
+        own[view.wanted] = material[view.wanted]
+        parts = [(own == numbers[n], brdf, scale) for n, brdf, scale in brdfs if n in numbers]
+        predicted = predict_photo(view, lighting, parts)
+        target = canvas.places(view, camera)
+        canvas.criteria.reshape(-1)[target] = criteria[view.wanted]
+        canvas.material.reshape(-1)[target] = material[view.wanted]
+        canvas.predicted.reshape(-1, 3)[target] = predicted[view.wanted]
+    yield (1 + len(windows)) / (2 + len(windows))
+    return _seen(capture, camera, photo, canvas, place, used)
+
+
+def chosen_pixels(
+    fits: Iterable[PaperFit | MeasuredResult], place: int
+) -> NDArray[np.int32] | None:
+    """(k,) flat indices in a photo of the handful of pixels that the paper's method chose; None
+    where it was not used."""
+    tables = [fit.chosen for fit in fits if isinstance(fit, PaperFit)]
+    if not tables:
+        return None
+    return np.concatenate([table.pixel[table.photo == place] for table in tables])
+
+
+def _curvature_limit(capture: Capture) -> float | None:
+    """What the capture's method believes, None for all."""
+    return capture.fit.paper.curvature if capture.fit.method == "paper" else None
+
+
+def _left_out(
+    masks: Mapping[str, NDArray[np.bool_]], view: SurfaceView
+) -> list[tuple[Criterion, NDArray[np.bool_]]]:
+    """(criterion, (n,) pixels) of each mask that leaves something out."""
+    return [
+        (criterion, masks[name].ravel().take(view.pixel))
+        for name, criterion in MASK_CRITERIA.items()
+        if name in masks
+    ]
+
+
+def _seen(
+    capture: Capture,
+    camera: Camera,
+    photo: LitPhoto,
+    canvas: _Canvas,
+    place: int,
+    used: NDArray[np.integer] | None,
+) -> PhotoView:
+    """The view, cut to what shows the surface."""
+    surface = canvas.criteria != Criterion.NO_SURFACE
+    height, width = surface.shape
+    rows, columns = display.crop_box(surface, MARGIN)
+    inner = slice(*rows.indices(height)), slice(*columns.indices(width))
+    box = (
+        slice(inner[0].start + canvas.top, inner[0].stop + canvas.top),
+        slice(inner[1].start + canvas.left, inner[1].stop + canvas.left),
+    )
+    measured, predicted = photo.radiance[box].copy(), canvas.predicted[inner]
+    row, column = np.divmod(np.asarray([] if used is None else used, np.intp), camera.width)
+    chosen = np.stack([row - box[0].start, column - box[1].start], axis=1)
+    there = ((chosen >= 0) & (chosen < measured.shape[:2])).all(axis=1)  # of another mesh: not all
+    return PhotoView(
+        place=place,
+        name=capture.photo_name(place),
+        box=box,
+        measured=measured,
+        predicted=predicted,
+        criteria=canvas.criteria[inner],
+        material=canvas.material[inner],
+        chosen=chosen[there],
+        white=display.white_level(measured[surface[inner]]),
+        error=relative_error(predicted, measured),
+        counts=np.bincount(canvas.criteria[surface], minlength=len(Criterion)),
+    )
+
+
+def relative_error(predicted: NDArray[np.floating], measured: NDArray[np.floating]) -> float:
+    """‖predicted − measured‖ / ‖measured‖ of radiances (h, w, 3), where there is a prediction."""
+    missed = size = 0.0
+    for top in range(0, len(predicted), ROWS):
+        ours, photo = predicted[top : top + ROWS], measured[top : top + ROWS]
+        known = np.isfinite(ours[..., 0])
+        missed += float(np.sum(np.square((ours - photo)[known], dtype=np.float64)))
+        size += float(np.sum(np.square(photo[known], dtype=np.float64)))
+    return (missed / max(size, 1e-300)) ** 0.5

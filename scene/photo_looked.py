@@ -1,0 +1,50 @@
+"""The photo that was looked at last, as it compares with its prediction."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..core.views.look_job import LookJob
+from ..core.views.photo_drawing import photo_drawing
+from ..core.views.photo_view import PhotoView
+from ..core.views.raster import raster
+from .apply import measured_of
+from .kept import Kept
+from .last_fit import kept_fit
+from .moved import measured_brdf
+from .properties import capture_path, stored_result
+from .view_image import put_view
+
+_last: Kept[PhotoView] = Kept()
+
+
+def show_photo_view(view: PhotoView, kind: str, exposure: float) -> bpy.types.Image:
+    """Draw it as "comparison" or "samples"; it is kept until another one is."""
+    _last.thing = view
+    return put_view(kind, raster(photo_drawing(view, kind, exposure)))
+
+
+def show_again(kind: str, exposure: float) -> None:
+    """The last one with another exposure; nothing where Blender was started since."""
+    if _last.thing is not None:
+        show_photo_view(_last.thing, kind, exposure)
+
+
+def look_job(scene: bpy.types.Scene, fit: object, place: int) -> LookJob:
+    """Of the scene's measured materials. fit: the FitJob of the scene's capture; place: of the
+    photo in it."""
+    path = capture_path(scene)
+    result = stored_result(path) or {}
+    there = measured_of(path)
+    scales = {m["name"]: float(m.get("scale", 1.0)) for m in result.get("materials", [])}
+    brdfs = [(name, measured_brdf(material)) for name, material in there.items()]
+    fitted = [(name, brdf, scales.get(name, 1.0)) for name, brdf in brdfs if brdf is not None]
+    name = fit.capture.photo_name(place)
+    chosen = [
+        tuple(one["pixel"])
+        for material in result.get("materials", [])
+        for one in material.get("chosen", [])
+        if one["photo"] == name
+    ]
+    known = kept_fit(path, stored_result(path))
+    return LookJob(fit.capture, fitted, place, fit.prepare, known, chosen)
