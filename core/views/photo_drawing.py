@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import textwrap
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .criteria import LOOKS
 from .drawing import INK, Drawing, Label, Part, Picture, box
 from .photo_pictures import FULL_COLOUR, compared, criteria_picture
@@ -27,22 +30,32 @@ def _comparison(view: PhotoView, exposure: float) -> Drawing:
     parts: list[Part] = []
     left = GAP
     for title, pixels in zip(titles, pictures, strict=True):
-        height, width = (n / PIXELS for n in pixels.shape[:2])
+        height, width = _size(pixels, ACROSS)
         parts.append(Label(left, TOP - 7, title, colour=INK))
         parts.append(Picture(left, TOP, width, height, pixels))
         left += width + GAP
-    bottom = TOP + pictures[0].shape[0] / PIXELS + LINE
-    told = f"RMS {100 * view.error:.1f} % of the photo · exposure {exposure:+.1f} stops"
+    bottom = TOP + height + LINE
+    told = f"RMS error {100 * view.error:.0f} %, highlights and edges included"
+    if np.isfinite(view.typical):
+        told = f"typical error {100 * view.typical:.0f} % · {told}"
+    if exposure:
+        told += f" · exposure {exposure:+.1f} stops"
     parts.append(Label(GAP, bottom, told))
     full = f"blue: prediction too dark, red: too bright, full at {100 * FULL_COLOUR:.0f} % of white"
-    parts.append(Label(left - GAP, bottom, full, "end"))
-    return Drawing(left, bottom + 8, f"{view.name} and its prediction", tuple(parts))
+    parts.append(Label(GAP, bottom + LINE, full))
+    return Drawing(left, bottom + LINE + 8, f"{view.name} and its prediction", tuple(parts))
+
+
+def _size(pixels: NDArray[np.uint8], longest: float) -> tuple[float, float]:
+    """(height, width) in the drawing; small photos are enlarged."""
+    height, width = (n * longest / max(pixels.shape[:2]) for n in pixels.shape[:2])
+    return height, width
 
 
 def _samples(view: PhotoView) -> Drawing:
     """The key beside it: the largest share first, and what to do about each."""
     pixels = criteria_picture(view, round(WIDE * PIXELS))
-    height, width = (n / PIXELS for n in pixels.shape[:2])
+    height, width = _size(pixels, WIDE)
     parts: list[Part] = [
         Label(GAP, TOP - 7, f"{view.name}: where samples came from", colour=INK),
         Picture(GAP, TOP, width, height, pixels),

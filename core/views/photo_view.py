@@ -12,6 +12,7 @@ from ..basis import PrincipalBRDF
 from ..capture import Capture
 from ..capture.model import HIGHLIGHT_MASK, IGNORE_MASK, SHADOW_MASK
 from ..fit import PaperFit
+from ..fit.held_out import DARK
 from ..fit.measured_result import MeasuredResult
 from ..fit.reliability import calm
 from ..geometry import PixelRays, RayScene, SurfaceView, Window, bands, view_window
@@ -65,6 +66,19 @@ class PhotoView:
     def surface(self) -> int:
         """Pixels that see the mesh."""
         return int(self.counts.sum())
+
+    @property
+    def typical(self) -> float:
+        """Median relative error of the reliable pixels that are not dark, NaN without any: as
+        HeldOut's, of a photo that the fit has seen."""
+        known = (self.criteria == Criterion.RELIABLE) & np.isfinite(self.predicted[..., 0])
+        photo, ours = self.measured[known], self.predicted[known]
+        level = photo.mean(axis=-1)
+        if not len(level):
+            return float("nan")
+        bright = level > max(DARK * float(np.median(level)), 0.0)
+        missed = np.abs(ours - photo).mean(axis=-1)
+        return float(np.median(missed[bright] / level[bright])) if bright.any() else float("nan")
 
     @property
     def shares(self) -> dict[Criterion, float]:
