@@ -47,12 +47,12 @@ LOOKS: dict[Criterion, Look] = {
         "An ignore mask leaves it out.",
     ),
     Criterion.TURNED_AWAY: Look(
-        "turned_away", "in shadow: turned away", (40, 38, 36),
+        "turned_away", "in shadow: turned away", (56, 53, 50),
         "The surface faces away from the lamp. Lamps on other sides reach it; where the photo is "
         "bright here, the light's direction is wrong.",
     ),
     Criterion.CAST_SHADOW: Look(
-        "cast_shadow", "in shadow: cast", (107, 101, 99),
+        "cast_shadow", "in shadow: cast", (112, 106, 104),
         "Another part of the mesh blocks the lamp. Where the photo is bright here, the light's "
         "direction is wrong or the mesh has too much.",
     ),
@@ -68,7 +68,8 @@ LOOKS: dict[Criterion, Look] = {
     Criterion.GRAZING: Look(
         "grazing", "grazing", (196, 10, 55),
         "Seen or lit so flatly that a small error of the mesh changes the result by much. Photos "
-        "from the front, and lamps beside the camera, see it better.",
+        "from the front, and lamps beside the camera, see it better; smallest_cosine is the "
+        "limit.",
     ),
     Criterion.MASK_BORDER: Look(
         "mask_border", "at a mask's border", (255, 134, 95),
