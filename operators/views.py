@@ -69,7 +69,7 @@ came from"""
 
     bl_idname = "patina.look_at_photo"
     bl_label = "Look at Photo"
-    PANEL = "fit"
+    PANEL = "check"
     bl_options = {"REGISTER", "UNDO"}
 
     kind: bpy.props.EnumProperty(name="View", items=PHOTO_ITEMS)  # type: ignore[valid-type]

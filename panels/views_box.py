@@ -1,4 +1,4 @@
-"""Below the fit: views of a measured material, and how to look at them."""
+"""Below the check: views of a measured material, and how to look at them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class PATINA_PT_views(bpy.types.Panel):
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Patina"
-    bl_parent_id = "PATINA_PT_fit"
+    bl_parent_id = "PATINA_PT_check"
     bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod

@@ -107,3 +107,31 @@ def test_fits_are_compared() -> None:
     views.file = str(path)
     same = pixels(view("ratio"))[150, 400, :3]
     assert np.allclose(same, same[0], atol=0.05), "its own table differs"
+
+
+def test_a_photo_is_looked_at_after_the_fit_and_after_a_reload() -> None:
+    fitted()
+    scene, listed = bpy.context.scene, extension("scene.photo_list")
+    scene.camera = None
+    assert not bpy.ops.patina.look_at_photo.poll(), "no photo is looked through"
+    scene.patina_photos.active = 1
+    assert listed.looked_at(scene) is not None
+    find = extension("scene.view_image").view_image
+    for kind in ("comparison", "samples"):
+        assert bpy.ops.patina.look_at_photo(kind=kind) == {"FINISHED"}
+    comparison, samples = pixels(find("comparison")), pixels(find("samples"))
+    assert comparison[..., :3].std() > 0.05 and samples[..., :3].std() > 0.05
+    reliable = np.abs(samples[..., :3] * 255 - [0, 147, 155]).max(axis=-1) < 90
+    assert reliable.mean() > 0.05, "samples came from somewhere"
+    bpy.context.scene.patina_views.shown = "comparison"
+    bpy.context.scene.patina_views.exposure = -3.0
+    darker = pixels(find("comparison"))
+    assert darker.shape != comparison.shape or darker.mean() < comparison.mean()
+    bpy.context.scene.patina_views.exposure = 0.0
+    path = str(folder() / "looked.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)  # the fit is no longer in memory
+    bpy.context.scene.patina_photos.active = 1
+    assert bpy.ops.patina.look_at_photo(kind="comparison") == {"FINISHED"}
+    again = pixels(find("comparison"))
+    assert np.allclose(again, comparison, atol=2 / 255), np.abs(again - comparison).max()

@@ -35,9 +35,11 @@ def main() -> None:
     extension()
     bpy.ops.wm.open_mainfile(filepath=str(folder / "session.blend"))
     from patina.scene.apply import measured_of
+    from patina.scene.charted import subject_of
     from patina.scene.mask_images import mask_images, read_mask_image
     from patina.scene.paints import paints, worn_slots
     from patina.scene.properties import DIAGNOSIS, capture_path, stored_result
+    from patina.scene.view_image import view_image
 
     scene = bpy.context.scene
     capture = capture_path(scene)
@@ -45,6 +47,9 @@ def main() -> None:
     assert {m["name"]: m["samples"]["used"] for m in result["materials"]} == told["materials"]
     assert sorted(measured_of(capture)) == sorted(told["materials"])
     assert stored_result(capture, DIAGNOSIS) is not None
+    for material in measured_of(capture).values():
+        assert len(subject_of(material).points) > 100 and subject_of(material).interval is not None
+    assert {view_image(kind) is None for kind in ("highlight", "comparison")} == {False}
     photos = scene.patina_photos
     masks = {
         kind: int(read_mask_image(image).sum())

@@ -202,6 +202,22 @@ def materials_and_masks() -> Iterator[float]:
     yield DRAWN
 
 
+def views() -> Iterator[float]:
+    """Of the fit, in an Image Editor."""
+    yield from open_panel("check")
+    press("patina.show_chart", kind="highlight")
+    yield DRAWN
+    photograph("10_highlight")
+    press("patina.look_at_photo", "INVOKE_DEFAULT", kind="comparison")
+    yield from until_done()
+    yield DRAWN
+    photograph("11_prediction")
+    editor = area_of("IMAGE_EDITOR")
+    with bpy.context.temp_override(window=window(), area=editor, region=region_of(editor)):
+        bpy.ops.screen.area_close()
+    yield DRAWN
+
+
 def fit_and_check() -> Iterator[float]:
     """To finished materials, marked as assets."""
     yield from open_panel("fit")
@@ -212,15 +228,15 @@ def fit_and_check() -> Iterator[float]:
     yield from until_done()
     yield 10.0  # shaders
     photograph("9_fitted")
-    yield from open_panel("check")
+    yield from views()
     press("patina.check", "INVOKE_DEFAULT")
     yield from until_done()
     yield 10.0
-    photograph("10_checked")
+    photograph("12_checked")
     yield from open_panel("material")
     press("patina.mark_assets")
     yield DRAWN
-    photograph("11_material")
+    photograph("13_material")
     stored = part("scene.properties")
     result = stored.stored_result(stored.capture_path(bpy.context.scene))
     found["materials"] = {m["name"]: m["samples"]["used"] for m in result["materials"]}
@@ -303,7 +319,7 @@ def close_panels() -> None:
     for panel in outer:
         noting(panel)
     for panel in (*outer, *inner):
-        panel.bl_options = {"DEFAULT_CLOSED"}
+        panel.bl_options = set() if panel.bl_idname == "PATINA_PT_views" else {"DEFAULT_CLOSED"}
         bpy.utils.register_class(panel)
 
 
