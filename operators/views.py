@@ -98,7 +98,8 @@ came from"""
         if scene is None or self._job.view is None:
             self.report({"WARNING"}, "The scene is gone; the photo was not looked at")
             return
-        image = show_photo_view(self._job.view, self.kind, scene.patina_views.exposure)
+        exposure = scene.patina_views.exposure
+        image = show_photo_view(context, self._job.view, self.kind, exposure)
         scene.patina_views.shown = self.kind
         show_image(context, image)
 

@@ -32,9 +32,11 @@ class PATINA_PT_views(bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, views = self.layout, context.scene.patina_views
-        layout.label(text=looked_at(context).name, icon="MATERIAL")
-        layout.prop(views, "material", text="Instead")
-        layout.prop(views, "against")
+        if views.material is None:
+            layout.label(text=looked_at(context).name, icon="MATERIAL")
+        layout.prop(views, "material", text="Look At")
+        layout.label(text="Compare with:")
+        layout.prop(views, "against", text="")
         if views.against == MATERIAL:
             layout.prop(views, "other", text="")
         elif views.against == FILE:

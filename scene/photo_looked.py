@@ -7,7 +7,6 @@ import bpy
 from ..core.views.look_job import LookJob
 from ..core.views.photo_drawing import photo_drawing
 from ..core.views.photo_view import PhotoView
-from ..core.views.raster import raster
 from .apply import measured_of
 from .kept import Kept
 from .last_fit import kept_fit
@@ -18,16 +17,18 @@ from .view_image import put_view
 _last: Kept[PhotoView] = Kept()
 
 
-def show_photo_view(view: PhotoView, kind: str, exposure: float) -> bpy.types.Image:
+def show_photo_view(
+    context: bpy.types.Context, view: PhotoView, kind: str, exposure: float
+) -> bpy.types.Image:
     """Draw it as "comparison" or "samples"; it is kept until another one is."""
     _last.thing = view
-    return put_view(kind, raster(photo_drawing(view, kind, exposure)))
+    return put_view(context, kind, photo_drawing(view, kind, exposure))
 
 
-def show_again(kind: str, exposure: float) -> None:
+def show_again(context: bpy.types.Context, kind: str, exposure: float) -> None:
     """The last one with another exposure; nothing where Blender was started since."""
     if _last.thing is not None:
-        show_photo_view(_last.thing, kind, exposure)
+        show_photo_view(context, _last.thing, kind, exposure)
 
 
 def look_job(scene: bpy.types.Scene, fit: object, place: int) -> LookJob:

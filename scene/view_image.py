@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
+
+from ..core.views.drawing import Drawing
+from ..core.views.raster import raster
+from .image_editor import width_to_show
 
 VIEW = "patina_view"  # on the image: which view it is
+USUAL, LEAST, MOST = 2.0, 1.0, 3.0  # pixels to one of the drawing's
 
 
-def put_view(kind: str, pixels: NDArray[np.uint8]) -> bpy.types.Image:
-    """Show (h, w, 3) display pixels as the image of that view; it stays in the .blend."""
+def put_view(context: bpy.types.Context, kind: str, drawing: Drawing) -> bpy.types.Image:
+    """Show a drawing as the image of that view, as large as the editor is wide; it stays in the
+    .blend."""
+    across = width_to_show(context)
+    scale = USUAL if across is None else min(max(0.96 * across / drawing.width, LEAST), MOST)
+    pixels = raster(drawing, scale)
     height, width, _ = pixels.shape
     image = view_image(kind)
     if image is None:

@@ -13,7 +13,6 @@ from ..core.brdf import merl_file
 from ..core.errors import PatinaError
 from ..core.views.charts import CHARTS, View, chart, most_measured
 from ..core.views.photo_drawing import KINDS
-from ..core.views.raster import raster
 from ..core.views.subject import Show, Subject
 from .charted import earlier_subject, subject_of
 from .materials import MEASURED
@@ -51,7 +50,7 @@ def _changed(views: PatinaViews, context: bpy.types.Context) -> None:
     if view_image(views.shown) is None:
         return
     if views.shown in KINDS:
-        show_again(views.shown, views.exposure)
+        show_again(context, views.shown, views.exposure)
     elif views.shown in CHARTS:
         try:
             show_chart(context, views.shown)
@@ -174,7 +173,7 @@ def show_chart(context: bpy.types.Context, kind: str) -> bpy.types.Image:
             views["theta_d"] = math.radians(best)  # not by the property: that would draw twice
     drawing = chart(kind, subject, _other(views, material), _view(views))
     views.shown = kind
-    return put_view(kind, raster(drawing))
+    return put_view(context, kind, drawing)
 
 
 def _view(views: PatinaViews) -> View:

@@ -14,7 +14,7 @@ _fitted: list[str] = []  # the .blend of the one fit that all tests here look at
 
 
 def fitted() -> bpy.types.Material:
-    """A fitted material; the first time its fit is in memory, then it is a file of the test's own."""
+    """A fitted material; the first time with its fit in memory, then in a file of its own."""
     if _fitted:
         bpy.ops.wm.open_mainfile(filepath=_fitted[0])
         bpy.ops.wm.save_as_mainfile(filepath=str(folder() / "own.blend"))
