@@ -177,6 +177,21 @@ def test_the_fit_operator_gives_the_numbers_of_the_api() -> None:
     assert counts()["materials"] == before["materials"]
 
 
+def test_the_demo_by_operator_is_the_demo_by_api() -> None:
+    """The embedded capture: coefficients, samples and unseen photos to the last digit."""
+    assert bpy.ops.patina.import_demo() == {"FINISHED"}
+    assert bpy.ops.patina.fit() == {"FINISHED"}
+    said = json.loads(bpy.data.texts["Patina result"].as_string())
+    demo = extension("operators.import_capture").DEMO
+    job = extension("core.job").FitJob(extension("core.capture").read_capture(demo), portable=False)
+    job.drain()
+    assert [m["name"] for m in said["materials"]] == ["glaze", "clay"]
+    for told, fitted in zip(said["materials"], job.result.materials, strict=True):
+        assert np.array_equal(np.array(told["coefficients"]), fitted.fit.brdf.coefficients)
+        assert sum(told["samples"]["per_photo"].values()) == sum(fitted.per_photo) > 1000
+        assert told["held_out"]["typical"] == fitted.held_out.typical
+
+
 def test_a_check_names_a_drift_fits_with_it_and_can_do_without() -> None:
     path = made().make_capture(folder() / "ball", photos=4)
     told = path.read_text()
