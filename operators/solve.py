@@ -24,7 +24,7 @@ class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
     bl_idname = "patina.solve_photos"
     bl_label = "Solve Photos"
     PANEL = "scan"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     TICK = 0.1
     CANCELLED = "Solving cancelled; nothing was written"

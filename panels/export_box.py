@@ -1,10 +1,34 @@
-"""Material & Export: the formats to choose from, below the measured materials."""
+"""Material & Export: the formats to choose from, below the measured materials; choices that were
+named are found again in the header's menu of presets."""
 
 from __future__ import annotations
 
 import bpy
+from bl_operators.presets import AddPresetBase
+from bl_ui.utils import PresetPanel
 
 from ..scene.export_choice import FORMATS, missing
+
+PRESETS = "patina/export"  # below the user's presets
+
+
+class PATINA_OT_add_export_preset(AddPresetBase, bpy.types.Operator):
+    """Keep this choice of formats under a name, or take one away"""
+
+    bl_idname = "patina.add_export_preset"
+    bl_label = "Add Export Preset"
+    preset_menu = "PATINA_PT_export_presets"
+    preset_subdir = PRESETS
+    preset_defines = ["export = bpy.context.scene.patina_export"]
+    preset_values = ["export.formats"]
+
+
+class PATINA_PT_export_presets(PresetPanel, bpy.types.Panel):
+    bl_idname = "PATINA_PT_export_presets"
+    bl_label = "Export Presets"
+    preset_subdir = PRESETS
+    preset_operator = "script.execute_preset"
+    preset_add_operator = "patina.add_export_preset"
 
 
 class PATINA_PT_export(bpy.types.Panel):
@@ -18,6 +42,9 @@ class PATINA_PT_export(bpy.types.Panel):
     bl_parent_id = "PATINA_PT_material"
     bl_options = {"DEFAULT_CLOSED"}
 
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        PATINA_PT_export_presets.draw_panel_header(self.layout)
+
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
         grid = layout.grid_flow(columns=2, even_columns=True, align=True)
@@ -28,9 +55,14 @@ class PATINA_PT_export(bpy.types.Panel):
         layout.operator("patina.export", icon="EXPORT")
 
 
+CLASSES = (PATINA_OT_add_export_preset, PATINA_PT_export_presets, PATINA_PT_export)
+
+
 def register() -> None:
-    bpy.utils.register_class(PATINA_PT_export)
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
 
 
 def unregister() -> None:
-    bpy.utils.unregister_class(PATINA_PT_export)
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -204,3 +205,21 @@ def test_a_dropped_export_leaves_nothing() -> None:
     assert job.now.stage and math.isfinite(job.now.fraction)
     job.close()
     assert list(out.iterdir()) == []
+
+
+def test_a_choice_of_formats_is_a_preset() -> None:
+    chosen, name = bpy.context.scene.patina_export, "patina test of presets"
+    chosen.formats = {"usd", "binary"}
+    assert bpy.ops.patina.add_export_preset(name=name) == {"FINISHED"}
+    folders = bpy.utils.preset_paths("patina/export")
+    file = next(f for f in Path(folders[-1]).glob("*.py") if "test_of_presets" in f.name)
+    try:
+        chosen.formats = {"gltf"}
+        bpy.ops.script.execute_preset(filepath=str(file), menu_idname="PATINA_PT_export_presets")
+        assert chosen.formats == {"usd", "binary"}
+    finally:
+        file.unlink()
+    for operator in ("new_capture", "solve_photos"):
+        rna = getattr(bpy.ops.patina, operator).get_rna_type()
+        kept = {p.identifier for p in rna.properties if not p.is_skip_preset} - {"rna_type"}
+        assert kept in ({"light", "offset", "direction"}, {"lens", "threads"}), kept
