@@ -11,6 +11,7 @@ from ..core.job.refit_job import RefitJob
 from ..core.report.diagnosis_json import describe
 from ..scene.checked import keep, kept
 from ..scene.evidence import paint_evidence, show_evidence
+from ..scene.prepared import PreparedJob
 from ..scene.properties import DIAGNOSIS, capture_path, store_result
 from ..scene.running import tell
 from .fit import can_fit, fit_job, show_result
@@ -32,11 +33,11 @@ explain, name the cause, and fit again with it in the model"""
 
     def _start(self, context: bpy.types.Context) -> None:
         keep(None)  # two at once would be too much
-        self._job = CheckJob(fit_job(self, context.scene))
+        self._job = PreparedJob(CheckJob(fit_job(self, context.scene)))
         self._scene = context.scene.name
 
     def _finish(self, context: bpy.types.Context) -> None:
-        checked, after = self._job.checked, self._job.result
+        checked, after = self._job.job.checked, self._job.result
         found, setting, before = checked.found, checked.setting, checked.result
         scene = bpy.data.scenes.get(self._scene)
         if found is None or setting is None or before is None or after is None or scene is None:
@@ -76,11 +77,12 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
 
     def _start(self, context: bpy.types.Context) -> None:
         off = [cause.name for cause in context.scene.patina.causes if not cause.use]
-        self._job = RefitJob(kept(capture_path(context.scene)), without=off, exactly=True)
+        refit = RefitJob(kept(capture_path(context.scene)), without=off, exactly=True)
+        self._job = PreparedJob(refit)
         self._scene = context.scene.name
 
     def _finish(self, context: bpy.types.Context) -> None:
-        checked, after = self._job.checked, self._job.result
+        checked, after = self._job.job.checked, self._job.result
         scene = bpy.data.scenes.get(self._scene)
         if after is None or scene is None or checked.result is None or checked.found is None:
             self.report({"WARNING"}, "The scene is gone; the materials were not applied")

@@ -18,6 +18,7 @@ from ..scene.lights import with_dragged_lamps
 from ..scene.mask_images import with_mask_images
 from ..scene.painted import take_all
 from ..scene.preferences import preferences
+from ..scene.prepared import PreparedJob
 from ..scene.running import tell
 from .stepped import Stepped
 
@@ -50,7 +51,8 @@ def fit_job(operator: bpy.types.Operator, scene: bpy.types.Scene) -> FitJob:
 
 def show_result(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> None:
     """The materials onto the mesh, and what should be known about them to the user."""
-    notes = apply_result(scene, result, operator._job.stages)
+    job = operator._job
+    notes = apply_result(scene, result, job.stages, job.prepared)
     keep_fit(result)
     trim_cache()
     for material in result.materials:
@@ -73,7 +75,7 @@ class PATINA_OT_fit(Stepped, bpy.types.Operator):
         return can_fit(cls, context)
 
     def _start(self, context: bpy.types.Context) -> None:
-        self._job = fit_job(self, context.scene)
+        self._job = PreparedJob(fit_job(self, context.scene))
         self._scene = context.scene.name  # by name: a reference does not survive undo
 
     def _finish(self, context: bpy.types.Context) -> None:

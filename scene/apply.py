@@ -14,7 +14,8 @@ from . import materials, meshes, osl_files
 from .charted import keep_earlier, keep_evidence
 from .face_slots import drop_stand_ins
 from .materials import MEASURED
-from .preview import show_sphere
+from .prepared import Prepared, prepare
+from .preview import put_spheres
 from .properties import CAPTURE, store_result
 
 NUMBERED = re.compile(r"\.\d{3}$")  # as Blender keeps names apart
@@ -32,22 +33,27 @@ def measured_of(capture: str) -> dict[str, bpy.types.Material]:
 
 
 def apply_result(
-    scene: bpy.types.Scene, result: CaptureResult, stages: Sequence[Stage]
+    scene: bpy.types.Scene,
+    result: CaptureResult,
+    stages: Sequence[Stage],
+    prepared: Sequence[Prepared] = (),
 ) -> list[str]:
     """Make the materials, put them on the scanned mesh where it is in the scene, and keep the
-    description. Returns notes for the user. A material of an earlier fit is replaced."""
+    description. Returns notes for the user. A material of an earlier fit is replaced. prepared: of
+    each material, where it was made before."""
     with_osl = materials.osl_missing() is None
     capture = str(result.capture.file)
     notes: list[str] = []
     made = []
-    for fitted in result.materials:
+    for place, fitted in enumerate(result.materials):
         old = next((m for m in measured_materials() if _is(m, fitted.name, capture)), None)
         brdf = fitted.fit.brdf
-        files = osl_files.ensure_files(brdf) if with_osl else None
+        own = prepared[place] if prepared else prepare(brdf, with_osl)
+        files = osl_files.ensure_files(brdf, own.tables) if with_osl else None
         new = materials.create_material(fitted.name, brdf, fitted.principled, files, fitted.lobes)
         new[MEASURED], new[CAPTURE] = fitted.name, capture
         new[DATE] = date.today().isoformat()
-        show_sphere(new, brdf)
+        put_spheres(new, own.spheres)
         keep_evidence(new, fitted)
         if old is not None:
             keep_earlier(new, old)

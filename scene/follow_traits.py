@@ -20,8 +20,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from ..core.appearance import osl_atlas, sampling_table
-from ..core.appearance.closure_split import split
+from ..core.appearance import osl_atlas
 from ..core.appearance.lobe_fit import fit_lobe_stack
 from ..core.appearance.principled_fit import fit_principled
 from ..core.basis import PrincipalBRDF
@@ -126,10 +125,9 @@ def _next() -> tuple[str, str, Callable[[], Any]] | None:
 
 
 def _sampling(brdf: PrincipalBRDF) -> Any:
-    parts = split(brdf.evaluate)
-    texels = sampling_table.texels(parts, sampling_table.sampling_table(brdf.evaluate, parts))
-    alphas = tuple(float(a) for a in parts.alpha)
-    return osl_atlas.sampling_name(brdf), texels, alphas, split_body(brdf.evaluate).body
+    made = osl_files.shader_tables(brdf)
+    alphas = tuple(float(a) for a in made.parts.alpha)
+    return osl_atlas.sampling_name(brdf), made.texels, alphas, split_body(brdf.evaluate).body
 
 
 _WORK: dict[str, Callable[[PrincipalBRDF], Callable[[], Any]]] = {

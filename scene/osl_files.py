@@ -14,10 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
+import numpy as np
 from bpy.app.handlers import persistent
+from numpy.typing import NDArray
 
 from ..core.appearance import osl_atlas, sampling_table
-from ..core.appearance.closure_split import split
+from ..core.appearance.closure_split import ClosureSplit, split
 from ..core.appearance.osl_source import COMPONENTS, REMAINDER, SAMPLING
 from ..core.basis import PrincipalBRDF
 from .folders import blend_folder
@@ -46,14 +48,25 @@ class ShaderFiles:
     alphas: tuple[float, float, float]
 
 
-def ensure_files(brdf: PrincipalBRDF) -> ShaderFiles:
-    """A BRDF's EXRs: on disk where this .blend expects them, and packed into it."""
+@dataclass(frozen=True)
+class ShaderTables:
+    """parts: the split into closures; texels: the sampling table as its picture has it."""
+
+    parts: ClosureSplit
+    texels: NDArray[np.float32]
+
+
+def shader_tables(brdf: PrincipalBRDF) -> ShaderTables:
+    """A second's work. Knows nothing of Blender: other threads may ask."""
     parts = split(brdf.evaluate)
+    table = sampling_table.sampling_table(brdf.evaluate, parts)
+    return ShaderTables(parts, sampling_table.texels(parts, table))
 
-    def write_sampling(path: Path) -> None:
-        table = sampling_table.sampling_table(brdf.evaluate, parts)
-        osl_atlas.write_picture(path, sampling_table.texels(parts, table))
 
+def ensure_files(brdf: PrincipalBRDF, tables: ShaderTables | None = None) -> ShaderFiles:
+    """A BRDF's EXRs: on disk where this .blend expects them, and packed into it. tables: where they
+    were made before."""
+    made = tables or shader_tables(brdf)
     paths = {
         COMPONENTS: _ensure(
             osl_atlas.components_name(brdf.basis),
@@ -62,9 +75,11 @@ def ensure_files(brdf: PrincipalBRDF) -> ShaderFiles:
         REMAINDER: _ensure(
             osl_atlas.remainder_name(brdf), lambda path: osl_atlas.write_remainder(path, brdf)
         ),
-        SAMPLING: _ensure(osl_atlas.sampling_name(brdf), write_sampling),
+        SAMPLING: _ensure(
+            osl_atlas.sampling_name(brdf), lambda path: osl_atlas.write_picture(path, made.texels)
+        ),
     }
-    first, second, third = (float(a) for a in parts.alpha)
+    first, second, third = (float(a) for a in made.parts.alpha)
     return ShaderFiles(paths, (first, second, third))
 
 

@@ -141,16 +141,16 @@ class FitJob(Job):
         capture = self.capture
         yield Step("reading the scan", 0.0)
         if isinstance(self.basis, Basis) or self.basis is None:
-            basis = self.basis or Basis.default()
+            basis = self.basis or (yield from beside(Basis.default, Step("reading the scan", 0.0)))
         else:
             basis = yield from beside(self.basis, Step("computing the basis", 0.0))
-        scan = inputs.open_scan(capture)
+        scan = yield from beside(lambda: inputs.open_scan(capture), Step("reading the scan", 0.0))
         if self.prepare is not None:
             scan = self.prepare(scan)
         inputs.check_face_attributes(capture, scan)
         inputs.check_photos(capture, scan)
         yield Step("reading the scan", 0.03)
-        rays = RayScene.build(scan.mesh)
+        rays = yield from beside(lambda: RayScene.build(scan.mesh), Step("reading the scan", 0.03))
         photos = LitPhotos.open(capture)
         lights = find_lights(capture, scan, photos)
         if any(entry.refine for entry in capture.lights):
