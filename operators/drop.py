@@ -99,11 +99,16 @@ def _way() -> str:
     return "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
 
 
-def _in_viewport(context: bpy.types.Context) -> bool:
-    return context.area is not None and context.area.type == "VIEW_3D"
+class OverViewport:
+    """What is dropped into a 3D viewport."""
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        """Nowhere else."""
+        return context.area is not None and context.area.type == "VIEW_3D"
 
 
-class PATINA_FH_capture(bpy.types.FileHandler):
+class PATINA_FH_capture(OverViewport, bpy.types.FileHandler):
     """A capture file."""
 
     bl_idname = "PATINA_FH_capture"
@@ -111,13 +116,8 @@ class PATINA_FH_capture(bpy.types.FileHandler):
     bl_import_operator = "patina.import_capture"
     bl_file_extensions = ".toml"
 
-    @classmethod
-    def poll_drop(cls, context: bpy.types.Context) -> bool:
-        """Over a viewport."""
-        return _in_viewport(context)
 
-
-class PATINA_FH_cameras(bpy.types.FileHandler):
+class PATINA_FH_cameras(OverViewport, bpy.types.FileHandler):
     """What a reconstruction tool wrote."""
 
     bl_idname = "PATINA_FH_cameras"
@@ -125,24 +125,14 @@ class PATINA_FH_cameras(bpy.types.FileHandler):
     bl_import_operator = "patina.new_capture"
     bl_file_extensions = ";".join(sorted(CAMERAS))
 
-    @classmethod
-    def poll_drop(cls, context: bpy.types.Context) -> bool:
-        """Over a viewport."""
-        return _in_viewport(context)
 
-
-class PATINA_FH_photos(bpy.types.FileHandler):
+class PATINA_FH_photos(OverViewport, bpy.types.FileHandler):
     """Photos of any kind that is read."""
 
     bl_idname = "PATINA_FH_photos"
     bl_label = "Patina: Photos"
     bl_import_operator = "patina.drop_photos"
     bl_file_extensions = ";".join(sorted(PHOTOS))
-
-    @classmethod
-    def poll_drop(cls, context: bpy.types.Context) -> bool:
-        """Over a viewport."""
-        return _in_viewport(context)
 
 
 CLASSES = (PATINA_OT_drop_photos, PATINA_FH_capture, PATINA_FH_cameras, PATINA_FH_photos)

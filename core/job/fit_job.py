@@ -23,6 +23,7 @@ from ..samples import MeasuredPoints, SampleSink, SampleTable
 from ..samples.face_votes import FaceVotes
 from ..samples.level import at_typical_level
 from ..scan import Scan
+from ..steps import relayed
 from . import inputs
 from .applied import Applied
 from .beside import beside
@@ -154,13 +155,10 @@ class FitJob(Job):
         photos = LitPhotos.open(capture)
         lights = find_lights(capture, scan, photos)
         if any(entry.refine for entry in capture.lights):
-            steps = refined(lights, capture, scan, photos, rays, basis)
-            while True:
-                try:
-                    yield Step("refining the lights", 0.03 + 0.02 * next(steps))
-                except StopIteration as end:
-                    lights = end.value
-                    break
+            lights = yield from relayed(
+                refined(lights, capture, scan, photos, rays, basis),
+                lambda done: Step("refining the lights", 0.03 + 0.02 * done),
+            )
         taken = yield from self._take_samples(scan, rays, photos, lights)
         results = []
         known = lights.known and capture.fit.absolute
@@ -191,13 +189,10 @@ class FitJob(Job):
     ) -> Generator[Step, None, Taken]:
         """Step through the photos; every material's sinks get its samples as they come."""
         sinks = {material.name: self.sinks(material.name) for material in self.capture.materials}
-        steps = take_samples(self.capture, scan, rays, photos, lights, sinks, self.threads)
-        while True:
-            try:
-                yield Step("sampling the photos", 0.05 + 0.35 * next(steps))
-            except StopIteration as end:
-                taken: Taken = end.value
-                break
+        taken = yield from relayed(
+            take_samples(self.capture, scan, rays, photos, lights, sinks, self.threads),
+            lambda done: Step("sampling the photos", 0.05 + 0.35 * done),
+        )
         self._check_light(taken)
         return taken
 

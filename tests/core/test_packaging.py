@@ -28,6 +28,8 @@ LIBRARIES = {"numpy", "scipy", "pycolmap", "OpenImageIO", "embreex"} | {
 BLENDER = {
     "bpy",
     "_cycles",
+    "bl_operators",
+    "bl_ui",
     "bpy_extras",
     "mathutils",
     "bmesh",
