@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from functools import partial
 
 import bpy
 import numpy as np
@@ -52,7 +53,7 @@ def subject_of(material: bpy.types.Material, label: str = "") -> Subject:
     interval = points = None
     if BAND in material:
         band = Band.from_values(np.array(material[BAND], np.float32), brdf.basis.grid.knee)
-        interval = lambda angles: band.interval(brdf, angles)  # noqa: E731
+        interval = partial(band.interval, brdf)
     if POINTS in material:
         rows = np.array(material[POINTS], np.float32).reshape(-1, COLUMNS)
         points = MeasuredPoints.from_rows(rows)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import bpy
 
+from ..core.errors import PatinaError
+from ..core.job import FitJob
 from ..core.views.look_job import LookJob
 from ..core.views.photo_drawing import photo_drawing
 from ..core.views.photo_view import PhotoView
@@ -31,15 +33,19 @@ def show_again(context: bpy.types.Context, kind: str, exposure: float) -> None:
         show_photo_view(context, _last.thing, kind, exposure)
 
 
-def look_job(scene: bpy.types.Scene, fit: object, place: int) -> LookJob:
-    """Of the scene's measured materials. fit: the FitJob of the scene's capture; place: of the
-    photo in it."""
+def look_job(scene: bpy.types.Scene, fit: FitJob, place: int) -> LookJob:
+    """Of the scene's measured materials. fit: of the scene's capture; place: of the photo in it.
+    Raises PatinaError where this computer lacks their basis."""
     path = capture_path(scene)
     result = stored_result(path) or {}
     there = measured_of(path)
     scales = {m["name"]: float(m.get("scale", 1.0)) for m in result.get("materials", [])}
     brdfs = [(name, measured_brdf(material)) for name, material in there.items()]
     fitted = [(name, brdf, scales.get(name, 1.0)) for name, brdf in brdfs if brdf is not None]
+    if not fitted:
+        raise PatinaError(
+            "the components that the materials were measured in are not on this computer: fit again"
+        )
     name = fit.capture.photo_name(place)
     chosen = [
         tuple(one["pixel"])
@@ -48,4 +54,7 @@ def look_job(scene: bpy.types.Scene, fit: object, place: int) -> LookJob:
         if one["photo"] == name
     ]
     known = kept_fit(path, stored_result(path))
+    names = [] if known is None else map(known.capture.photo_name, range(len(known.capture.photos)))
+    if name not in list(names)[place : place + 1]:  # the capture file was changed since
+        known = None
     return LookJob(fit.capture, fitted, place, fit.prepare, known, chosen)

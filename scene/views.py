@@ -45,9 +45,12 @@ CHANNELS = (
 )
 
 
+_suiting = False  # while a setting is found for the artist: the chart is drawn once, with it
+
+
 def _changed(views: PatinaViews, context: bpy.types.Context) -> None:
     """What was shown last follows."""
-    if view_image(views.shown) is None:
+    if _suiting or view_image(views.shown) is None:
         return
     if views.shown in KINDS:
         show_again(context, views.shown, views.exposure)
@@ -168,12 +171,23 @@ def show_chart(context: bpy.types.Context, kind: str) -> bpy.types.Image:
         raise PatinaError("there is no measured material in this file: fit first")
     subject = subject_of(material)
     if kind == "highlight" and not views.is_property_set("theta_d"):
-        best = most_measured(subject)
-        if best is not None:
-            views["theta_d"] = math.radians(best)  # not by the property: that would draw twice
+        _suit(views, subject)
     drawing = chart(kind, subject, _other(views, material), _view(views))
     views.shown = kind
     return put_view(context, kind, drawing)
+
+
+def _suit(views: PatinaViews, subject: Subject) -> None:
+    """The highlight curve where most samples are, until the artist chooses."""
+    global _suiting
+    best = most_measured(subject)
+    if best is None:
+        return
+    _suiting = True
+    try:
+        views.theta_d = math.radians(best)
+    finally:
+        _suiting = False
 
 
 def _view(views: PatinaViews) -> View:

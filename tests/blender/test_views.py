@@ -70,6 +70,10 @@ def test_every_chart_is_shown_and_survives_a_reload() -> None:
         assert pictures[kind][..., :3].std() > 0.02, kind
     views = bpy.context.scene.patina_views
     assert views.shown == "interval"
+    best = extension("core.views.charts").most_measured(
+        extension("scene.charted").subject_of(bpy.data.materials["surface"])
+    )
+    assert abs(np.degrees(views.theta_d) - best) < 0.01, "the highlight where most samples are"
     path = str(folder() / "views.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
