@@ -11,6 +11,7 @@ from ..core.report.figures import either_side
 from .wrapped import IN_BOX, wrapped
 
 SPHERE = 5.0  # of a line's height
+SHOWN = 8  # coefficients
 
 
 def draw_measured(
@@ -34,6 +35,25 @@ def draw_measured(
         box.label(text=f"{material['samples']['used']:,} samples", icon="BLANK1")
         for warning in material["warnings"]:
             wrapped(box, warning, "ERROR", IN_BOX)
+        _coefficients(layout, material)
+
+
+def _coefficients(layout: bpy.types.UILayout, material: dict[str, Any]) -> None:
+    """Of the first components, folded: what Change Traits moves."""
+    header, body = layout.panel(f"patina_coefficients_{material['name']}", default_closed=True)
+    header.label(text="Coefficients")
+    if body is None:
+        return
+    rows = material["coefficients"]
+    grid = body.grid_flow(columns=4, even_columns=True, row_major=True, align=True)
+    for word in ("", "R", "G", "B"):
+        grid.label(text=word)
+    for number in range(min(SHOWN, len(rows[0]))):
+        grid.label(text=f"{number + 1}")
+        for channel in rows:
+            grid.label(text=f"{channel[number]:+.3f}")
+    if len(rows[0]) > SHOWN:
+        body.label(text=f"{len(rows[0])} in result.json", icon="BLANK1")
 
 
 def icon_of(material: bpy.types.Material) -> int:

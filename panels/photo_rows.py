@@ -58,6 +58,6 @@ def draw_photos(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         return
     column = layout.column(align=True)
     column.prop(state, "mesh_over", slider=True)
-    column.prop(scene.view_settings, "exposure", text="Exposure for Looking")
+    column.prop(state, "view_exposure", slider=True)
     if photo.exposure:
         column.label(text=f"Exposure {photo.exposure:.4g}")

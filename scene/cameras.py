@@ -60,7 +60,6 @@ def create_camera(
 def put_photo_behind(camera: bpy.types.Object, photo: Path, visible: bool = True) -> None:
     """Show a photo of the camera's own size and lens behind everything the camera sees."""
     image = bpy.data.images.load(str(photo), check_existing=True)
-    image.use_view_as_render = True  # by the scene's view transform and exposure, as the mesh is
     background = camera.data.background_images.new()
     background.image = image
     background.frame_method = "CROP"  # STRETCH, the default, ignores the camera's shift

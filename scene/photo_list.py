@@ -9,6 +9,7 @@ import bpy
 
 from ..core.capture.entries import PhotoEntry
 from . import cameras, lights
+from .exposed_photo import exposed
 from .handlers import attach, detach
 from .properties import CAPTURE, capture_path
 
@@ -36,6 +37,12 @@ def _look(state: PatinaPhotos, context: bpy.types.Context) -> None:
         look_at(state.id_data, state.photos[state.active])
 
 
+def _expose(state: PatinaPhotos, context: bpy.types.Context) -> None:
+    photo = looked_at(state.id_data)
+    if photo is not None:
+        _put_behind(photo, state)
+
+
 def _mix(state: PatinaPhotos, context: bpy.types.Context) -> None:
     _blend(state.id_data)
 
@@ -59,6 +66,19 @@ class PatinaPhotos(bpy.types.PropertyGroup):
         max=1.0,
         default=1.0,
         update=_mix,
+    )
+    view_exposure: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Exposure for Looking",
+        description="How much brighter the photo behind the mesh is shown, in stops; nothing that "
+        "is measured sees it",
+        min=-10.0,
+        max=10.0,
+        soft_min=-5.0,
+        soft_max=5.0,
+        step=10,
+        precision=1,
+        options=set(),
+        update=_expose,
     )
 
 
@@ -107,13 +127,18 @@ def look_at(scene: bpy.types.Scene, photo: PatinaPhoto) -> None:
     camera = photo.camera
     if not has_camera(scene, photo):
         return
-    behind = camera.data.background_images
-    if len(behind) and photo.image is not None:
-        behind[-1].image = photo.image
+    _put_behind(photo, scene.patina_photos)
     mark_lit(camera, photo.name, photo.place, photo.light)
     cameras.look_through(scene, camera)
     lights.shine_only(scene, camera)
     _blend(scene)
+
+
+def _put_behind(photo: PatinaPhoto, state: PatinaPhotos) -> None:
+    """Behind its camera's view, as bright as is asked for."""
+    behind = photo.camera.data.background_images
+    if len(behind) and photo.image is not None:
+        behind[-1].image = exposed(photo.image, state.view_exposure)
 
 
 def _blend(scene: bpy.types.Scene) -> None:

@@ -76,6 +76,33 @@ def test_each_photo_is_looked_at_by_its_line() -> None:
     assert (behind.display_depth, behind.alpha) == ("BACK", 1.0)
 
 
+def test_a_photo_is_shown_brighter_for_looking_only() -> None:
+    bpy.ops.patina.import_capture(filepath=str(two_from_one_place()))
+    state = bpy.context.scene.patina_photos
+    first, last = state.photos[0], state.photos[4]
+    shown = first.camera.data.background_images[0]
+
+    def level(image: bpy.types.Image) -> np.ndarray:
+        pixels = np.empty(len(image.pixels), np.float32)
+        image.pixels.foreach_get(pixels)
+        return pixels.reshape(image.size[1], image.size[0], 4)[..., :3]
+
+    before = level(first.image)
+    state.view_exposure = 1.0
+    assert shown.image not in (first.image, last.image) and tuple(shown.image.size) == tuple(
+        first.image.size
+    )
+    encoded = level(shown.image)
+    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    assert np.abs(linear - np.clip(2 * before, 0, 1)).max() < 0.01
+    assert np.array_equal(level(first.image), before), "the photo itself was changed"
+    state.active = 4
+    assert shown.image != last.image, "the next photo is shown as bright"
+    state.view_exposure = 0.0
+    assert shown.image == last.image
+    assert len([i for i in bpy.data.images if "patina_exposed" in i]) == 1
+
+
 def test_the_list_survives_and_old_files_get_one() -> None:
     path, blend = made().make_capture(folder() / "ball", photos=3), folder() / "list.blend"
     bpy.ops.patina.import_capture(filepath=str(path))
