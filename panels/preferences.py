@@ -36,8 +36,8 @@ class PatinaPreferences(bpy.types.AddonPreferences):
         default=USUAL.cache_folder,
     )
     cache_size: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Largest Size",
-        description="In MB. Beyond it the oldest files are removed when a file is opened and after "
+        name="Largest Size (MB)",
+        description="Beyond it the oldest files are removed when a file is opened and after "
         "a fit, except those that the open file shows",
         min=0,
         max=1_000_000,
@@ -46,19 +46,19 @@ class PatinaPreferences(bpy.types.AddonPreferences):
         default=USUAL.cache_size,
     )
     silhouette: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Silhouette",
+        name="Left Out at Silhouettes",
         description=f"Pixels left out along outlines of the mesh. {SAID} (silhouette_margin)",
         default=USUAL.silhouette,
         **MARGIN,
     )
     shadow: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Shadow Edges",
+        name="Left Out at Shadow Edges",
         description=f"Pixels left out along the edges of shadows. {SAID} (shadow_margin)",
         default=USUAL.shadow,
         **MARGIN,
     )
     mask: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Masks",
+        name="Left Out at Masks",
         description=f"Pixels left out along the borders of painted masks. {SAID} (mask_margin)",
         default=USUAL.mask,
         **MARGIN,
@@ -93,9 +93,9 @@ class PatinaPreferences(bpy.types.AddonPreferences):
         layout.prop(self, "merl_folder")
         if self.merl_folder and not Path(bpy.path.abspath(self.merl_folder)).is_dir():
             layout.label(text="There is no such folder: fits will stop and say so", icon="ERROR")
-        heading = layout.column(heading="Left Out")
+        margins = layout.column()
         for name in ("silhouette", "shadow", "mask", "cosine"):
-            heading.prop(self, name)
+            margins.prop(self, name)
         column = layout.column()
         column.prop(self, "cache_folder")
         column.prop(self, "cache_size")
