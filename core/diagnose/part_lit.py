@@ -7,6 +7,8 @@ object nearly every lit pixel is beside one, and the photo would seem darker tha
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,25 +19,30 @@ from .pixels import Pixels
 Array = NDArray[np.floating]
 
 SIDE = 4  # rays a side of a pixel
+RAYS = SIDE**2
 
 
 def part_lit(
-    rays: RayScene, pixels: Pixels, towards: Array, distance: Array | None = None
+    rays: RayScene,
+    pixels: Pixels,
+    towards: Array | Callable[[int], Array],
+    distance: Array | None = None,
 ) -> NDArray[np.float32]:
     """(n,) part of the irradiance of a pixel's surface that arrives; 1 where it is turned away.
-    towards: (n, 3) unit, to the lamp; distance: (n,) to it, None: it is far."""
+    towards: (n, 3) unit, to the lamp, or for each of RAYS rays to another part of it; distance:
+    (n,) to it, None: it is far."""
     full, through = np.zeros((2, len(pixels)))
-    middles = (np.arange(SIDE) + 0.5) / SIDE - 0.5
-    for down in middles:
-        for right in middles:
-            point = pixels.point + right * pixels.step[:, 0] + down * pixels.step[:, 1]
-            normal = pixels.normal + np.float32(right) * pixels.turn[:, 0]
-            normal = normal + np.float32(down) * pixels.turn[:, 1]
-            normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-            cos_i = np.maximum(np.einsum("ni,ni->n", normal, towards), 0)
-            facing = np.flatnonzero(cos_i > 0)
-            far = None if distance is None else distance[facing]
-            hidden = cast_shadow(rays, point[facing], normal[facing], towards[facing], far)
-            full += cos_i
-            through[facing[~hidden]] += cos_i[facing[~hidden]]
+    for ray in range(RAYS):
+        down, right = ((k + 0.5) / SIDE - 0.5 for k in divmod(ray, SIDE))
+        lamp = towards(ray) if callable(towards) else towards
+        point = pixels.point + right * pixels.step[:, 0] + down * pixels.step[:, 1]
+        normal = pixels.normal + np.float32(right) * pixels.turn[:, 0]
+        normal = normal + np.float32(down) * pixels.turn[:, 1]
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        cos_i = np.maximum(np.einsum("ni,ni->n", normal, lamp), 0)
+        facing = np.flatnonzero(cos_i > 0)
+        far = None if distance is None else distance[facing]
+        hidden = cast_shadow(rays, point[facing], normal[facing], lamp[facing], far)
+        full += cos_i
+        through[facing[~hidden]] += cos_i[facing[~hidden]]
     return np.where(full > 0, through / np.maximum(full, 1e-12), 1.0).astype(np.float32)

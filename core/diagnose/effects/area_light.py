@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...angles.vectors import tangents
-from ...geometry.view import cast_shadow
 from ..effect import Array, Effect, Numbers, Setting
+from ..part_lit import RAYS, part_lit
 from ..situation import Situation
 
 RADII = np.radians([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 13.0])  # about the lamp's middle, of shadow rays
-AROUND = 8
+TURNS = 7  # of RAYS, from the direction of one ray to that of the next: all of them, in no order
 PARTS = 12  # of the lamp
 LEAST = np.radians(1.0)  # the sun itself is half a degree wide
 USUAL, START = np.radians(6.0), np.radians(3.0)
@@ -55,12 +55,14 @@ class AreaLight(Effect):
         ring = np.empty((len(pixels), len(RADII)))
         ring[:, 0] = pixels.visible
         for k, radius in enumerate(RADII[1:], start=1):
-            hidden = np.zeros(len(pixels))
-            for turn in 2 * np.pi * np.arange(AROUND) / AROUND:
+
+            def towards(ray: int, radius: float = radius) -> Array:
+                turn = 2 * np.pi * (TURNS * ray % RAYS) / RAYS
                 aside = np.tan(radius) * (np.cos(turn) * first + np.sin(turn) * other)
-                towards = (pixels.light + aside) * np.float32(np.cos(radius))
-                hidden += cast_shadow(setting.rays, pixels.point, pixels.normal, towards, None)
-            ring[:, k] = 1 - hidden / AROUND
+                return (pixels.light + aside) * np.float32(np.cos(radius))
+
+            # as the light of a point was: else the edges' pixels alone would ask for a lamp's size
+            ring[:, k] = part_lit(setting.rays, pixels, towards)
         # of a disc: the integral of rings, linear between them
         middle = 0.5 * (ring[:, 1:] + ring[:, :-1]) * np.diff(RADII**2)
         free = ring.copy()
