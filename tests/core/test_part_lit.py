@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from patina.core.diagnose.effects.area_light import RADII, AreaLight
 from patina.core.diagnose.effects.light_direction import LightDirection
 from patina.core.diagnose.moved_shadows import MovedShadows
 from patina.core.diagnose.part_lit import SIDE, part_lit
@@ -64,6 +65,30 @@ def test_a_pixel_is_lit_as_far_as_the_shadow_does_not_reach(elevation: float) ->
 def test_what_is_turned_away_is_not_in_a_shadow() -> None:
     pixels = _row_of_pixels(np.array([0.1]), _towards(0.5))
     assert part_lit(_floor_and_wall(), pixels, -pixels.light) == pytest.approx(1.0)
+
+
+def test_a_wide_lamp_softens_the_edge_of_whole_pixels() -> None:
+    """Against the shadow of a wall under a disc of lamps, seen by square pixels; a lamp of next to
+    no size is a point."""
+    high, rng = 0.5, np.random.default_rng(0)
+    ends = WALL / np.tan(high)
+    x = ends + np.linspace(-0.06, 0.06, 49)
+    rays = _floor_and_wall()
+    pixels = _row_of_pixels(x, _towards(high))
+    pixels = replace(pixels, visible=part_lit(rays, pixels, pixels.light))
+    effect = AreaLight.of(replace(make_lit_ball.lit_ball(), pixels=pixels, rays=rays))
+    assert effect is not None and np.array_equal(effect.free[:, 0], pixels.visible)
+    out, turn = np.sqrt(rng.random(4000)), 2 * np.pi * rng.random(4000)
+    for place in (1, 2):  # lamps of 1 and of 2 degrees
+        aside = np.tan(RADII[place]) * out
+        sides = (
+            aside * np.cos(turn) * effect.first[:1].T + aside * np.sin(turn) * effect.other[:1].T
+        )
+        lamps = _towards(high)[:, None] + sides
+        reach = -WALL * lamps[0] / lamps[2]
+        true = np.clip((x[:, None] - reach) / WIDE + 0.5, 0, 1).mean(axis=1)
+        assert np.abs(effect.free[:, place] - true).max() < 0.5 / SIDE  # columns of rays
+        assert abs(effect.free[:, place].mean() - true.mean()) < 0.02
 
 
 def test_shadows_go_with_the_lamp() -> None:
