@@ -72,9 +72,11 @@ def test_a_wide_lamp_softens_the_edge_of_whole_pixels() -> None:
     no size is a point."""
     high, rng = 0.5, np.random.default_rng(0)
     ends = WALL / np.tan(high)
-    x = ends + np.linspace(-0.06, 0.06, 49)
+    wide = 5 * WIDE  # than which the penumbra is narrower
+    x = ends + np.linspace(-0.15, 0.15, 61)
     rays = _floor_and_wall()
     pixels = _row_of_pixels(x, _towards(high))
+    pixels = replace(pixels, step=pixels.step * np.float32(wide / WIDE))
     pixels = replace(pixels, visible=part_lit(rays, pixels, pixels.light))
     effect = AreaLight.of(replace(make_lit_ball.lit_ball(), pixels=pixels, rays=rays))
     assert effect is not None and np.array_equal(effect.free[:, 0], pixels.visible)
@@ -86,7 +88,7 @@ def test_a_wide_lamp_softens_the_edge_of_whole_pixels() -> None:
         )
         lamps = _towards(high)[:, None] + sides
         reach = -WALL * lamps[0] / lamps[2]
-        true = np.clip((x[:, None] - reach) / WIDE + 0.5, 0, 1).mean(axis=1)
+        true = np.clip((x[:, None] - reach) / wide + 0.5, 0, 1).mean(axis=1)
         assert np.abs(effect.free[:, place] - true).max() < 0.5 / SIDE  # columns of rays
         assert abs(effect.free[:, place].mean() - true.mean()) < 0.02
 
