@@ -3,6 +3,8 @@ named are found again in the header's menu of presets."""
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import bpy
 from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
@@ -19,8 +21,9 @@ class PATINA_OT_add_export_preset(AddPresetBase, bpy.types.Operator):
     bl_label = "Add Export Preset"
     preset_menu = "PATINA_PT_export_presets"
     preset_subdir = PRESETS
-    preset_defines = ["export = bpy.context.scene.patina_export"]
-    preset_values = ["export.formats"]
+    # no preset_defines: Blender 4.3 does not find the names in them under Python 3.13
+    preset_defines: ClassVar[list[str]] = []
+    preset_values: ClassVar[list[str]] = ["bpy.context.scene.patina_export.formats"]
 
 
 class PATINA_PT_export_presets(PresetPanel, bpy.types.Panel):
