@@ -312,7 +312,7 @@ def close_panels() -> None:
     panels += [c for c in part("panels.sidebar").CLASSES if c.__name__.startswith("PATINA_PT_")]
     panels = list(dict.fromkeys(panels))
     inner = [panel for panel in panels if getattr(panel, "bl_parent_id", "")]
-    outer = [panel for panel in panels if panel not in inner]
+    outer = [panel for panel in panels if getattr(panel, "stage", "")]  # menus of presets have none
     for panel in (*inner, *outer):
         bpy.utils.unregister_class(panel)
     outer.sort(key=lambda panel: STAGES.index(panel.stage))
