@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.photo.transfer import SRGB
 from ..core.views import display
 from .kept import Kept
 
@@ -45,6 +46,6 @@ def _light(photo: bpy.types.Image) -> NDArray[np.float32]:
         photo.pixels.foreach_get(pixels)
         small = display.shrink(pixels.reshape(height, width, 4)[..., :3], LONGEST)
         if not photo.is_float:  # bytes are as the file has them
-            small = np.where(small <= 0.04045, small / 12.92, ((small + 0.055) / 1.055) ** 2.4)
+            small = SRGB(small)
         _last.thing = photo.name, small.astype(np.float32)
     return _last.thing[1]

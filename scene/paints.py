@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.capture.model import LEFT_OUT
+from ..core.photo.transfer import SRGB
 from ..core.views.display import srgb
 from .face_slots import COLOURS, shown_name
 
@@ -92,5 +93,4 @@ def _of_brush(colour: tuple[int, int, int], linear: NDArray[np.float64]) -> tupl
 
 
 def _linear(colour: tuple[int, int, int]) -> NDArray[np.float64]:
-    x = np.array(colour) / 255
-    return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4)
+    return SRGB(np.array(colour) / 255)

@@ -94,26 +94,11 @@ def box(left: float, top: float, right: float, bottom: float, colour: str) -> Ar
     return Area(np.array(corners, float), colour)
 
 
-def beside(drawings: Sequence[Drawing], gap: float = 12.0) -> Drawing:
-    """Several drawings in a row."""
-    parts: list[Part] = []
-    left = 0.0
-    for one in drawings:
-        parts += [_shifted(part, left) for part in one.parts]
-        left += one.width + gap
-    height = max(one.height for one in drawings)
-    label = "; ".join(one.label for one in drawings)
-    return Drawing(left - gap, height, label, tuple(parts))
+def rgb(colour: str) -> NDArray[np.uint8]:
+    """(3,) of a "#rrggbb"."""
+    return np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)], np.uint8)
 
 
-def _shifted(part: Part, right: float) -> Part:
-    if isinstance(part, Label):
-        return Label(part.x + right, part.y, part.text, part.anchor, part.colour, part.size)
-    if isinstance(part, Picture):
-        return Picture(part.left + right, part.top, part.width, part.height, part.pixels)
-    moved = part.points + np.array([right, 0.0])
-    if isinstance(part, Line):
-        return Line(moved, part.colour, part.width, part.dash)
-    if isinstance(part, Area):
-        return Area(moved, part.colour, part.opacity)
-    return Dots(moved, part.colours, part.radius, part.opacity)
+def named(colour: Sequence[int] | NDArray[np.integer]) -> str:
+    """The "#rrggbb" of (3,) 0 … 255."""
+    return "#" + "".join(f"{int(c):02x}" for c in colour)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..angles import Angles, cosines
 from ..samples import MeasuredPoints
 from . import display
-from .drawing import INK, Dots, Drawing, Label, Part, Picture, box
+from .drawing import INK, Dots, Drawing, Label, Part, Picture, box, named
 from .subject import Show, Subject, round_up
 
 LEFT, TOP, WIDTH, HEIGHT = 40.0, 18.0, 400.0, 200.0
@@ -145,8 +145,7 @@ def _drawing(field: _Field, dots: Dots | None) -> Drawing:
     parts.append(Label(LEFT + WIDTH, bottom + 28, "across: θh, square-root axis · up: θd", "end"))
     x = LEFT
     for text, colour in field.key:
-        shade = "#" + "".join(f"{c:02x}" for c in colour.tolist())
-        parts.append(box(x, bottom + 38, x + 10, bottom + 48, shade))
+        parts.append(box(x, bottom + 38, x + 10, bottom + 48, named(colour)))
         parts.append(Label(x + 14, bottom + 47, text))
         x += 14 + 5.6 * len(text) + 14
     height = bottom + (56 if field.key else 36)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .criteria import LOOKS
-from .drawing import INK, Drawing, Label, Part, Picture, box
+from .drawing import INK, Drawing, Label, Part, Picture, box, named
 from .photo_pictures import FULL_COLOUR, compared, criteria_picture
 from .photo_view import PhotoView
 
@@ -63,9 +63,8 @@ def _samples(view: PhotoView) -> Drawing:
     left, y = width + 2 * GAP, TOP + 10
     for criterion, share in sorted(view.shares.items(), key=lambda item: -item[1]):
         look = LOOKS[criterion]
-        shade = "#" + "".join(f"{c:02x}" for c in look.colour)
         told = f"{100 * share:.0f} %" if share >= 0.01 else "< 1 %"
-        parts.append(box(left, y - 9, left + 10, y + 1, shade))
+        parts.append(box(left, y - 9, left + 10, y + 1, named(look.colour)))
         parts.append(Label(left + 15, y, f"{told} {look.word}", colour=INK))
         for line in textwrap.wrap(look.advice, LETTERS):
             y += LINE - 3

@@ -9,7 +9,7 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from .drawing import Area, Dots, Drawing, Label, Line, Picture
+from .drawing import Area, Dots, Drawing, Label, Line, Picture, rgb
 
 Array = NDArray[np.float32]
 
@@ -166,4 +166,4 @@ def _over(image: Array, covered: Array, colour: Array) -> None:
 
 
 def _rgb(colour: str) -> Array:
-    return np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)], np.float32) / 255
+    return rgb(colour).astype(np.float32) / 255

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import display
-from .drawing import INK, Drawing, Label, Part, Picture
+from .drawing import INK, Drawing, Label, Part, Picture, rgb
 from .raster import PAPER
 from .sphere import lit_sphere
 from .subject import Subject
@@ -38,5 +38,5 @@ def sphere_view(subject: Subject, other: Subject | None = None, exposure: float 
 
 
 def _on_paper(pixels: NDArray[np.uint8], coverage: NDArray[np.floating]) -> NDArray[np.uint8]:
-    paper = np.array([int(PAPER[k : k + 2], 16) for k in (1, 3, 5)], np.float32)
+    paper = rgb(PAPER).astype(np.float32)
     return (paper + coverage[..., None] * (pixels - paper) + 0.5).astype(np.uint8)

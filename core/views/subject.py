@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..angles import Angles
 from ..samples import MeasuredPoints
+from .drawing import rgb
 
 Evaluate = Callable[[Angles], NDArray[np.floating]]
 Channels = Literal["rgb", "r", "g", "b", "mean"]
@@ -99,4 +100,4 @@ def round_up(x: float) -> float:
 
 def dark(colour: str) -> NDArray[np.uint8]:
     """(3,) the colour of the points over a curve of that colour."""
-    return np.array([int(colour[k : k + 2], 16) * 2 // 3 for k in (1, 3, 5)], np.uint8)
+    return (rgb(colour).astype(int) * 2 // 3).astype(np.uint8)

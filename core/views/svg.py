@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from .drawing import FONT, GREY, Area, Dots, Drawing, Label, Line, Part
+from .drawing import FONT, GREY, Area, Dots, Drawing, Label, Line, Part, named
 
 FAMILY = "system-ui,sans-serif"
 
@@ -55,9 +55,8 @@ def _dots(part: Dots) -> str:
     for colour in np.unique(part.colours, axis=0):
         mine = part.points[(part.colours == colour).all(axis=1)]
         path = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in mine)
-        shade = "#" + "".join(f"{c:02x}" for c in colour.tolist())
         found.append(
-            f'<path d="{path}" stroke="{shade}" stroke-width="{2 * part.radius:g}" '
+            f'<path d="{path}" stroke="{named(colour)}" stroke-width="{2 * part.radius:g}" '
             f'stroke-linecap="round" stroke-opacity="{part.opacity:g}" fill="none"/>'
         )
     return "".join(found)
