@@ -6,6 +6,7 @@ import tempfile
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from patina.core.fit.spread import directions
 from patina.core.job import CaptureResult, FitJob
 from patina.core.job.check_job import CheckJob
 
-from .make import OUTSIDERS, Truth, make
+from .make import CAPTURE, OUTSIDERS, Truth, make, make_plain
 
 SURE = 1.96  # standard errors to either side of a 95 % interval
 OWN_BRDF = ("second_material", "subsurface", "anisotropy", "outside_basis", "interreflection")
@@ -78,10 +79,9 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
     """Make a capture in a folder that is thrown away, and look what is found in it."""
     with tempfile.TemporaryDirectory() as folder:
         since = time.perf_counter()
-        hidden, plain = Path(folder) / "hidden", Path(folder) / "plain"
-        truth = make(hidden, cause, strength, seed, plain_folder=plain)
+        truth = make(Path(folder), cause, strength, seed)
         made = time.perf_counter()
-        job = CheckJob(FitJob(read_capture(hidden / "hunt.capture.toml"), threads=threads))
+        job = CheckJob(FitJob(read_capture(Path(folder) / CAPTURE), threads=threads))
         job.drain()
         done = time.perf_counter()
         found, after = job.checked.found, job.result
@@ -94,14 +94,9 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
             if name in of
             for each in _off(of[name], truth.numbers, job.checked.setting)
         ]
-        error = None
-        if not set(cause.split("+")) & set(OWN_BRDF):
-            again = FitJob(
-                read_capture(plain / "hunt.capture.toml"), threads=threads, portable=False
-            )
-            again.drain()
-            assert again.result is not None
-            error = _brdf_error(after, truth) / _brdf_error(again.result, truth)
+    error = None
+    if not set(cause.split("+")) & set(OWN_BRDF):
+        error = _brdf_error(after, truth) / _plain_error(seed, threads)
     return Row(
         cause=cause,
         wanted=strength,
@@ -115,6 +110,17 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
         off=tuple(off),
         seconds=(made - since, done - made),
     )
+
+
+@lru_cache(maxsize=1)
+def _plain_error(seed: int, threads: int | None) -> float:
+    """Of the BRDF that is fitted to photos without an effect."""
+    with tempfile.TemporaryDirectory() as folder:
+        truth = make_plain(Path(folder), seed)
+        job = FitJob(read_capture(Path(folder) / CAPTURE), threads=threads, portable=False)
+        job.drain()
+    assert job.result is not None
+    return _brdf_error(job.result, truth)
 
 
 def _brdf_error(result: CaptureResult, truth: Truth) -> float:

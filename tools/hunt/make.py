@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,8 @@ from .shape import lumpy
 from .studio import HuntStudio
 
 Array = np.ndarray
+
+CAPTURE = "hunt.capture.toml"
 
 MAKERS: dict[str, Callable[[Scene], Hidden]] = {
     "light_direction": light_makers.direction,
@@ -71,27 +74,41 @@ class Truth:
     seed: int
 
 
-def make(
-    folder: Path, cause: str, strength: float, seed: int, plain_folder: Path | None = None
-) -> Truth:
+def make(folder: Path, cause: str, strength: float, seed: int) -> Truth:
     """Write capture, mesh, cameras and photos into ``folder``. cause: "none", a key of MAKERS or
-    OUTSIDERS, or two of them with a + between, the second of ON_PICTURES. plain_folder: where the
-    same is written without the effect."""
+    OUTSIDERS, or two of them with a + between, the second of ON_PICTURES."""
+    plain = _plain(seed)
+    scene, material = _scene(seed)
+    scene = replace(scene, plain=plain, strength=strength)
+    hidden = _hidden(scene, [] if cause == "none" else cause.split("+"))
+    photos = camera_faults.with_noise(hidden.photos, scene.rng)
+    _write(folder, hidden.surface or scene.surface, hidden.told or scene.shots, photos)
+    return Truth(cause, hidden.strength, hidden.numbers, material, seed)
+
+
+def make_plain(folder: Path, seed: int) -> Truth:
+    """The same without an effect, and with other noise."""
+    scene, material = _scene(seed)
+    noise = np.random.default_rng([seed, 8])
+    _write(folder, scene.surface, scene.shots, camera_faults.with_noise(_plain(seed), noise))
+    return Truth("none", 0.0, {}, material, seed)
+
+
+@lru_cache(maxsize=1)
+def _plain(seed: int) -> list[Array]:
+    """Photos without an effect: causes and strengths of one seed share them."""
+    return _scene(seed)[0].photographed()
+
+
+def _scene(seed: int) -> tuple[Scene, int]:
+    """What is drawn from a seed, not photographed yet; the number of its material."""
     rng = np.random.default_rng([seed, 7])
     studio = HuntStudio()
     surface = lumpy(seed)
     studio.shape(surface)
     material, brdf = any_brdf(Basis.default(), rng)
     studio.dress(studio.measured(brdf))
-    scene = Scene(studio, surface, brdf, any_shots(rng), [], strength, rng)
-    plain = scene.photographed()
-    hidden = _hidden(replace(scene, plain=plain), [] if cause == "none" else cause.split("+"))
-    photos = camera_faults.with_noise(hidden.photos, rng)
-    _write(folder, hidden.surface or surface, hidden.told or scene.shots, photos)
-    if plain_folder is not None:
-        noise = np.random.default_rng([seed, 8])
-        _write(plain_folder, surface, scene.shots, camera_faults.with_noise(plain, noise))
-    return Truth(cause, hidden.strength, hidden.numbers, material, seed)
+    return Scene(studio, surface, brdf, any_shots(rng), [], 0.0, rng), material
 
 
 def _hidden(scene: Scene, causes: Sequence[str]) -> Hidden:
@@ -136,4 +153,4 @@ def _write(folder: Path, surface, shots: list[Shot], photos: list[Array]) -> Non
         target.write(str(folder / name))
         lines += ["[[photo]]", f'file = "{name}"', f'camera = "view_{k}.jpg"']
         lines += [f'light = "light {k // 2 + 1}"', ""]
-    (folder / "hunt.capture.toml").write_text("\n".join(lines), "utf-8")
+    (folder / CAPTURE).write_text("\n".join(lines), "utf-8")

@@ -62,9 +62,10 @@ def main() -> int:
 
 
 def _wanted(told: argparse.Namespace, usual: Sequence[str]) -> Iterator[tuple[str, float, int]]:
-    for cause in told.causes or usual:
-        for strength in told.strengths if cause != "none" else (0.0,):
-            for seed in told.seeds:
+    """Seed by seed: what is the same for one is made once."""
+    for seed in told.seeds:
+        for cause in told.causes or usual:
+            for strength in told.strengths if cause != "none" else (0.0,):
                 yield cause, strength, seed
 
 
