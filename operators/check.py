@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import bpy
 
 from ..core.diagnose.chosen import can_be_applied
@@ -36,7 +38,7 @@ explain, name the cause, and fit again with it in the model"""
         self._job = PreparedJob(CheckJob(fit_job(self, context.scene)))
         self._scene = context.scene.name
 
-    def _finish(self, context: bpy.types.Context) -> None:
+    def _finish(self, context: bpy.types.Context) -> Iterator[None]:
         checked, after = self._job.job.checked, self._job.result
         found, setting, before = checked.found, checked.setting, checked.result
         scene = bpy.data.scenes.get(self._scene)
@@ -49,8 +51,9 @@ explain, name the cause, and fit again with it in the model"""
         for trial in can_be_applied(found):
             cause = scene.patina.causes.add()
             cause.name, cause.use = trial.effect.cause, trial.effect.cause in applied
-        _show(self, scene, after)
+        yield from _show(self, scene, after)
         store_result(str(before.capture.file), describe(found, before, after), DIAGNOSIS)
+        yield
         mesh, vertices = scene.patina.mesh, setting.rays.mesh.vertices
         if mesh is not None and not paint_evidence(mesh, vertices, setting.pixels, found):
             self.report({"WARNING"}, f"{mesh.name} no longer has the scan's vertices: not coloured")
@@ -81,20 +84,20 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
         self._job = PreparedJob(refit)
         self._scene = context.scene.name
 
-    def _finish(self, context: bpy.types.Context) -> None:
+    def _finish(self, context: bpy.types.Context) -> Iterator[None]:
         checked, after = self._job.job.checked, self._job.result
         scene = bpy.data.scenes.get(self._scene)
         if after is None or scene is None or checked.result is None or checked.found is None:
             self.report({"WARNING"}, "The scene is gone; the materials were not applied")
             return
-        _show(self, scene, after)
+        yield from _show(self, scene, after)
         told = describe(checked.found, checked.result, after)
         store_result(str(after.capture.file), told, DIAGNOSIS)
 
 
-def _show(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> None:
+def _show(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> Iterator[None]:
     """The materials onto the mesh, and with which causes they were fitted."""
-    show_result(operator, scene, result)
+    yield from show_result(operator, scene, result)
     used = ", ".join(effect.cause for effect in result.effects)
     told = f"with {used} in the model" if used else "as the capture says"
     operator.report({"INFO"}, f"{len(result.materials)} materials fitted {told}")

@@ -25,6 +25,7 @@ are written as the last fit found them; glTF and USD take the scanned mesh along
     PANEL = "material"
     bl_options = {"REGISTER", "UNDO"}
 
+    ALONGSIDE = False
     TICK = 0.1
     CANCELLED = "Export cancelled"
 

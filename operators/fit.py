@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
@@ -10,7 +11,7 @@ from ..core.capture import read_capture
 from ..core.errors import InputError
 from ..core.job import CaptureResult, FitJob
 from ..core.samples import Margins
-from ..scene.apply import apply_result
+from ..scene.apply import applying
 from ..scene.cache import own_basis, trim_cache
 from ..scene.face_slots import with_painted_slots
 from ..scene.last_fit import keep_fit
@@ -49,10 +50,12 @@ def fit_job(operator: bpy.types.Operator, scene: bpy.types.Scene) -> FitJob:
     return FitJob(capture, own_basis(), prepare)
 
 
-def show_result(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> None:
-    """The materials onto the mesh, and what should be known about them to the user."""
+def show_result(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> Iterator[None]:
+    """The materials onto the mesh, and what should be known about them to the user; piece by
+    piece."""
     job = operator._job
-    notes = apply_result(scene, result, job.stages, job.prepared)
+    notes = yield from applying(scene, result, job.stages, job.prepared)
+    yield
     keep_fit(result)
     trim_cache()
     for material in result.materials:
@@ -78,7 +81,7 @@ class PATINA_OT_fit(Stepped, bpy.types.Operator):
         self._job = PreparedJob(fit_job(self, context.scene))
         self._scene = context.scene.name  # by name: a reference does not survive undo
 
-    def _finish(self, context: bpy.types.Context) -> None:
+    def _finish(self, context: bpy.types.Context) -> Iterator[None]:
         result = self._job.result
         if result is None:
             return
@@ -86,7 +89,7 @@ class PATINA_OT_fit(Stepped, bpy.types.Operator):
         if scene is None:
             self.report({"WARNING"}, "The scene is gone; the materials were not applied")
             return
-        show_result(self, scene, result)
+        yield from show_result(self, scene, result)
         self.report({"INFO"}, f"{len(result.materials)} materials measured")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
@@ -9,10 +10,10 @@ import bpy
 from ..commands.staging import check_out, staged_folder
 from ..core.capture import Capture, read_capture
 from ..core.errors import InputError, PatinaError
-from ..core.job.job import Job
+from ..core.job.job import Job, Step
 from ..core.masks.proposal import MOST_MATERIALS
 from ..core.masks.proposal_job import ProposalJob
-from ..core.masks.write_masks import MasksJob, Wanted, material_names
+from ..core.masks.write_masks import MasksJob, Wanted, Written, material_names
 from ..scene.face_slots import show_proposal
 from ..scene.lights import with_dragged_lamps
 from ..scene.mask_images import (
@@ -91,6 +92,22 @@ class PATINA_OT_propose_materials(_OfCapture, bpy.types.Operator):
             self.report({"INFO"}, f"{found.count} materials; paint over what is wrong")
 
 
+class _StagedMasks(Job):
+    """Shadow masks in the folder ``out``, all of them or none."""
+
+    def __init__(self, capture: Capture, out: Path) -> None:
+        super().__init__()
+        self.capture, self.out = capture, out
+        self.result: Written | None = None
+
+    def run(self) -> Iterator[Step]:
+        """Those of a MasksJob; then the files move into place."""
+        with staged_folder(self.out) as folder:
+            job = MasksJob(self.capture, Wanted(), folder, self.out)
+            yield from job.run()
+        self.result = job.result
+
+
 class PATINA_OT_shadow_masks(_OfCapture, bpy.types.Operator):
     """Compute where each photo's light is blocked, as images to paint on: white is left out"""
 
@@ -104,34 +121,18 @@ class PATINA_OT_shadow_masks(_OfCapture, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    _staging = None
-
     def _job_of(self, scene: bpy.types.Scene, capture: Capture) -> Job:
         if shadow_images(self._capture) and not self.replace:
             raise PatinaError("there are shadow masks already: choose Replace to lose them")
         self._photos = capture.photos
-        self._out = check_out(masks_folder(capture.file))
-        self._staging = staged_folder(self._out)
-        return MasksJob(capture, Wanted(), self._staging.__enter__(), self._out)
+        return _StagedMasks(capture, check_out(masks_folder(capture.file)))
 
     def _take(self, scene: bpy.types.Scene) -> None:
-        staging, self._staging = self._staging, None
-        staging.__exit__(None, None, None)  # moves the files into place
-        files = [self._out / name for name in self._job.result.shadows]
+        out = self._job.out
+        files = [out / name for name in self._job.result.shadows]
         names = [photo.file.name for photo in self._photos]
         show_shadow_masks(scene, self._capture, names, files)
-        self.report({"INFO"}, f"{len(files)} shadow masks in {self._out}")
-
-    def _stop(self, context: bpy.types.Context) -> None:
-        staging, self._staging = self._staging, None
-        if staging is not None:  # ended early: take the files away
-            stopped = PatinaError("stopped")
-            try:
-                staging.__exit__(PatinaError, stopped, None)
-            except PatinaError as error:
-                if error is not stopped:
-                    raise
-        super()._stop(context)
+        self.report({"INFO"}, f"{len(files)} shadow masks in {out}")
 
 
 CLASSES = (PATINA_OT_propose_materials, PATINA_OT_shadow_masks)

@@ -27,6 +27,7 @@ class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     TICK = 0.1
+    ALONGSIDE = False
     CANCELLED = "Solving cancelled; nothing was written"
 
     directory: bpy.props.StringProperty(  # type: ignore[valid-type]

@@ -1,30 +1,41 @@
-"""Long work from the window: scripts drain the job, the window steps it on a timer, ESC cancels."""
+"""Long work from the window: scripts drain the job, the window looks at it on a timer, ESC cancels.
+
+Work that knows nothing of Blender goes on in a thread of its own, so that a tick of the timer never
+waits for a piece of it. What is done to Blender's data is done on the timer, a piece a tick.
+"""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import bpy
 
 from ..core.errors import PatinaError
 from ..core.job import Job
+from ..core.job.beside import Alongside
 from ..scene.running import Running, running, tell
 from .report_errors import refuse
 
+TAKING = "putting it into the file"
 TOLD, SOON = 0.05, 2.0  # done, and seconds taken, before time left is told
 
 
 class Stepped:
-    """Subclasses set self._job and self._scene in _start, and take the result in _finish."""
+    """Subclasses set self._job and self._scene in _start, and take the result in _finish. A _finish
+    that yields is gone on with a tick later; no event is passed on meanwhile."""
 
-    TICK = 0.01
+    TICK = 0.05
+    ALONGSIDE = True  # False: the job touches Blender
     PANEL = ""  # the stage that shows how far it is
     CANCELLED = "Cancelled; nothing was changed"
 
     _timer: Any = None
     _since = 0.0
     _job: Job | None = None
+    _alongside: Alongside | None = None
+    _taking: Iterator[None] | None = None
     _scene: str = ""  # by name: a reference does not survive undo
 
     @classmethod
@@ -40,7 +51,8 @@ class Stepped:
         try:
             self._start(context)
             self._job.drain()
-            self._finish(context)
+            for _ in self._finish(context) or ():
+                pass
         except PatinaError as error:
             return refuse(self, error)
         finally:
@@ -61,7 +73,9 @@ class Stepped:
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """One step a tick."""
+        """Look how far it is, or take over a piece of the result, once a tick."""
+        if self._taking is not None and event.type != "TIMER":
+            return {"RUNNING_MODAL"}  # too late to leave the file as it was
         if event.type == "ESC":
             self._stop(context)
             self.report({"WARNING"}, self.CANCELLED)
@@ -69,19 +83,36 @@ class Stepped:
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         try:
-            if self._job.step():
-                now = self._job.now
-                tell(Running(self._scene, self.PANEL, now.stage, now.fraction, self._left()))
-                return {"RUNNING_MODAL"}
-            self._finish(context)
+            going = self._goes_on(context)
         except PatinaError as error:
             self._stop(context)
             return refuse(self, error)
         except BaseException:
             self._stop(context)
             raise
+        if going:
+            return {"RUNNING_MODAL"}
         self._stop(context)
         return {"FINISHED"}
+
+    def _goes_on(self, context: bpy.types.Context) -> bool:
+        """A tick's worth of work; False when all is done."""
+        if self._taking is None:
+            if self._step():
+                now = self._job.now
+                tell(Running(self._scene, self.PANEL, now.stage, now.fraction, self._left()))
+                return True
+            tell(Running(self._scene, self.PANEL, TAKING, 1.0))
+            self._taking = iter(self._finish(context) or ())
+            return True
+        return next(self._taking, self) is not self
+
+    def _step(self) -> bool:
+        """False when the job is done."""
+        if not self.ALONGSIDE:
+            return self._job.step()
+        self._alongside = self._alongside or Alongside(self._job)
+        return self._alongside.step()
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender ends the operator (the window closes)."""
@@ -90,7 +121,7 @@ class Stepped:
     def _start(self, context: bpy.types.Context) -> None:
         raise NotImplementedError
 
-    def _finish(self, context: bpy.types.Context) -> None:
+    def _finish(self, context: bpy.types.Context) -> Iterator[None] | None:
         raise NotImplementedError
 
     def _left(self) -> float | None:
@@ -99,7 +130,9 @@ class Stepped:
         return took * (1 - done) / done if done > TOLD and took > SOON else None
 
     def _stop(self, context: bpy.types.Context) -> None:
-        if self._job is not None:
+        if self._alongside is not None:
+            self._alongside.close()
+        elif self._job is not None:
             self._job.close()
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)

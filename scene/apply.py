@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from datetime import date
 
 import bpy
 
 from ..core.job import CaptureResult, Stage
 from ..core.report.result_json import describe
+from ..core.steps import drained
 from . import materials, meshes, osl_files
 from .charted import keep_earlier, keep_evidence
 from .face_slots import drop_stand_ins
@@ -41,6 +42,16 @@ def apply_result(
     """Make the materials, put them on the scanned mesh where it is in the scene, and keep the
     description. Returns notes for the user. A material of an earlier fit is replaced. prepared: of
     each material, where it was made before."""
+    return drained(applying(scene, result, stages, prepared))
+
+
+def applying(
+    scene: bpy.types.Scene,
+    result: CaptureResult,
+    stages: Sequence[Stage],
+    prepared: Sequence[Prepared] = (),
+) -> Generator[None, None, list[str]]:
+    """``apply_result``, a piece at a time."""
     with_osl = materials.osl_missing() is None
     capture = str(result.capture.file)
     notes: list[str] = []
@@ -49,9 +60,12 @@ def apply_result(
         old = next((m for m in measured_materials() if _is(m, fitted.name, capture)), None)
         brdf = fitted.fit.brdf
         own = prepared[place] if prepared else prepare(brdf, with_osl)
+        yield
         files = osl_files.ensure_files(brdf, own.tables) if with_osl else None
+        yield
         new = materials.create_material(fitted.name, brdf, fitted.principled, files, fitted.lobes)
         new[MEASURED], new[CAPTURE] = fitted.name, capture
+        yield
         new[DATE] = date.today().isoformat()
         put_spheres(new, own.spheres)
         keep_evidence(new, fitted)
@@ -67,12 +81,14 @@ def apply_result(
                 f"because {new[materials.REASON_PROPERTY]}"
             )
         made.append(new)
+        yield
     osl_files.drop_unused()
     mesh = scene.patina.mesh
     if mesh is None or mesh.type != "MESH" or mesh.name not in scene.objects:
         notes.append("the scanned mesh is not in this scene: materials were made, not assigned")
     elif not meshes.assign_materials(mesh, made, result.face_material):
         notes.append(f"{mesh.name} no longer has the scan's faces: all wear the first material")
+    yield
     drop_stand_ins(capture)
     for material in made:  # what had its name made way; another name is the artist's
         name = material[MEASURED]

@@ -36,6 +36,7 @@ class Prepared:
 
 def prepare(brdf: PrincipalBRDF, with_osl: bool) -> Prepared:
     """Knows nothing of Blender: other threads may ask."""
+    _ = brdf.basis.version  # a sum over the components, which file names need: kept once it is made
     return Prepared(spheres(brdf), shader_tables(brdf) if with_osl else None)
 
 

@@ -23,8 +23,9 @@ BENCHES = (
     "diagnose",
     "speed",
     "traits",
+    "steps",
 )
-OWN = ("speed", "traits")  # these need no reference data
+OWN = ("speed", "traits", "steps")  # these need no reference data
 
 
 def main() -> int:

@@ -47,6 +47,11 @@ def asked(
     signs = np.random.default_rng(1).choice([-1.0, 1.0], (DRAWS, int(of.max()) + 1))
 
     def ask(effect: Effect) -> tuple[Asked, Vector | None]:
+        tries = [ask_from(one) for one in effect.beginnings]
+        best, draws = max(tries, key=lambda each: each[0].gain)
+        return replace(best, chance=min(1.0, best.chance * len(tries))), draws
+
+    def ask_from(effect: Effect) -> tuple[Asked, Vector | None]:
         if not len(effect.numbers) or effect.fine:  # signs of squares tell nothing of single pixels
             return Asked(effect, np.inf, 0.0), None
         pulls, metric = _scores(now, effect, of)

@@ -171,6 +171,11 @@ class Effect(ABC):
         """(p,) the numbers without that part."""
         return x if self.anchor is None else self.anchor @ x
 
+    @property
+    def beginnings(self) -> Sequence[Effect]:
+        """The same from other places, where one does not tell of all sizes of it."""
+        return (self,)
+
     def guess(self, missed: Array, shown: Array) -> NDArray[np.float64]:
         """Where the search begins; missed: (n, 3) what the photos show more than the model without
         the effect, which predicts shown, (n, 3); 0 where that is dark. What is far off counts as an

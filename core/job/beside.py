@@ -7,6 +7,8 @@ from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import TypeVar
 
+from .job import Job
+
 Value = TypeVar("Value")
 Result = TypeVar("Result")
 
@@ -44,3 +46,33 @@ def stepped_beside(
             return result  # type: ignore[return-value]
         done = fraction
         yield done
+
+
+class Alongside:
+    """A job in a thread of its own: who steps it never waits. Not for a job that touches what
+    belongs to another thread."""
+
+    def __init__(self, job: Job) -> None:
+        self.job = job
+        self._pool = ThreadPoolExecutor(1, "patina")
+        self._dropped = False
+        self._going = self._pool.submit(self._drive)
+
+    def step(self) -> bool:
+        """False when the job is done. Errors of the work pass through."""
+        if not self._going.done():
+            return True
+        self._going.result()
+        return False
+
+    def close(self) -> None:
+        """What is under way ends unheard; then the job lets go of everything it holds."""
+        self._dropped = True
+        self._pool.shutdown(wait=False)
+
+    def _drive(self) -> None:
+        try:
+            while not self._dropped and self.job.step():
+                pass
+        finally:
+            self.job.close()

@@ -151,7 +151,7 @@ def _off(trial: Trial, truth: Mapping[str, float], setting: Setting) -> list[flo
         moved, spread = x.reshape(-1, 2), deviation.reshape(-1, 2)
         x = np.hypot(*moved.T)
         deviation = np.hypot(*(moved * spread).T) / np.maximum(x, 1e-9)
-        wanted = np.full(len(x), truth["angle"])
+        wanted = np.full(len(x), np.tan(truth["angle"]))
     elif cause == "ambient_light":
         wanted = np.full(3, truth["radiance"] * np.pi / setting.level)
     elif cause == "cast_shadow":

@@ -103,7 +103,7 @@ def room(scene: Scene) -> Hidden:
     """Even light from all around."""
     scene.studio.room(1.0)
     scene.studio.noise_free(100)
-    return scene.in_part(scene.photographed(), "radiance", np.inf)
+    return scene.in_part(scene.once("room"), "radiance", np.inf)
 
 
 def window(scene: Scene) -> Hidden:
@@ -113,17 +113,17 @@ def window(scene: Scene) -> Hidden:
     at /= np.linalg.norm(at)
     scene.studio.window(at, 1.0, np.radians(scene.rng.uniform(15, 40)))
     scene.studio.noise_free(128)
-    return scene.in_part(scene.photographed(), "radiance", np.inf)
+    return scene.in_part(scene.once("window"), "radiance", np.inf)
 
 
 def bounced(scene: Scene) -> Hidden:
     """Light goes from one part of a bright matte object to another."""
     scene.studio.dress(scene.studio.matte(scene.rng.uniform(0.75, 0.95, 3)))
     scene.studio.bounce(0)
-    once = scene.photographed()
+    once = scene.once("lit once")
     scene.studio.bounce(BOUNCES)
     scene.studio.noise_free(100)
-    return replace(scene, plain=once).in_part(scene.photographed(), "part", 1.0)
+    return replace(scene, plain=once).in_part(scene.once("bounced"), "part", 1.0)
 
 
 def shadow(scene: Scene) -> Hidden:

@@ -79,7 +79,7 @@ def make(folder: Path, cause: str, strength: float, seed: int) -> Truth:
     OUTSIDERS, or two of them with a + between, the second of ON_PICTURES."""
     plain = _plain(seed)
     scene, material = _scene(seed)
-    scene = replace(scene, plain=plain, strength=strength)
+    scene = replace(scene, plain=plain, strength=strength, kept=_kept(seed))
     hidden = _hidden(scene, [] if cause == "none" else cause.split("+"))
     photos = camera_faults.with_noise(hidden.photos, scene.rng)
     _write(folder, hidden.surface or scene.surface, hidden.told or scene.shots, photos)
@@ -98,6 +98,12 @@ def make_plain(folder: Path, seed: int) -> Truth:
 def _plain(seed: int) -> list[Array]:
     """Photos without an effect: causes and strengths of one seed share them."""
     return _scene(seed)[0].photographed()
+
+
+@lru_cache(maxsize=1)
+def _kept(seed: int) -> dict[str, list[Array]]:
+    """Likewise, of effects of which a photo has more or less."""
+    return {}
 
 
 def _scene(seed: int) -> tuple[Scene, int]:

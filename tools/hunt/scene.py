@@ -45,7 +45,8 @@ class Shot:
 
 @dataclass(frozen=True)
 class Scene:
-    """plain: the photos without an effect; strength: the wanted RMS change of them."""
+    """plain: the photos without an effect; strength: the wanted RMS change of them; kept: photos
+    that do not depend on it, by what they show."""
 
     studio: HuntStudio
     surface: Surface
@@ -54,6 +55,13 @@ class Scene:
     plain: list[Array]
     strength: float
     rng: np.random.Generator
+    kept: dict[str, list[Array]] = field(default_factory=dict)
+
+    def once(self, name: str) -> list[Array]:
+        """Photos of the studio as it is, which is the same whatever the wanted strength is."""
+        if name not in self.kept:
+            self.kept[name] = self.photographed()
+        return self.kept[name]
 
     def photographed(self, shots: list[Shot] | None = None) -> list[Array]:
         """Photos of the studio as it is."""

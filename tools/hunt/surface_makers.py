@@ -43,7 +43,7 @@ def second(scene: Scene) -> Hidden:
     reach = scene.surface.points @ at
     border = np.quantile(reach, 1 - part)
     scene.studio.dress_part(scene.studio.measured(other), reach > border)
-    return scene.in_part(scene.photographed(), "part", 1.0)
+    return scene.in_part(scene.once("second"), "part", 1.0)
 
 
 def subsurface(scene: Scene) -> Hidden:
@@ -52,9 +52,9 @@ def subsurface(scene: Scene) -> Hidden:
     scene.studio.noise_free(256)
     scene.studio.bounce(0)
     scene.studio.dress(scene.studio.matte(colour))
-    matte = scene.photographed()
+    matte = scene.once("matte")
     scene.studio.dress(scene.studio.translucent(colour, scene.rng.uniform(0.05, 0.15)))
-    deep = scene.photographed()
+    deep = scene.once("deep")
     level = np.mean([p.mean() for p in scene.plain]) / np.mean([p.mean() for p in matte])
 
     def photos(what: list[Array], share: float) -> list[Array]:

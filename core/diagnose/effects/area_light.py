@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +17,8 @@ RADII = np.radians([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 13.0])  # about the lamp's mid
 TURNS = 7  # of RAYS, from the direction of one ray to that of the next: all of them, in no order
 PARTS = 12  # of the lamp
 LEAST = np.radians(1.0)  # the sun itself is half a degree wide
-USUAL, START = np.radians(6.0), np.radians(3.0)
+USUAL = np.radians(6.0)
+STARTS = np.radians([3.0, 12.0])  # a wide one pulls nothing of a narrow one that way
 
 
 def _disc(count: int) -> NDArray[np.float64]:
@@ -36,14 +38,17 @@ DISC = _disc(PARTS)
 @dataclass(frozen=True)
 class AreaLight(Effect):
     """numbers: the lamp's angular diameter. first, other: (n, 3) unit, across the light; free:
-    (n, r) part of a disc of RADII about its middle that the mesh does not hide; distant: (n,)."""
+    (n, r) part of a disc of RADII about its middle that the mesh does not hide; distant: (n,);
+    start: where the search begins."""
 
     first: Array
     other: Array
     free: Array
     distant: NDArray[np.bool_]
+    start: float = STARTS[0]
     cause = "area_light"
     proof = "a photo of the lamp from where the object stands"
+    accuracy = 0.02  # a dozen points stand for it
 
     @classmethod
     def of(cls, setting: Setting) -> AreaLight | None:
@@ -72,8 +77,12 @@ class AreaLight(Effect):
     @property
     def numbers(self) -> Numbers:
         return Numbers.alike(
-            ["angular diameter"], "rad", USUAL, 0.0, 2 * RADII[-1], step=2e-3, start=START
+            ["angular diameter"], "rad", USUAL, 0.0, 2 * RADII[-1], step=2e-3, start=self.start
         )
+
+    @property
+    def beginnings(self) -> Sequence[AreaLight]:
+        return [replace(self, start=start) for start in STARTS]
 
     def worth(self, x: np.ndarray) -> bool:
         return bool(x[0] > LEAST)

@@ -69,6 +69,6 @@ class LightDirection(Effect):
         return replace(now, light=light.astype(np.float32))
 
     def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
-        angle = np.degrees(np.hypot(x[0::2], x[1::2]))
+        angle = np.degrees(np.arctan(np.hypot(x[0::2], x[1::2])))
         said = ", ".join(f"{n} by {a:.1f}°" for n, a in zip(self.names, angle, strict=True))
         return f"the light came from elsewhere than the capture says: {said}"

@@ -1,0 +1,76 @@
+"""How long Blender stands still: the longest tick of each operator that runs in steps, on the demo.
+
+A window's timer calls `modal` once a tick; so does this, with the operators' own code and without a
+window. Between ticks Blender is free to draw.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+OPERATORS = ("propose_materials", "shadow_masks", "fit", "check", "refit")
+MODULES = {"fit": "fit", "check": "check", "refit": "check"}
+PROPERTIES = {"count": 0, "replace": True}
+
+
+def run(data: Path) -> None:
+    """Print the table of docs/sidebar.md. data: not looked at."""
+    import bpy
+
+    from .package import load_patina
+
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    patina = load_patina()
+    patina.register()
+    try:
+        bpy.ops.patina.import_demo()
+        print(
+            "| operator | took | beginning | a tick while it goes on: half below, 99 of 100 below, "
+            "longest | taking over: ticks, longest |\n|---|---|---|---|---|"
+        )
+        for name in OPERATORS:
+            print(_row(name), flush=True)
+    finally:
+        patina.unregister()
+
+
+def _row(name: str) -> str:
+    """One operator, from its press to its end."""
+    import importlib
+
+    import bpy
+
+    module = importlib.import_module(f"patina.operators.{MODULES.get(name, 'masks')}")
+    operator = _without_window(getattr(module, f"PATINA_OT_{name}"))
+    context, timer = bpy.context, SimpleNamespace(type="TIMER")
+    since = time.perf_counter()
+    operator._start(context)
+    begun = time.perf_counter() - since
+    going: list[float] = []
+    taking: list[float] = []
+    answer = {"RUNNING_MODAL"}
+    while answer == {"RUNNING_MODAL"}:
+        time.sleep(operator.TICK)
+        ticks = going if operator._taking is None else taking
+        moment = time.perf_counter()
+        answer = operator.modal(context, timer)
+        ticks.append(time.perf_counter() - moment)
+    took = time.perf_counter() - since
+    half, most = np.quantile(going, (0.5, 0.99))
+    return (
+        f"| {name} | {took:.1f} s | {begun:.3f} s | {half:.3f} s, {most:.3f} s, {max(going):.3f} s "
+        f"| {len(taking)}, {max(taking):.3f} s |"
+    )
+
+
+def _without_window(operator: type):  # type: ignore[no-untyped-def]
+    """What an operator does, without Blender having called it."""
+    import bpy
+
+    plain = tuple(kind for kind in operator.__bases__ if not issubclass(kind, bpy.types.Operator))
+    mine = {key: value for key, value in vars(operator).items() if key != "__dict__"}
+    return type("Ticked", plain, {**mine, **PROPERTIES, "report": lambda *told: None})()
