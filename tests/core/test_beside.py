@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 
 import pytest
 
 from patina.core.errors import FitError
-from patina.core.job.beside import beside, stepped_beside
+from patina.core.job.beside import Alongside, beside, stepped_beside
+from patina.core.job.job import Job, Step
 from patina.core.steps import drained
 
 
@@ -63,3 +64,62 @@ def test_errors_pass_through() -> None:
             raise TimeoutError
 
         drained(beside(late, 0.0))
+
+
+class Slow(Job):
+    """A piece of a third of a second, then another."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.done: list[str] = []
+
+    def run(self) -> Iterator[Step]:
+        try:
+            yield Step("first", 0.0)
+            time.sleep(0.3)
+            self.done.append("first")
+            yield Step("second", 0.5)
+            self.done.append("second")
+        finally:
+            self.done.append("let go")
+
+
+def test_who_steps_a_job_alongside_never_waits() -> None:
+    job, longest, steps = Slow(), 0.0, 0
+    alongside = Alongside(job)
+    while True:
+        since = time.perf_counter()
+        going = alongside.step()
+        longest = max(longest, time.perf_counter() - since)
+        if not going:
+            break
+        steps += 1
+        time.sleep(0.01)
+    assert longest < 0.1 and steps > 5
+    assert job.done == ["first", "second", "let go"]
+    assert [stage.name for stage in job.stages] == ["first", "second"] and job.now.fraction == 1.0
+
+
+def test_a_job_alongside_that_is_dropped_ends_after_its_piece() -> None:
+    job = Slow()
+    alongside = Alongside(job)
+    while job.now.stage != "first":
+        time.sleep(0.01)
+    since = time.perf_counter()
+    alongside.close()
+    assert time.perf_counter() - since < 0.2
+    for thread in [t for t in threading.enumerate() if t.name.startswith("patina")]:
+        thread.join(5)
+    assert job.done == ["first", "let go"]
+
+
+def test_errors_of_a_job_alongside_pass_through() -> None:
+    class Fails(Slow):
+        def run(self) -> Iterator[Step]:
+            yield Step("first", 0.0)
+            raise FitError("too few samples")
+
+    alongside = Alongside(Fails())
+    with pytest.raises(FitError, match="too few"):
+        while alongside.step():
+            time.sleep(0.01)

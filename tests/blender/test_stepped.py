@@ -1,0 +1,82 @@
+"""Operators on a window's timer, stepped by hand: what a tick costs, what ESC leaves behind."""
+
+from __future__ import annotations
+
+import time
+from types import SimpleNamespace
+
+import bpy
+from support import extension
+from test_workflow import counts
+
+TIMER, ESC = SimpleNamespace(type="TIMER"), SimpleNamespace(type="ESC")
+MOUSE = SimpleNamespace(type="MOUSEMOVE")
+
+
+def of(module: str, name: str):
+    """What an operator does, without a window that called it."""
+    operator = getattr(extension(f"operators.{module}"), name)
+    plain = tuple(kind for kind in operator.__bases__ if not issubclass(kind, bpy.types.Operator))
+    own = {key: value for key, value in vars(operator).items() if key != "__dict__"}
+    told: list[str] = []
+    own["report"] = lambda self, kind, text: told.append(text)
+    made = type("Ticked", plain, {**own, "told": told, "replace": False, "count": 0})()
+    made._start(bpy.context)
+    return made
+
+
+def ticked(operator) -> list[float]:
+    """Seconds of every tick, to the end."""
+    ticks = []
+    while True:
+        time.sleep(operator.TICK)
+        since = time.perf_counter()
+        answer = operator.modal(bpy.context, TIMER)
+        ticks.append(time.perf_counter() - since)
+        if answer != {"RUNNING_MODAL"}:
+            assert answer == {"FINISHED"}
+            return ticks
+
+
+def test_a_fit_by_the_timer_is_the_fit_of_a_script() -> None:
+    assert bpy.ops.patina.import_demo() == {"FINISHED"}
+    running = extension("scene.running").running
+    ticks = ticked(of("fit", "PATINA_OT_fit"))
+    measured = extension("scene.apply").measured_materials
+    stepped = {m.name: list(m["patina_coefficients"]) for m in measured()}
+    assert running(bpy.context.scene) is None and stepped
+    # one step in a hundred may meet a busy machine
+    assert sorted(ticks)[int(0.99 * len(ticks)) - 1] < 0.1
+    assert bpy.ops.patina.fit() == {"FINISHED"}
+    assert {m.name: list(m["patina_coefficients"]) for m in measured()} == stepped
+
+
+def test_esc_leaves_the_file_as_it_was() -> None:
+    assert bpy.ops.patina.import_demo() == {"FINISHED"}
+    before, running = counts(), extension("scene.running").running
+    for module, name in (
+        ("fit", "PATINA_OT_fit"),
+        ("masks", "PATINA_OT_propose_materials"),
+        ("masks", "PATINA_OT_shadow_masks"),
+    ):
+        operator = of(module, name)
+        for _ in range(10):
+            time.sleep(operator.TICK)
+            assert operator.modal(bpy.context, TIMER) == {"RUNNING_MODAL"}
+        assert operator.modal(bpy.context, MOUSE) == {"PASS_THROUGH"}
+        assert running(bpy.context.scene) is not None
+        since = time.perf_counter()
+        assert operator.modal(bpy.context, ESC) == {"CANCELLED"}
+        assert time.perf_counter() - since < 0.2
+        assert running(bpy.context.scene) is None and counts() == before
+
+
+def test_no_event_passes_while_a_result_is_taken_over() -> None:
+    assert bpy.ops.patina.import_demo() == {"FINISHED"}
+    operator = of("masks", "PATINA_OT_propose_materials")
+    while operator._taking is None:
+        time.sleep(operator.TICK)
+        assert operator.modal(bpy.context, TIMER) == {"RUNNING_MODAL"}
+    assert operator.modal(bpy.context, ESC) == {"RUNNING_MODAL"}
+    assert operator.modal(bpy.context, TIMER) == {"FINISHED"}
+    assert len(bpy.context.scene.patina.mesh.material_slots) == 2
