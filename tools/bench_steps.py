@@ -44,11 +44,12 @@ def _row(name: str) -> str:
 
     import bpy
 
+    from tests.blender.support import without_window
+
     module = importlib.import_module(f"patina.operators.{MODULES.get(name, 'masks')}")
-    operator = _without_window(getattr(module, f"PATINA_OT_{name}"))
     context, timer = bpy.context, SimpleNamespace(type="TIMER")
     since = time.perf_counter()
-    operator._start(context)
+    operator = without_window(getattr(module, f"PATINA_OT_{name}"), **PROPERTIES)
     begun = time.perf_counter() - since
     going: list[float] = []
     taking: list[float] = []
@@ -65,12 +66,3 @@ def _row(name: str) -> str:
         f"| {name} | {took:.1f} s | {begun:.3f} s | {half:.3f} s, {most:.3f} s, {max(going):.3f} s "
         f"| {len(taking)}, {max(taking):.3f} s |"
     )
-
-
-def _without_window(operator: type):  # type: ignore[no-untyped-def]
-    """What an operator does, without Blender having called it."""
-    import bpy
-
-    plain = tuple(kind for kind in operator.__bases__ if not issubclass(kind, bpy.types.Operator))
-    mine = {key: value for key, value in vars(operator).items() if key != "__dict__"}
-    return type("Ticked", plain, {**mine, **PROPERTIES, "report": lambda *told: None})()

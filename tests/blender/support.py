@@ -39,3 +39,16 @@ def extension(inside: str = "") -> ModuleType:
             spec.loader.exec_module(module)
             module.register()
     return importlib.import_module(f"{package}.{inside}" if inside else package)
+
+
+def without_window(operator: type, **properties: object):
+    """An operator's own code, begun, without a window that called it. told: what it reported."""
+    import bpy
+
+    plain = tuple(kind for kind in operator.__bases__ if not issubclass(kind, bpy.types.Operator))
+    own = {key: value for key, value in vars(operator).items() if key != "__dict__"}
+    told: list[str] = []
+    own |= {"told": told, "report": lambda self, kind, text: told.append(text), **properties}
+    made = type("Ticked", plain, own)()
+    made._start(bpy.context)
+    return made

@@ -6,7 +6,7 @@ import time
 from types import SimpleNamespace
 
 import bpy
-from support import extension
+from support import extension, without_window
 from test_workflow import counts
 
 TIMER, ESC = SimpleNamespace(type="TIMER"), SimpleNamespace(type="ESC")
@@ -14,15 +14,9 @@ MOUSE = SimpleNamespace(type="MOUSEMOVE")
 
 
 def of(module: str, name: str):
-    """What an operator does, without a window that called it."""
+    """Begun, and to be ticked."""
     operator = getattr(extension(f"operators.{module}"), name)
-    plain = tuple(kind for kind in operator.__bases__ if not issubclass(kind, bpy.types.Operator))
-    own = {key: value for key, value in vars(operator).items() if key != "__dict__"}
-    told: list[str] = []
-    own["report"] = lambda self, kind, text: told.append(text)
-    made = type("Ticked", plain, {**own, "told": told, "replace": False, "count": 0})()
-    made._start(bpy.context)
-    return made
+    return without_window(operator, replace=False, count=0)
 
 
 def ticked(operator) -> list[float]:
