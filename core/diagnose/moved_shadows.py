@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .effect import Array, Effect, Setting
-from .part_lit import part_lit
+from .part_lit import part_lit, parts_of
 from .situation import Situation
 
 
@@ -26,7 +26,10 @@ class MovedShadows:
         pixels = setting.pixels
         towards = effect.before(Situation.of(pixels), x).light
         # of both in one way: what rays from parts of a pixel miss of a fold is the same
-        was, will = (part_lit(setting.rays, pixels, to) for to in (pixels.light, towards))
+        parts = parts_of(setting.rays, pixels)
+        was, will = (
+            part_lit(setting.rays, pixels, to, parts=parts) for to in (pixels.light, towards)
+        )
         return cls(x, will - was)
 
     def on(self, now: Situation) -> Situation:

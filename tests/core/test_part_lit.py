@@ -11,7 +11,7 @@ import trimesh
 from patina.core.diagnose.effects.area_light import RADII, AreaLight
 from patina.core.diagnose.effects.light_direction import LightDirection
 from patina.core.diagnose.moved_shadows import MovedShadows
-from patina.core.diagnose.part_lit import SIDE, part_lit
+from patina.core.diagnose.part_lit import SIDE, part_lit, parts_of
 from patina.core.diagnose.pixels import Pixels
 from patina.core.diagnose.situation import Situation
 from patina.core.geometry import RayScene
@@ -135,3 +135,28 @@ def test_every_column_is_selected() -> None:
     pixels = make_lit_ball.lit_ball().pixels
     some = pixels.select(slice(3, 7))
     assert all(len(getattr(some, f.name)) == 4 for f in fields(Pixels))
+
+
+def test_a_hollow_under_its_lamp_is_lit() -> None:
+    """The plane at a pixel's middle lies under the mesh all around it; the mesh is what is lit."""
+    side = np.linspace(-0.4, 0.4, 81)
+    x, y = (v.ravel() for v in np.meshgrid(side, side))
+    number = np.arange(len(x)).reshape(len(side), -1)
+    a, b, c, d = (
+        v.ravel() for v in (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1])
+    )
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).astype(np.int32)
+    rays = RayScene.build(Mesh(np.stack([x, y, x**2 + y**2], axis=1), faces)).close()
+    middle = np.random.default_rng(3).uniform(-0.05, 0.05, (50, 2))
+    up = np.float32([0, 0, 1])
+    pixels = _row_of_pixels(middle[:, 0], up)
+    normal = np.concatenate([-2 * middle, np.ones((50, 1))], axis=1)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    point = np.concatenate([middle, np.sum(middle**2, axis=1, keepdims=True)], axis=1)
+    pixels = replace(
+        pixels, point=point, normal=normal.astype(np.float32), view=np.tile(up, (50, 1))
+    )
+    assert part_lit(rays, pixels, pixels.light) == pytest.approx(1.0)
+    # and parts of a pixel lie on the mesh
+    parts = parts_of(rays, pixels)
+    assert parts[..., 2] == pytest.approx(np.sum(parts[..., :2] ** 2, axis=-1), abs=1e-4)

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from ...angles.vectors import tangents
 from ..effect import Array, Effect, Numbers, Setting
-from ..part_lit import RAYS, part_lit
+from ..part_lit import RAYS, part_lit, parts_of
 from ..situation import Situation
 
 RADII = np.radians([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 13.0])  # about the lamp's middle, of shadow rays
 TURNS = 7  # of RAYS, from the direction of one ray to that of the next: all of them, in no order
-PARTS = 12  # of the lamp
+PARTS = 24  # of the lamp
 LEAST = np.radians(1.0)  # the sun itself is half a degree wide
 USUAL = np.radians(6.0)
 STARTS = np.radians([3.0, 12.0])  # a wide one pulls nothing of a narrow one that way
@@ -59,6 +59,7 @@ class AreaLight(Effect):
         first, other = (v.astype(np.float32) for v in tangents(pixels.light))
         ring = np.empty((len(pixels), len(RADII)))
         ring[:, 0] = pixels.visible
+        parts = parts_of(setting.rays, pixels)
         for k, radius in enumerate(RADII[1:], start=1):
 
             def towards(ray: int, radius: float = radius) -> Array:
@@ -67,7 +68,7 @@ class AreaLight(Effect):
                 return (pixels.light + aside) * np.float32(np.cos(radius))
 
             # as the light of a point was: else the edges' pixels alone would ask for a lamp's size
-            ring[:, k] = part_lit(setting.rays, pixels, towards)
+            ring[:, k] = part_lit(setting.rays, pixels, towards, parts=parts)
         # of a disc: the integral of rings, linear between them
         middle = 0.5 * (ring[:, 1:] + ring[:, :-1]) * np.diff(RADII**2)
         free = ring.copy()
