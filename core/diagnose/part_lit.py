@@ -32,6 +32,7 @@ def parts_of(rays: RayScene, pixels: Pixels) -> NDArray[np.float64]:
         right, down = _aside(ray)
         plane = pixels.point + right * pixels.step[:, 0] + down * pixels.step[:, 1]
         hits = rays.first_hits(plane + reach * pixels.view, -pixels.view)
+        assert hits.distance is not None
         before = reach - np.where(hits.face >= 0, hits.distance, np.inf)[:, None]  # of the plane
         found[ray] = plane + np.where(np.abs(before) < reach, before, 0.0) * pixels.view
     return found

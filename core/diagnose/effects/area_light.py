@@ -9,16 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...angles.vectors import tangents
-from ..effect import Array, Effect, Numbers, Setting
+from ..effect import Array, Effect, Near, Numbers, Setting
 from ..part_lit import RAYS, part_lit, parts_of
 from ..situation import Situation
 
 RADII = np.radians([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 13.0])  # about the lamp's middle, of shadow rays
 TURNS = 7  # of RAYS, from the direction of one ray to that of the next: all of them, in no order
-PARTS = 24  # of the lamp
 LEAST = np.radians(1.0)  # the sun itself is half a degree wide
 USUAL = np.radians(6.0)
-STARTS = np.radians([3.0, 12.0])  # a wide one pulls nothing of a narrow one that way
+STARTS = {np.radians(3.0): 12, np.radians(12.0): 24}
+"""Where the search begins, and how many parts stand for the lamp then: what a wide one does to the
+photos is no larger piece of what a narrow one does."""
 
 
 def _disc(count: int) -> NDArray[np.float64]:
@@ -32,7 +33,7 @@ def _disc(count: int) -> NDArray[np.float64]:
     return np.asarray(0.5 * np.linalg.solve(spread, points.T).T)
 
 
-DISC = _disc(PARTS)
+DISCS = {start: _disc(count) for start, count in STARTS.items()}
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class AreaLight(Effect):
     other: Array
     free: Array
     distant: NDArray[np.bool_]
-    start: float = STARTS[0]
+    start: float = min(STARTS)
     cause = "area_light"
     proof = "a photo of the lamp from where the object stands"
     accuracy = 0.02  # a dozen points stand for it
@@ -75,6 +76,10 @@ class AreaLight(Effect):
         free[:, 1:] = np.cumsum(middle, axis=1) / RADII[1:] ** 2
         return cls(first, other, free.astype(np.float32), distant)
 
+    def elsewhere(self, setting: Setting, near: Near) -> AreaLight | None:
+        found = AreaLight.of(setting)
+        return None if found is None else replace(found, start=self.start)
+
     @property
     def numbers(self) -> Numbers:
         return Numbers.alike(
@@ -98,7 +103,7 @@ class AreaLight(Effect):
         visible = np.clip(now.visible + free - now.pixels.visible, 0, 1)
         visible = np.where(self.distant, visible, now.visible)
         parts = []
-        for first, other in np.tan(radius) * DISC:
+        for first, other in np.tan(radius) * DISCS[self.start]:
             aside = first * self.first + other * self.other
             towards = now.light + np.where(self.distant[:, None], aside, 0).astype(np.float32)
             towards /= np.linalg.norm(towards, axis=1, keepdims=True)
