@@ -19,6 +19,7 @@ from ..scene.running import Running, running, tell
 from .report_errors import refuse
 
 TAKING = "putting it into the file"
+TELL = 0.25  # seconds from one drawing of the progress to the next
 TOLD, SOON = 0.05, 2.0  # done, and seconds taken, before time left is told
 
 
@@ -32,7 +33,7 @@ class Stepped:
     CANCELLED = "Cancelled; nothing was changed"
 
     _timer: Any = None
-    _since = 0.0
+    _since = _told = 0.0
     _job: Job | None = None
     _alongside: Alongside | None = None
     _taking: Iterator[None] | None = None
@@ -99,8 +100,10 @@ class Stepped:
         """A tick's worth of work; False when all is done."""
         if self._taking is None:
             if self._step():
-                now = self._job.now
-                tell(Running(self._scene, self.PANEL, now.stage, now.fraction, self._left()))
+                if time.perf_counter() - self._told > TELL:  # drawing takes from the job's time
+                    now = self._job.now
+                    tell(Running(self._scene, self.PANEL, now.stage, now.fraction, self._left()))
+                    self._told = time.perf_counter()
                 return True
             tell(Running(self._scene, self.PANEL, TAKING, 1.0))
             self._taking = iter(self._finish(context) or ())
