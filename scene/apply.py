@@ -61,8 +61,9 @@ def applying(
         brdf = fitted.fit.brdf
         own = prepared[place] if prepared else prepare(brdf, with_osl)
         yield
-        files = osl_files.ensure_files(brdf, own.tables) if with_osl else None
-        yield
+        files = None
+        if with_osl:
+            files = yield from osl_files.ensuring_files(brdf, own.tables)
         new = materials.create_material(fitted.name, brdf, fitted.principled, files, fitted.lobes)
         new[MEASURED], new[CAPTURE] = fitted.name, capture
         yield

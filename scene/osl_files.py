@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from ..core.appearance import osl_atlas, sampling_table
 from ..core.appearance.closure_split import ClosureSplit, split
 from ..core.appearance.osl_source import COMPONENTS, REMAINDER, SAMPLING
 from ..core.basis import PrincipalBRDF
+from ..core.steps import drained
 from .folders import blend_folder
 from .handlers import attach, detach
 
@@ -66,19 +67,27 @@ def shader_tables(brdf: PrincipalBRDF) -> ShaderTables:
 def ensure_files(brdf: PrincipalBRDF, tables: ShaderTables | None = None) -> ShaderFiles:
     """A BRDF's EXRs: on disk where this .blend expects them, and packed into it. tables: where they
     were made before."""
+    return drained(ensuring_files(brdf, tables))
+
+
+def ensuring_files(
+    brdf: PrincipalBRDF, tables: ShaderTables | None = None
+) -> Generator[None, None, ShaderFiles]:
+    """``ensure_files``, a file at a time."""
     made = tables or shader_tables(brdf)
-    paths = {
-        COMPONENTS: _ensure(
-            osl_atlas.components_name(brdf.basis),
-            lambda path: osl_atlas.write_components(path, brdf.basis),
-        ),
-        REMAINDER: _ensure(
-            osl_atlas.remainder_name(brdf), lambda path: osl_atlas.write_remainder(path, brdf)
-        ),
-        SAMPLING: _ensure(
-            osl_atlas.sampling_name(brdf), lambda path: osl_atlas.write_picture(path, made.texels)
-        ),
-    }
+    basis = brdf.basis
+    wanted = (
+        (COMPONENTS, osl_atlas.components_name(basis),
+         lambda path: osl_atlas.write_components(path, basis)),
+        (REMAINDER, osl_atlas.remainder_name(brdf),
+         lambda path: osl_atlas.write_remainder(path, brdf)),
+        (SAMPLING, osl_atlas.sampling_name(brdf),
+         lambda path: osl_atlas.write_picture(path, made.texels)),
+    )  # fmt: skip
+    paths = {}
+    for socket, name, write in wanted:
+        paths[socket] = _ensure(name, write)
+        yield
     first, second, third = (float(a) for a in made.parts.alpha)
     return ShaderFiles(paths, (first, second, third))
 
