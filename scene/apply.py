@@ -14,6 +14,7 @@ from ..core.steps import drained
 from . import materials, meshes, osl_files
 from .charted import keep_earlier, keep_evidence
 from .face_slots import drop_stand_ins
+from .lobe_group import stack_group
 from .materials import MEASURED
 from .prepared import Prepared, prepare
 from .preview import put_spheres
@@ -64,6 +65,8 @@ def applying(
         files = None
         if with_osl:
             files = yield from osl_files.ensuring_files(brdf, own.tables)
+        stack_group()  # once a file, a tenth of a second
+        yield
         new = materials.create_material(fitted.name, brdf, fitted.principled, files, fitted.lobes)
         new[MEASURED], new[CAPTURE] = fitted.name, capture
         yield
