@@ -13,7 +13,7 @@ from patina.core.capture import read_capture  # noqa: E402
 from patina.core.job import FitJob  # noqa: E402
 from patina.core.job.diagnose_job import DiagnoseJob  # noqa: E402
 from patina.scene import materials  # noqa: E402
-from tools.hunt.make import make  # noqa: E402
+from tools.hunt.make import CAPTURE, make  # noqa: E402
 
 if materials.osl_missing():
     pytest.skip(f"{materials.osl_missing()}", allow_module_level=True)
@@ -32,7 +32,7 @@ def test_what_is_hidden_is_named(cause, tmp_path):
     strength, seed, name = CASES[cause]
     truth = make(tmp_path, cause, strength, seed)
     assert truth.strength == pytest.approx(strength, rel=0.2)
-    job = DiagnoseJob(FitJob(read_capture(tmp_path / "hunt.capture.toml"), portable=False))
+    job = DiagnoseJob(FitJob(read_capture(tmp_path / CAPTURE), portable=False))
     job.drain()
     found = job.found
     assert (found.causes or ("none",)) == (name,)

@@ -28,6 +28,7 @@ from .studio import HuntStudio
 Array = np.ndarray
 
 CAPTURE = "hunt.capture.toml"
+PLAIN = "plain"  # photos without an effect
 
 MAKERS: dict[str, Callable[[Scene], Hidden]] = {
     "light_direction": light_makers.direction,
@@ -77,9 +78,8 @@ class Truth:
 def make(folder: Path, cause: str, strength: float, seed: int) -> Truth:
     """Write capture, mesh, cameras and photos into ``folder``. cause: "none", a key of MAKERS or
     OUTSIDERS, or two of them with a + between, the second of ON_PICTURES."""
-    plain = _plain(seed)
     scene, material = _scene(seed)
-    scene = replace(scene, plain=plain, strength=strength, kept=_kept(seed))
+    scene = replace(scene, plain=scene.once(PLAIN), strength=strength)
     hidden = _hidden(scene, [] if cause == "none" else cause.split("+"))
     photos = camera_faults.with_noise(hidden.photos, scene.rng)
     _write(folder, hidden.surface or scene.surface, hidden.told or scene.shots, photos)
@@ -90,19 +90,13 @@ def make_plain(folder: Path, seed: int) -> Truth:
     """The same without an effect, and with other noise."""
     scene, material = _scene(seed)
     noise = np.random.default_rng([seed, 8])
-    _write(folder, scene.surface, scene.shots, camera_faults.with_noise(_plain(seed), noise))
+    _write(folder, scene.surface, scene.shots, camera_faults.with_noise(scene.once(PLAIN), noise))
     return Truth("none", 0.0, {}, material, seed)
 
 
 @lru_cache(maxsize=1)
-def _plain(seed: int) -> list[Array]:
-    """Photos without an effect: causes and strengths of one seed share them."""
-    return _scene(seed)[0].photographed()
-
-
-@lru_cache(maxsize=1)
 def _kept(seed: int) -> dict[str, list[Array]]:
-    """Likewise, of effects of which a photo has more or less."""
+    """Photos that causes and strengths of one seed share (Scene.once)."""
     return {}
 
 
@@ -114,7 +108,7 @@ def _scene(seed: int) -> tuple[Scene, int]:
     studio.shape(surface)
     material, brdf = any_brdf(Basis.default(), rng)
     studio.dress(studio.measured(brdf))
-    return Scene(studio, surface, brdf, any_shots(rng), [], 0.0, rng), material
+    return Scene(studio, surface, brdf, any_shots(rng), [], 0.0, rng, _kept(seed)), material
 
 
 def _hidden(scene: Scene, causes: Sequence[str]) -> Hidden:

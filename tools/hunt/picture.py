@@ -43,10 +43,11 @@ def _row(folder: Path, cause: str, seed: int) -> Array:
     from patina.core.report.residual_picture import photo_most_changed, residual_picture
     from patina.core.views import display
 
+    from .make import CAPTURE
     from .make import make as hide
 
     hide(folder, cause, STRENGTH, seed)
-    job = DiagnoseJob(FitJob(read_capture(folder / "hunt.capture.toml"), portable=False))
+    job = DiagnoseJob(FitJob(read_capture(folder / CAPTURE), portable=False))
     job.drain()
     found, result = finished(job.found), finished(job.result)
     say(f"{cause}: {', '.join(found.causes) or 'none'}")

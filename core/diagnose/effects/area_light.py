@@ -49,7 +49,7 @@ class AreaLight(Effect):
     start: float = min(STARTS)
     cause = "area_light"
     proof = "a photo of the lamp from where the object stands"
-    accuracy = 0.02  # a dozen points stand for it
+    accuracy = 0.02  # a dozen points or two stand for it
 
     @classmethod
     def of(cls, setting: Setting) -> AreaLight | None:
