@@ -14,11 +14,12 @@ SHARE = 0.85  # of the job, before the second fit
 
 class CheckJob(Job):
     """``checked`` is the diagnosis with the fit as it was, ``result`` the fit with what was named
-    in the model, but without the causes ``without``; they are there when the job is done."""
+    in the model, but without the causes ``without``; they are there when the job is done. Its
+    materials have portable forms where those of ``fit`` would have."""
 
     def __init__(self, fit: FitJob, without: Collection[str] = ()) -> None:
         super().__init__()
-        fit.portable = False  # of the second fit's materials only
+        self.portable, fit.portable = fit.portable, False  # of the second fit's materials only
         self.checked = DiagnoseJob(fit)
         self.without = frozenset(without)
         self.result: CaptureResult | None = None
@@ -27,7 +28,7 @@ class CheckJob(Job):
         """The diagnosis' steps, then those of the second fit."""
         for step in self.checked.run():
             yield Step(step.stage, SHARE * step.fraction)
-        again = RefitJob(self.checked, without=self.without)
+        again = RefitJob(self.checked, without=self.without, portable=self.portable)
         for step in again.run():
             yield Step(step.stage, SHARE + (1 - SHARE) * step.fraction)
         self.result = again.result

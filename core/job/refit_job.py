@@ -42,16 +42,22 @@ class RefitJob(Job):
     """``result`` is the fit with the effects in the model; where none is, the fit as it was.
 
     checked: a finished diagnosis. without: causes that it named and that are left out. exactly: the
-    rest is taken into account even where unseen photos are then predicted worse.
+    rest is taken into account even where unseen photos are then predicted worse. portable: whether
+    the materials' portable forms are fitted too.
     """
 
     def __init__(
-        self, checked: DiagnoseJob, without: Collection[str] = (), exactly: bool = False
+        self,
+        checked: DiagnoseJob,
+        without: Collection[str] = (),
+        exactly: bool = False,
+        portable: bool = True,
     ) -> None:
         super().__init__()
         self.checked = checked
         self.without = without
         self.exactly = exactly
+        self.portable = portable
         self.result: CaptureResult | None = None
 
     def run(self) -> Iterator[Step]:
@@ -81,11 +87,11 @@ class RefitJob(Job):
         self, result: CaptureResult, materials: Sequence[MaterialResult], start: float
     ) -> Iterator[Step]:
         """With the portable forms of those materials that have none, from ``start`` of the job."""
-        done = []
-        share = (1 - start) / len(materials)
-        for index, material in enumerate(materials):
+        done = list(materials)
+        share = (1 - start) / len(done)
+        for index, material in enumerate(materials if self.portable else ()):
             at = start + index * share
-            done.append((yield from with_portable(material, at, self.checked.fit.threads)))
+            done[index] = yield from with_portable(material, at, self.checked.fit.threads)
         self.result = replace(result, materials=tuple(done))
 
     def _with(

@@ -20,6 +20,7 @@ from patina.core.job import CaptureResult, FitJob
 from patina.core.job.check_job import CheckJob
 
 from .make import CAPTURE, OUTSIDERS, Truth, make, make_plain
+from .state import state
 
 SURE = 1.96  # standard errors to either side of a 95 % interval
 OWN_BRDF = ("second_material", "subsurface", "anisotropy", "outside_basis", "interreflection")
@@ -32,7 +33,8 @@ class Row:
     first; ties: those declared of the first. gain: of the first, in standard errors. brdf: error of
     the second fit over that of a fit to photos without the effect, None where the material is
     another one. over_floor: of left-out parts, after. off: what numbers that the truth says are off
-    by, in standard errors. seconds: making, diagnosing."""
+    by, in standard errors. seconds: making, diagnosing. state: of the code (state.py), "" where
+    that was not noted yet."""
 
     cause: str
     wanted: float
@@ -45,6 +47,7 @@ class Row:
     over_floor: float
     off: tuple[float, ...]
     seconds: tuple[float, float]
+    state: str = ""
 
     @property
     def hidden(self) -> set[str]:
@@ -77,11 +80,13 @@ class Row:
 
 def judged(cause: str, strength: float, seed: int, threads: int | None = None) -> Row:
     """Make a capture in a folder that is thrown away, and look what is found in it."""
+    of_code = state()
     with tempfile.TemporaryDirectory() as folder:
         since = time.perf_counter()
         truth = make(Path(folder), cause, strength, seed)
         made = time.perf_counter()
-        job = CheckJob(FitJob(read_capture(Path(folder) / CAPTURE), threads=threads))
+        fit = FitJob(read_capture(Path(folder) / CAPTURE), threads=threads, portable=False)
+        job = CheckJob(fit)
         job.drain()
         done = time.perf_counter()
         found, after = job.checked.found, job.result
@@ -109,6 +114,7 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
         over_floor=found.error_after.over_floor,
         off=tuple(off),
         seconds=(made - since, done - made),
+        state=of_code,
     )
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from ..common import say
 from ..package import load_patina
+from .state import state
 
 if TYPE_CHECKING:
     from .judged import Row
@@ -88,8 +89,8 @@ def table(rows: Sequence[Row]) -> str:
     """Markdown: every row, how many were right, and what was named for what."""
     lines = [
         "| hidden | RMS change | seed | named | gain | BRDF error ÷ without | error ÷ floor | in "
-        "interval | made | diagnosed |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "interval | made | diagnosed | state |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in sorted(rows, key=lambda r: (r.cause, r.wanted, r.seed)):
         named = ", ".join(row.named) or "none"
@@ -101,7 +102,7 @@ def table(rows: Sequence[Row]) -> str:
         lines.append(
             f"| {row.cause} | {100 * row.strength:.1f} % | {row.seed} | "
             f"{named if row.right else f'**{named}**'} | {row.gain:.1f} | {brdf} | "
-            f"{row.over_floor:.2f} | {inside} | {made:.0f} s | {took:.0f} s |"
+            f"{row.over_floor:.2f} | {inside} | {made:.0f} s | {took:.0f} s | {row.state or '–'} |"
         )
     return "\n".join([*lines, "", *_sums(rows), "", *_confusion(rows)])
 
@@ -133,6 +134,9 @@ def _sums(rows: Sequence[Row]) -> list[str]:
         lines.append(f"| BRDF error ÷ without the effect ≤ 1.2, where right | {said} | |")
     within = sum(row.over_floor <= 1.1 for row in rows)
     lines.append(f"| error of left-out parts ÷ floor ≤ 1.1 | {within} of {len(rows)} | |")
+    present = state()
+    mine = sum(row.state == present for row in rows)
+    lines.append(f"| rows of the present state, {present} | {mine} of {len(rows)} | |")
     return lines
 
 
