@@ -23,7 +23,7 @@ COMMANDS = {
     "bench": ("tools.bench_main", "the measurements behind the figures in docs/"),
 }
 """Command → what runs and what it does: MODULE:FUNCTION is called here with the arguments, a
-MODULE alone is run in the environment that has bpy. No module, no command."""
+MODULE alone is run in the environment of the tests. No module, no command."""
 
 
 def available() -> dict[str, tuple[str, str]]:

@@ -1,4 +1,4 @@
-"""Programs of this folder that need the libraries: run with the Python that has them."""
+"""Programs of this folder that need the libraries, and trimesh: run with the Python of the tests."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import os
 from collections.abc import Sequence
 
 from .common import ROOT, call
-from .environment import bpy_python
+from .environment import test_python
 
 
 def main(module: str, arguments: Sequence[str]) -> int:
-    """Run `python -m MODULE ...` in our environment and return its exit code."""
+    """Run `python -m MODULE ...` in the environment of the tests and return its exit code."""
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
-    return call([bpy_python(), "-m", module, *arguments], env=env)
+    return call([test_python(), "-m", module, *arguments], env=env)
