@@ -1,4 +1,4 @@
-"""Programs of this folder that need the libraries, and trimesh: run with the Python of the tests."""
+"""Programs of this folder that need the libraries and trimesh: run by the Python of the tests."""
 
 from __future__ import annotations
 

@@ -127,8 +127,9 @@ class Trial:
 
 @dataclass(frozen=True)
 class Found:
-    """accepted: in the order of acceptance, with their numbers in the whole model. rounds: what was
-    fitted at each, best first; the last is the one that found nothing. before, after: the fits
+    """accepted: what is missed most of the whole model first, with their numbers in it; the slack
+    beside the basis last. rounds: what was fitted at each, best first; the last is the one that
+    found nothing. before, after: the fits
     without and with all accepted. left: structure that nothing accepted explains. error_before,
     error_after: of left-out parts and photos."""
 
@@ -151,8 +152,8 @@ class Found:
 
     @property
     def causes(self) -> tuple[str, ...]:
-        """By the words of the vocabulary, in the order of acceptance; ``unknown`` for what is left
-        of structure."""
+        """By the words of the vocabulary, as accepted; ``unknown`` for what is left of
+        structure."""
         named = tuple(trial.effect.cause for trial in self.accepted)
         return (*named, "unknown") if self.unexplained else named
 
@@ -208,7 +209,8 @@ def search(
         now = best.fitted
         left = [e for e in left if e.cause != best.effect.cause]
     now, kept = _missed(before, now, accepted, pool)
-    kept = (*map(_by_photos, kept), *_outside(now, kept))
+    kept = sorted(map(_by_photos, kept), key=lambda t: -t.gain)  # what is missed most first
+    kept = (*kept, *_outside(now, kept))
     unseen = predict_unseen(before), predict_unseen(now)
     return Found(
         kept, tuple(rounds), before, now, *unseen,

@@ -61,8 +61,8 @@ class RefitJob(Job):
         self.result: CaptureResult | None = None
 
     def run(self) -> Iterator[Step]:
-        """With all causes; where unseen photos are then predicted worse, without the last of them,
-        which was accepted when the others were in the model."""
+        """With all causes; where unseen photos are then predicted worse, without the one of them
+        that gained least."""
         before, found = finished(self.checked.result), finished(self.checked.found)
         chosen = [t for t in can_be_applied(found) if t.effect.cause not in self.without]
         dropped: list[str] = []
