@@ -32,9 +32,9 @@ class Row:
     """cause, seed, wanted: of the capture; strength: RMS change as it came out. named: causes, best
     first; ties: those declared of the first. gain: of the first, in standard errors. brdf: error of
     the second fit over that of a fit to photos without the effect, None where the material is
-    another one. over_floor: of left-out parts, after. off: what numbers that the truth says are off
-    by, in standard errors. seconds: making, diagnosing. state: of the code (state.py), "" where
-    that was not noted yet."""
+    another one; brdf_before: of the first fit, None too where that was not noted yet. over_floor:
+    of left-out parts, after. off: what numbers that the truth says are off by, in standard errors.
+    seconds: making, diagnosing. state: of the code (state.py), "" where that was not noted yet."""
 
     cause: str
     wanted: float
@@ -48,6 +48,7 @@ class Row:
     off: tuple[float, ...]
     seconds: tuple[float, float]
     state: str = ""
+    brdf_before: float | None = None
 
     @property
     def hidden(self) -> set[str]:
@@ -89,8 +90,9 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
         job = CheckJob(fit)
         job.drain()
         done = time.perf_counter()
-        found, after = job.checked.found, job.result
-        assert found is not None and after is not None and job.checked.setting is not None
+        found, before, after = job.checked.found, job.checked.result, job.result
+        assert found is not None and job.checked.setting is not None
+        assert before is not None and after is not None
         first = found.accepted[0] if found.accepted else None
         of = {trial.effect.cause: trial for trial in found.accepted}
         off = [
@@ -99,9 +101,10 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
             if name in of
             for each in _off(of[name], truth.numbers, job.checked.setting)
         ]
-    error = None
+    error = error_before = None
     if not set(cause.split("+")) & set(OWN_BRDF):
-        error = _brdf_error(after, truth) / _plain_error(seed, threads)
+        plain = _plain_error(seed, threads)
+        error, error_before = (_brdf_error(fit, truth) / plain for fit in (after, before))
     return Row(
         cause=cause,
         wanted=strength,
@@ -115,6 +118,7 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
         off=tuple(off),
         seconds=(made - since, done - made),
         state=of_code,
+        brdf_before=error_before,
     )
 
 
@@ -143,6 +147,13 @@ def _brdf_error(result: CaptureResult, truth: Truth) -> float:
     return float(np.sqrt(np.mean((ours - true) ** 2)))
 
 
+def _nearness(inverse: float, light: int, setting: Setting) -> float:
+    """The object's size over the distance of its middle from a lamp that stands where the capture
+    says the light comes from, at a distance 1 / inverse from the origin."""
+    towards = setting.pixels.light[setting.light[setting.pixels.photo] == light][0]
+    return float(setting.size / np.linalg.norm(towards / inverse - setting.centre))
+
+
 def _off(trial: Trial, truth: Mapping[str, float], setting: Setting) -> list[float]:
     """What numbers that the truth says are off by, in standard errors."""
     x, deviation = trial.told, trial.deviation
@@ -152,7 +163,7 @@ def _off(trial: Trial, truth: Mapping[str, float], setting: Setting) -> list[flo
         wanted -= wanted.mean()
     elif cause == "near_light":
         x, deviation = x[::4], deviation[::4]
-        wanted = np.full(len(x), truth["1 / distance"] * setting.size)
+        wanted = np.array([_nearness(truth["1 / distance"], k, setting) for k in range(len(x))])
     elif cause == "light_direction":
         moved, spread = x.reshape(-1, 2), deviation.reshape(-1, 2)
         x = np.hypot(*moved.T)

@@ -97,6 +97,8 @@ def table(rows: Sequence[Row]) -> str:
         if row.ties:
             named += f" (or {', '.join(row.ties)})"
         brdf = "–" if row.brdf is None else f"{row.brdf:.2f}"
+        if row.brdf_before is not None:
+            brdf = f"{row.brdf_before:.2f} → {brdf}"
         inside = f"{row.inside} of {len(row.off)}" if row.off else "–"
         made, took = row.seconds
         lines.append(

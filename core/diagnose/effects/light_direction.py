@@ -29,6 +29,7 @@ class LightDirection(Effect):
     shadows: MovedShadows | None = None
     cause = "light_direction"
     proof = "a mirror ball beside the object in one photo under each light"
+    accuracy = 0.02  # facets of a mesh on which it grazes, and shadows cast away from where it was
 
     @classmethod
     def of(cls, setting: Setting) -> LightDirection | None:
