@@ -2,7 +2,9 @@
 
 What the camera did is taken back by one Newton step about the prediction, which no noise can throw
 far; light that was added is subtracted; directions, irradiance and shadows are what the effects
-make them; and what a lamp's size or a stretched highlight does is a ratio of two predictions.
+make them; and what a lamp's size or a stretched highlight does is a ratio of two predictions. Of
+a channel that is clipped nothing can be taken back: it stands as the joint fit predicts it, which
+knows that it is brighter than the plateau, and counts as no evidence of what unseen photos show.
 """
 
 from __future__ import annotations
@@ -30,9 +32,10 @@ FARTHEST = 3.0  # factor by which a prediction may correct
 def corrected(
     table: SampleTable, pixels: Pixels, model: Model, setting: Setting
 ) -> Generator[float, None, tuple[SampleTable, float]]:
-    """Samples (n,) → (those, m ≤ n, that can be corrected, the RMS of their radiance over what it
-    was before other light was subtracted); yields the fraction done. pixels: of the samples
-    (of_samples.py); model: with the effects, at its optimum; setting: that it was made for."""
+    """Samples (n,) → (those, m ≤ n, that can be corrected, the RMS of the radiance of those that
+    the photos show over what it was before other light was subtracted); yields the fraction done.
+    pixels: of the samples (of_samples.py); model: with the effects, at its optimum; setting: that
+    it was made for."""
     parts = []
     near = nearest(pixels, setting.pixels, setting.size)
     # of a photo that the diagnosis did not look at nothing is known
@@ -69,9 +72,13 @@ def _corrected(table: SampleTable, model: Model) -> tuple[SampleTable, float, fl
     step = NUDGE * np.maximum(entering, 1e-12)
     response = (model.recorded(entering + step, now) - recorded) / step
     relative = response * entering / np.where(recorded > 0, recorded, np.inf)
-    good = (relative > LEAST_RESPONSE).all(axis=1)
+    told = relative > LEAST_RESPONSE
+    # more light than the photo can say: how much, the rest of the photos knows best
+    plateau = ~told & (response < LEAST_RESPONSE) & (recorded < entering)
+    good = (told | plateau).all(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):  # of what is not good
         arrived = entering + (table.radiance - recorded) / response
+    arrived = np.where(plateau, entering, arrived)
     radiance = arrived - (entering - reflected)
     lamp, whole = radiance, arrived
     if len(lamps) > 1 or now.stretch is not None:
@@ -99,5 +106,7 @@ def _corrected(table: SampleTable, model: Model) -> tuple[SampleTable, float, fl
         irradiance=irradiance,
         normal=np.asarray(now.normal, np.float32),
         light=np.asarray(now.light, np.float32),
+        read=table.read & ~plateau.any(axis=1),
     ).select(rows)
+    rows = rows[found.read]
     return found, float(np.sum(lamp[rows] ** 2)), float(np.sum(whole[rows] ** 2))

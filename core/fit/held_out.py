@@ -61,7 +61,7 @@ def leave_out(
 
 def predicted(table: SampleTable, photo: int, brdf: PrincipalBRDF) -> LeftOut:
     """How well a BRDF that was found without a photo predicts it, at the scan's own normals."""
-    held = table.select(table.photo == photo)
+    held = table.select((table.photo == photo) & table.read)
     difference = predict_radiance(brdf, held) - held.radiance
     level = held.radiance.mean(axis=1)
     bright = level > max(DARK * weighted.median(level, held.weight), 0.0)

@@ -118,11 +118,11 @@ class RefitJob(Job):
         self, index: int, material: MaterialResult, model: Model, start: float, share: float
     ) -> Generator[Step, None, Again]:
         table, light = yield from self._corrected(index, material.name, model, Step(STAGE, start))
-        if len(table) < FEWEST:
-            raise PatinaError(f"too few samples can be corrected: {len(table)}")
+        if np.count_nonzero(table.read) < FEWEST:
+            raise PatinaError(f"too few samples can be corrected: {np.count_nonzero(table.read)}")
         start, share = start + CORRECTING * share, (1 - CORRECTING) * share
         fitted = yield from self.checked.fit.fitted_again(index, table, material, start, share)
-        return Again(fitted, light, ())
+        return Again(fitted, light, _of_clipped(table))
 
     def _corrected(
         self, index: int, name: str, model: Model, step: Step
@@ -133,6 +133,18 @@ class RefitJob(Job):
         steps = pixels_of_samples(table, index, before.capture, before.scan, before.photos, read)
         pixels = yield from relayed(steps, lambda _: step)
         return (yield from relayed(corrected(table, pixels, model, setting), lambda _: step))
+
+
+def _of_clipped(table: SampleTable) -> tuple[str, ...]:
+    """In words, where channels of samples are predictions."""
+    filled = np.count_nonzero(~table.read)
+    if not filled:
+        return ()
+    part = 100 * filled / len(table)
+    return (
+        f"{part:.2g} % of its samples are clipped: how bright they are is what the rest of the "
+        "photos and measured materials say; a photo at a quarter of the exposure would tell",
+    )
 
 
 def _proposed(before: CaptureResult, again: Sequence[Again]) -> list[MaterialResult]:

@@ -27,7 +27,8 @@ def material_warnings(
 ) -> tuple[str, ...]:
     """What an artist should know about this material before trusting it."""
     found = list(fit.warnings)
-    near_peak = round(float(table.weight[table.theta_h < np.radians(5)].sum(dtype=np.float64)))
+    peak = table.read & (table.theta_h < np.radians(5))
+    near_peak = round(float(table.weight[peak].sum(dtype=np.float64)))
     if near_peak < FEW_AT_PEAK:
         found.append(
             f"only {near_peak} samples lie within 5° of the highlight: its height is a guess; "

@@ -23,6 +23,8 @@ class SampleTable:
     point: (n, 3) float64, where on the surface; normal, view: (n, 3) float32 unit; scan frame.
     curvature: (n,) float32, 1/pixel, NaN unknown.
     weight: (n,) float32, how many samples the row stands for where not all were kept, else 1.
+    read: (n,) bool, whether the photo says all of it; False where a clipped channel is what a
+    diagnosis predicts of it.
     """
 
     photo: NDArray[np.int16]
@@ -41,6 +43,7 @@ class SampleTable:
     light: NDArray[np.float32]
     irradiance: NDArray[np.float32]
     weight: NDArray[np.float32]
+    read: NDArray[np.bool_]
 
     def __len__(self) -> int:
         return len(self.photo)
@@ -89,6 +92,7 @@ class SampleTable:
             theta_h=flat, theta_d=flat, phi_d=flat, cos_i=flat, cos_o=flat,
             rho=vectors, radiance=vectors, point=np.zeros((0, 3)), normal=vectors, view=vectors,
             curvature=flat, light=vectors, irradiance=vectors, weight=flat,
+            read=np.zeros(0, bool),
         )  # fmt: skip
 
     @staticmethod

@@ -97,6 +97,7 @@ def samples(
         light=light,
         irradiance=irradiance,
         weight=np.ones(count, np.float32),
+        read=np.ones(count, bool),
     )
 
 
