@@ -209,7 +209,8 @@ def search(
         now = best.fitted
         left = [e for e in left if e.cause != best.effect.cause]
     now, kept = _missed(before, now, accepted, pool)
-    kept = sorted(map(_by_photos, kept), key=lambda t: -t.gain)  # what is missed most first
+    # what is missed most first
+    kept = tuple(sorted(map(_by_photos, kept), key=lambda t: -t.gain))
     kept = (*kept, *_outside(now, kept))
     unseen = predict_unseen(before), predict_unseen(now)
     return Found(

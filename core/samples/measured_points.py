@@ -35,7 +35,9 @@ class MeasuredPoints:
 
     @staticmethod
     def of(table: SampleTable, most: int = MOST) -> MeasuredPoints:
-        """At most so many of a table's, the same whatever its order."""
+        """At most so many of a table's that photos say all of, the same whatever its order."""
+        if not table.read.all():
+            table = table.select(table.read)
         across, along = CELLS
         column = np.sqrt(table.theta_h / (np.pi / 2)) * across
         row = table.theta_d / (np.pi / 2) * along
