@@ -12,7 +12,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-OPERATORS = ("propose_materials", "shadow_masks", "fit", "check", "refit")
+OPERATORS = ("fit", "check", "refit", "propose_materials", "shadow_masks")
+"""Masks last: they change what is fitted."""
 MODULES = {"fit": "fit", "check": "check", "refit": "check"}
 PROPERTIES = {"count": 0, "replace": True}
 

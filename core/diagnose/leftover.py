@@ -77,6 +77,6 @@ def _leftover(fitted: Fitted, across: int) -> Leftover:
     mean /= (total + SHRINK)[:, None]
     gains = (robust(fitted.residual) - robust(fitted.residual - mean)).sum(axis=1)
     gained = by_square(cell, gains)
-    structure = np.where(np.isfinite(fitted.deviation), mean * fitted.deviation, 0.0)
+    structure = mean * np.where(np.isfinite(fitted.deviation), fitted.deviation, 0.0)
     size = rms_change(fitted.shown, fitted.shown + structure, fitted.deviation)
     return Leftover(float(gained.sum()), error_of_sum(gained), size, structure, pixels.photo)
