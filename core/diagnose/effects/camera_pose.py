@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effect import Array, Effect, Near, Numbers, Setting, felt_by
+from ..moved_view import MovedView
 from ..situation import Situation
 
 USUAL = 1.0  # pixels
@@ -29,10 +30,12 @@ class CameraPose(Effect):
     photos: tuple[int, ...]
     photo: NDArray[np.intp]
     turn: Array
+    step: Array
     slope: Array
     beside: NDArray[np.bool_]
     x: Array
     y: Array
+    seen: MovedView | None = None
     cause = "camera_pose"
     proof = "the same photos aligned again, with more landmarks"
 
@@ -42,16 +45,21 @@ class CameraPose(Effect):
         photos, place = np.unique(pixels.photo, return_inverse=True)
         beside = pixels.edge < BESIDE
         return cls(
-            tuple(photos.tolist()), place.ravel(), pixels.turn, pixels.slope, beside,
+            tuple(photos.tolist()), place.ravel(), pixels.turn, pixels.step, pixels.slope, beside,
             pixels.x, pixels.y,
         )  # fmt: skip
 
     def elsewhere(self, setting: Setting, near: Near) -> CameraPose:
         pixels = setting.pixels
-        return replace(
-            self, photo=self.photo[near.photo], turn=self.turn[near.photo], slope=pixels.slope,
-            beside=pixels.edge < BESIDE, x=pixels.x, y=pixels.y,
+        found = replace(
+            self, photo=self.photo[near.photo], turn=self.turn[near.photo],
+            step=self.step[near.photo], slope=pixels.slope, beside=pixels.edge < BESIDE,
+            x=pixels.x, y=pixels.y, seen=None,
         )  # fmt: skip
+        return found if self.seen is None else found.casting(setting, self.seen.x)
+
+    def casting(self, setting: Setting, x: np.ndarray) -> CameraPose:
+        return replace(self, seen=MovedView.of(setting, self._moved(self.step, x), x.copy()))
 
     @property
     def numbers(self) -> Numbers:
@@ -65,7 +73,11 @@ class CameraPose(Effect):
     def before(self, now: Situation, x: np.ndarray) -> Situation:
         if not x.any():
             return now
-        normal = now.normal + np.where(self.beside[:, None], 0, self._moved(self.turn, x))
+        turned = self._moved(self.turn, x)
+        if self.seen is not None:
+            near = self.seen.more + self._moved(self.turn, x - self.seen.x)
+            turned = np.where(self.seen.known[:, None], near, turned)
+        normal = now.normal + np.where(self.beside[:, None], 0, turned)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         return replace(now, normal=normal)
 

@@ -1,0 +1,70 @@
+"""What a photo shows that lies beside where the scan says: the surface's own normal there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import trimesh
+
+from patina.core.diagnose.effects.camera_pose import CameraPose
+from patina.core.diagnose.situation import Situation
+from patina.core.geometry import RayScene
+from patina.core.scan import Mesh
+from tests.make_lit_ball import lit_ball
+
+RADIUS = 0.4  # of the ball
+PIXEL = 0.01  # scan units
+
+
+def test_normals_of_a_ball_are_those_of_the_place_that_is_shown():
+    """Far beside where a pixel should look a straight line leaves the ball; rays do not."""
+    setting, truth = _on_a_real_ball()
+    effect = CameraPose.of(setting)
+    x = np.tile([6.0, 0.0, 0.0], len(effect.photos))
+    straight = effect.before(Situation.of(setting.pixels), x).normal
+    seen = effect.casting(setting, x)
+    known = seen.seen.known
+    assert known.mean() > 0.9
+    found = seen.before(Situation.of(setting.pixels), x).normal
+    missed = [np.linalg.norm(n - truth, axis=1)[known] for n in (straight, found)]
+    assert np.median(missed[1]) < 0.2 * np.median(missed[0])
+    assert np.percentile(missed[1], 95) < 0.01
+
+
+def test_about_where_it_was_looked_for_it_turns_as_before():
+    setting, _ = _on_a_real_ball()
+    effect = CameraPose.of(setting)
+    x = np.tile([3.0, 1.0, 0.5], len(effect.photos))
+    seen = effect.casting(setting, x)
+    step = np.tile([0.01, 0.0, 0.0], len(effect.photos))
+    now = Situation.of(setting.pixels)
+    one, other = (e.before(now, x + step).normal - e.before(now, x).normal for e in (effect, seen))
+    np.testing.assert_allclose(other, one, atol=3e-5)
+
+
+def _on_a_real_ball():
+    """(The lit ball with a mesh, (n, 3) normals six pixels to the right of each pixel.)"""
+    setting = lit_ball(3)
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=RADIUS)
+    rays = RayScene.build(Mesh(np.asarray(ball.vertices), np.asarray(ball.faces, np.int32)))
+    pixels = setting.pixels
+    view = pixels.view.astype(float)
+    right = np.cross([0.0, 0.0, 1.0], view)
+    right /= np.linalg.norm(right, axis=1, keepdims=True)
+    inner = np.einsum("ij,ij->i", pixels.normal, view) > 0.6
+    rows = np.flatnonzero(inner)
+    pixels, view, right = pixels.select(rows), view[rows], right[rows]
+    along = right - np.einsum("ij,ij->i", right, pixels.normal)[:, None] / np.einsum(
+        "ij,ij->i", view, pixels.normal
+    )[:, None] * view  # fmt: skip
+    step = np.zeros((len(rows), 2, 3), np.float32)
+    step[:, 0] = PIXEL * along
+    turn = np.zeros_like(step)
+    turn[:, 0] = PIXEL * along / RADIUS
+    pixels = replace(pixels, step=step, turn=turn)
+    flat = RADIUS * pixels.normal + 6 * PIXEL * right
+    across = flat - np.einsum("ij,ij->i", flat, view)[:, None] * view
+    height = np.sqrt(RADIUS**2 - np.sum(across**2, axis=1))
+    truth = (across + height[:, None] * view) / RADIUS
+    return replace(setting, pixels=pixels, rays=rays), truth
