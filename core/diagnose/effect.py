@@ -220,8 +220,9 @@ class Effect(ABC):
         return kind.before is not Effect.before or kind.lamps is not Effect.lamps
 
     def casting(self, setting: Setting, x: NDArray[np.float64]) -> Effect:
-        """The same, where the mesh casts shadows away from where these numbers put the lamp: they
-        are found once the effect is accepted, since each needs rays. Most move no lamp."""
+        """The same, with rays cast anew: shadows away from where these numbers put the lamp, the
+        surface that photos show where they lie elsewhere. Found once the effect is accepted, since
+        rays take long. Most move neither."""
         return self
 
     def before(self, now: Situation, x: NDArray[np.float64]) -> Situation:

@@ -52,7 +52,7 @@ NEARLY = 0.93  # of the best gain
 TRIED, PROMISING = 4, 0.25  # so many are fitted at least; and all that promise this of the best
 UNLIKELY = 0.05  # chance of effects of patches that are fitted
 MINOR = 0.05  # of what accepted effects gained: less is more likely what their model lacks
-SHADOWS = 2  # rounds in which a lamp that is found elsewhere casts its shadows anew
+CASTS = 2  # rounds in which rays are cast anew for a lamp or a photo that is found elsewhere
 EXPECTATIONS = 1  # rounds in which patches say what is usual among them
 ALIKE = 2.0  # standard errors by which gains differ that the photos cannot tell apart
 
@@ -204,7 +204,7 @@ def search(
             break
         if best.effect.of_brdf:
             best = replace(_remade(now, costs, best, setting), ties=best.ties)
-        best = _with_shadows(now, costs, best, setting)
+        best = _with_rays(now, costs, best, setting)
         accepted.append(best)
         now = best.fitted
         left = [e for e in left if e.cause != best.effect.cause]
@@ -296,9 +296,10 @@ def _remade(now: Fitted, costs: Costs, best: Trial, setting: Setting) -> Trial:
     return _try(now, costs, Asked(effect, best.gain, best.chance))
 
 
-def _with_shadows(now: Fitted, costs: Costs, best: Trial, setting: Setting) -> Trial:
-    """With shadows away from where it puts the lamp, if it moves one."""
-    for _ in range(SHADOWS):
+def _with_rays(now: Fitted, costs: Costs, best: Trial, setting: Setting) -> Trial:
+    """With shadows away from where it puts the lamp, and the surface that photos show where it puts
+    them, if it moves either."""
+    for _ in range(CASTS):
         effect = best.effect.casting(setting, best.x)
         if effect is best.effect:
             break

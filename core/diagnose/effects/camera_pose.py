@@ -18,13 +18,14 @@ BESIDE = 2.0  # pixels from the edge of a shadow, where light changes, not the n
 @dataclass(frozen=True)
 class CameraPose(Effect):
     """numbers: for each photo a shift to the right and down, and a turn, in pixels (of the turn:
-    at half the diagonal). turn: (n, 2, 3) of the normal, slope: (n, 2, 3) of what the photo shows,
-    a pixel to the right and down. beside: (n,) whether the edge of a shadow is near. x, y: (n,) in
-    half diagonals.
+    at half the diagonal). turn: (n, 2, 3) of the normal, step: (n, 2, 3) of the point, slope:
+    (n, 2, 3) of what the photo shows, a pixel to the right and down. beside: (n,) whether the edge
+    of a shadow is near. x, y: (n,) in half diagonals. seen: what rays say of the surface, once it
+    is known about where photos lie.
 
-    A pixel shows the surface beside the one that it should. Over a few pixels normals turn evenly,
-    but what they reflect does not change so (a highlight has a top); beside the edge of a shadow
-    it is light that changes.
+    A pixel shows the surface beside the one that it should. Over a pixel normals turn evenly, but
+    what they reflect does not change so (a highlight has a top); beside the edge of a shadow it is
+    light that changes.
     """
 
     photos: tuple[int, ...]
