@@ -100,7 +100,7 @@ def _calm(
         hits = rays.first_hits(start, np.nan_to_num(directions, nan=1.0))
         hit = (hits.face >= 0) & np.isfinite(directions).all(axis=1)
         keep[some[~hit]] = False
-        met = Hits(hits.face[hit], hits.u[hit], hits.v[hit])
+        met = hits.select(hit)
         normal = rays.normals(met)
         if k == 0:
             centre[some[hit]], along[some[hit]] = normal, directions[hit]

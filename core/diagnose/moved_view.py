@@ -31,9 +31,7 @@ class MovedView:
         assert hits.distance is not None
         met = (hits.face >= 0) & (hits.distance < 2 * back)
         normal = np.zeros_like(view)
-        rows = np.flatnonzero(met)
-        found = type(hits)(hits.face[rows], hits.u[rows], hits.v[rows])
-        normal[rows] = setting.rays.normals(found)
+        normal[met] = setting.rays.normals(hits.select(met))
         met &= np.einsum("ij,ij->i", normal, view) > 0
         more = np.where(met[:, None], normal - pixels.normal, 0).astype(np.float32)
         return cls(x, more, met)

@@ -28,6 +28,10 @@ class Hits(NamedTuple):
     v: NDArray[np.float32]
     distance: NDArray[np.float32] | None = None
 
+    def select(self, which: NDArray) -> Hits:
+        """Those of a boolean mask or an index array, without distances."""
+        return Hits(self.face[which], self.u[which], self.v[which])
+
 
 @dataclass(frozen=True)
 class RayScene:

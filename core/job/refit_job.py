@@ -118,8 +118,9 @@ class RefitJob(Job):
         self, index: int, material: MaterialResult, model: Model, start: float, share: float
     ) -> Generator[Step, None, Again]:
         table, light = yield from self._corrected(index, material.name, model, Step(STAGE, start))
-        if np.count_nonzero(table.read) < FEWEST:
-            raise PatinaError(f"too few samples can be corrected: {np.count_nonzero(table.read)}")
+        count = np.count_nonzero(table.read)
+        if count < FEWEST:
+            raise PatinaError(f"too few samples can be corrected: {count}")
         start, share = start + CORRECTING * share, (1 - CORRECTING) * share
         fitted = yield from self.checked.fit.fitted_again(index, table, material, start, share)
         return Again(fitted, light, _of_clipped(table))

@@ -12,7 +12,6 @@ from scipy.spatial import cKDTree
 
 from ..errors import InputError
 from ..geometry import RayScene
-from ..geometry.rays import Hits
 from ..scan import Camera
 from .features import Features
 
@@ -52,7 +51,7 @@ class OnMesh:
             directions[~sound] = (0.0, 0.0, 1.0)
             hits = self.rays.first_hits(camera.ray_starts(found.pixels), directions)
             there = sound & (hits.face >= 0)
-            met = Hits(hits.face[there], hits.u[there], hits.v[there])
+            met = hits.select(there)
             normal = self.rays.mesh.face_normals[met.face]
             steep = np.abs(np.einsum("ij,ij->i", normal, directions[there])) > FLATTEST
             points[np.flatnonzero(there)[steep]] = self.rays.points(met)[steep]

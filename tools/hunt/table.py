@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 STRENGTHS = (0.01, 0.03, 0.1)
 SEEDS = 5
-SHORT = 0.85  # of the change that was wanted
 
 
 def main() -> int:
@@ -50,10 +49,7 @@ def main() -> int:
     rows = read_rows(told.rows)
     wanted = [] if told.only_print else list(_wanted(told, ("none", *MAKERS)))
     for cause, strength, seed in wanted:
-        mine = [r for r in rows if (r.cause, r.seed) == (cause, seed)]
-        # as much as there can be of it, and another row with less: a larger one would be the same
-        most = any(r.strength < SHORT * r.wanted and r.wanted < strength for r in mine)
-        if most or any(r.wanted == strength for r in mine):
+        if any((r.cause, r.wanted, r.seed) == (cause, strength, seed) for r in rows):
             continue
         row = judged(cause, strength, seed, told.threads)
         rows.append(row)
