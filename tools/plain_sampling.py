@@ -82,7 +82,7 @@ def sample_plainly(rays: Any, camera: Any, light: Any, radiance: np.ndarray, mar
         light=to.astype(single),
         irradiance=irradiance.astype(single),
         weight=np.ones(len(n), single),
-        read=np.ones(len(n), bool),
+        response=np.ones((len(n), 3), np.float32),
     )
 
 

@@ -32,8 +32,8 @@ FARTHEST = 3.0  # factor by which a prediction may correct
 def corrected(
     table: SampleTable, pixels: Pixels, model: Model, setting: Setting
 ) -> Generator[float, None, tuple[SampleTable, float]]:
-    """Samples (n,) → (those, m ≤ n, that can be corrected, the RMS of the radiance of those that
-    the photos show over what it was before other light was subtracted); yields the fraction done.
+    """Samples (n,) → (those, m ≤ n, that can be corrected, the RMS of the radiance of those, as the
+    photos show it, over that of all the light they show); yields the fraction done.
     pixels: of the samples (of_samples.py); model: with the effects, at its optimum; setting: that
     it was made for."""
     parts = []
@@ -63,7 +63,8 @@ def elsewhere(model: Model, setting: Setting, near: Near) -> Model:
 
 
 def _corrected(table: SampleTable, model: Model) -> tuple[SampleTable, float, float]:
-    """(samples, sum of squares of their radiance, the same before light was subtracted)."""
+    """(samples, sum of squares of their radiance as the photos show it, and of all that they
+    show)."""
     now = model.situation()
     lamps = model.lamps(now)
     reflected = model.reflected(lamps)
@@ -80,12 +81,13 @@ def _corrected(table: SampleTable, model: Model) -> tuple[SampleTable, float, fl
         arrived = entering + (table.radiance - recorded) / response
     arrived = np.where(plateau, entering, arrived)
     radiance = arrived - (entering - reflected)
-    lamp, whole = radiance, arrived
+    lamp = response * radiance
+    response = np.where(plateau, 0, response)
     if len(lamps) > 1 or now.stretch is not None:
         point = model.brdfs.reflected(replace(now, stretch=None))
         ratio = point / np.maximum(reflected, 1e-30)
         good &= ((ratio < FARTHEST) & (ratio > 1 / FARTHEST)).all(axis=1)
-        radiance = radiance * ratio
+        radiance, response = radiance * ratio, response / ratio
     cos_i = dot(now.normal, now.light)
     cos_o = dot(now.normal, table.view)
     good &= (cos_i > LEAST_COS) & (cos_o > LEAST_COS) & (now.visible > LEAST_LIGHT)
@@ -106,7 +108,7 @@ def _corrected(table: SampleTable, model: Model) -> tuple[SampleTable, float, fl
         irradiance=irradiance,
         normal=np.asarray(now.normal, np.float32),
         light=np.asarray(now.light, np.float32),
-        read=table.read & ~plateau.any(axis=1),
+        response=(table.response * response).astype(np.float32),
     ).select(rows)
     rows = rows[found.read]
-    return found, float(np.sum(lamp[rows] ** 2)), float(np.sum(whole[rows] ** 2))
+    return found, float(np.sum(lamp[rows] ** 2)), float(np.sum(table.radiance[rows] ** 2))

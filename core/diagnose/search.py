@@ -52,7 +52,7 @@ NEARLY = 0.93  # of the best gain
 TRIED, PROMISING = 4, 0.25  # so many are fitted at least; and all that promise this of the best
 UNLIKELY = 0.05  # chance of effects of patches that are fitted
 MINOR = 0.05  # of what accepted effects gained: less is more likely what their model lacks
-CASTS = 2  # rounds in which rays are cast anew for a lamp or a photo that is found elsewhere
+CASTS = 3  # rounds in which rays are cast anew for a lamp or a photo that is found elsewhere
 EXPECTATIONS = 1  # rounds in which patches say what is usual among them
 ALIKE = 2.0  # standard errors by which gains differ that the photos cannot tell apart
 

@@ -19,9 +19,9 @@ DARK = 0.05  # of the median radiance: below it relative errors are those of the
 
 @dataclass(frozen=True)
 class LeftOut:
-    """One photo predicted from the others. missed, size: sums of squares of L̂ − L and of L;
-    relative: (m,) channels' mean |L̂ − L| over mean L, of its pixels that are not dark; weight: (m,)
-    how many pixels each of them stands for."""
+    """One photo predicted from the others. missed, size: sums of squares of L̂ − L and of L, as
+    the photo shows them; relative: (m,) channels' mean |L̂ − L| over mean L, of its pixels that are
+    not dark; weight: (m,) how many pixels each of them stands for."""
 
     photo: int
     missed: float
@@ -33,8 +33,9 @@ class LeftOut:
 @dataclass(frozen=True)
 class HeldOut:
     """per_photo: photo index → relative RMS error ‖L̂ − L‖ / ‖L‖ of its lit pixels, all channels,
-    predicted from the other photos. error: the same over all of them together. typical: median
-    over all pixels of the channels' mean |L̂ − L| over mean L: what most of it is off by."""
+    as the photo shows them, predicted from the other photos. error: the same over all of them
+    together. typical: median over all pixels of the channels' mean |L̂ − L| over mean L: what most
+    of it is off by."""
 
     error: float
     typical: float
@@ -68,8 +69,8 @@ def predicted(table: SampleTable, photo: int, brdf: PrincipalBRDF) -> LeftOut:
     weight = held.weight[:, None]
     return LeftOut(
         photo=photo,
-        missed=float(np.sum(weight * np.square(difference, dtype=np.float64))),
-        size=float(np.sum(weight * np.square(held.radiance, dtype=np.float64))),
+        missed=float(np.sum(weight * np.square(held.response * difference, dtype=np.float64))),
+        size=float(np.sum(weight * np.square(held.response * held.radiance, dtype=np.float64))),
         relative=np.abs(difference).mean(axis=1)[bright] / level[bright],
         weight=held.weight[bright],
     )

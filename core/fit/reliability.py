@@ -53,5 +53,5 @@ def highest_intensity(table: SampleTable) -> tuple[int, SampleTable]:
         rho=rho.astype(np.float32), radiance=one.radiance, point=one.point,
         normal=half.astype(np.float32),
         view=one.view, curvature=one.curvature, light=one.light, irradiance=one.irradiance,
-        weight=one.weight, read=one.read,
+        weight=one.weight, response=one.response,
     )  # fmt: skip

@@ -30,8 +30,7 @@ MORE = 0.03  # ln of what errors of unseen photos may grow by
 @dataclass(frozen=True)
 class Again:
     """A material's second fit. material: None where it could not be fitted; light: RMS radiance of
-    its samples over what it was before other light was subtracted; warnings: what is to be said.
-    """
+    its samples, as photos show it, over that of all they show; warnings: what is to be said."""
 
     material: MaterialResult | None
     light: float
@@ -156,8 +155,8 @@ def _proposed(before: CaptureResult, again: Sequence[Again]) -> list[MaterialRes
 
 def _worse(before: Sequence[MaterialResult], after: Sequence[Again]) -> str | None:
     """In words, where unseen photos are predicted worse than without: a model may explain what it
-    was fitted to by something that is not there. Errors are relative to the light; where light was
-    taken away it is the light as it was."""
+    was fitted to by something that is not there. Both errors are relative to all that photos show:
+    in light that a steep curve was taken from, the same error is another part."""
     known = [
         (one.held_out.error, other.material.held_out.error * other.light)
         for one, other in zip(before, after, strict=True)

@@ -36,8 +36,8 @@ class MeasuredPoints:
     @staticmethod
     def of(table: SampleTable, most: int = MOST) -> MeasuredPoints:
         """At most so many of a table's that photos say all of, the same whatever its order."""
-        if not table.read.all():
-            table = table.select(table.read)
+        if not (read := table.read).all():
+            table = table.select(read)
         across, along = CELLS
         column = np.sqrt(table.theta_h / (np.pi / 2)) * across
         row = table.theta_d / (np.pi / 2) * along

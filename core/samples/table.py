@@ -23,7 +23,8 @@ class SampleTable:
     point: (n, 3) float64, where on the surface; normal, view: (n, 3) float32 unit; scan frame.
     curvature: (n,) float32, 1/pixel, NaN unknown.
     weight: (n,) float32, how many samples the row stands for where not all were kept, else 1.
-    read: (n,) bool, whether the photo says all of it; False where a clipped channel is what a
+    response: (n, 3) float32, what the photo says more per radiance more: 1 unless a diagnosis took
+    back what the camera did; 0 where the photo says nothing, a clipped channel being what the
     diagnosis predicts of it.
     """
 
@@ -43,7 +44,7 @@ class SampleTable:
     light: NDArray[np.float32]
     irradiance: NDArray[np.float32]
     weight: NDArray[np.float32]
-    read: NDArray[np.bool_]
+    response: NDArray[np.float32]
 
     def __len__(self) -> int:
         return len(self.photo)
@@ -51,6 +52,11 @@ class SampleTable:
     @property
     def angles(self) -> Angles:
         return Angles(self.theta_h, self.theta_d, self.phi_d)
+
+    @property
+    def read(self) -> NDArray[np.bool_]:
+        """(n,) whether the photo says all of it."""
+        return (self.response > 0).all(axis=1)
 
     def select(self, which: NDArray) -> SampleTable:
         """The rows of a boolean mask or an index array."""
@@ -92,7 +98,7 @@ class SampleTable:
             theta_h=flat, theta_d=flat, phi_d=flat, cos_i=flat, cos_o=flat,
             rho=vectors, radiance=vectors, point=np.zeros((0, 3)), normal=vectors, view=vectors,
             curvature=flat, light=vectors, irradiance=vectors, weight=flat,
-            read=np.zeros(0, bool),
+            response=vectors,
         )  # fmt: skip
 
     @staticmethod

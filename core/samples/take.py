@@ -180,7 +180,7 @@ def sample_photo(
         light=np.broadcast_to(light, (n, 3)),
         irradiance=np.broadcast_to(irradiance, (n, 3)),
         weight=np.broadcast_to(np.float32(1), n),
-        read=np.broadcast_to(np.True_, n),
+        response=np.broadcast_to(np.float32(1), (n, 3)),
     )
 
 

@@ -49,7 +49,7 @@ def table_of(theta_h: np.ndarray, theta_d: np.ndarray) -> SampleTable:
         theta_h=theta_h.astype(np.float32), theta_d=theta_d.astype(np.float32), phi_d=one,
         cos_i=one, cos_o=one, rho=three, radiance=three, point=np.zeros((n, 3)), normal=vector,
         view=vector, curvature=one, light=vector, irradiance=three, weight=one,
-        read=np.ones(n, bool),
+        response=np.ones((n, 3), np.float32),
     )  # fmt: skip
 
 

@@ -123,7 +123,7 @@ def test_held_out_error_is_that_of_the_samples() -> None:
         pixel=np.arange(n, dtype=np.int32), point=np.zeros((n, 3)),
         normal=np.zeros((n, 3), np.float32), view=np.zeros((n, 3), np.float32),
         light=np.zeros((n, 3), np.float32), curvature=np.zeros(n, np.float32),
-        weight=np.ones(n, np.float32), read=np.ones(n, bool),
+        weight=np.ones(n, np.float32), response=np.ones((n, 3), np.float32),
     )  # fmt: skip
     held = summarise([predicted(table, photo, brdf) for photo in (0, 3)])
     assert held is not None and set(held.per_photo) == {0, 3}

@@ -97,7 +97,7 @@ def samples(
         light=light,
         irradiance=irradiance,
         weight=np.ones(count, np.float32),
-        read=np.ones(count, bool),
+        response=np.ones((count, 3), np.float32),
     )
 
 

@@ -10,6 +10,7 @@ import trimesh
 from patina.core.diagnose.effects.camera_pose import CameraPose
 from patina.core.diagnose.situation import Situation
 from patina.core.geometry import RayScene
+from patina.core.geometry.view import cast_shadow
 from patina.core.scan import Mesh
 from tests.make_lit_ball import lit_ball
 
@@ -43,10 +44,35 @@ def test_about_where_it_was_looked_for_it_turns_as_before():
     np.testing.assert_allclose(other, one, atol=3e-5)
 
 
-def _on_a_real_ball():
-    """(The lit ball with a mesh, (n, 3) normals six pixels to the right of each pixel.)"""
+def test_shadows_are_those_of_the_place_that_is_shown():
+    """Boxes stand between lamps and ball; six pixels beside, their shadows lie otherwise."""
+    setting, truth = _on_a_real_ball(boxes=True)
+    pixels = setting.pixels
+    lit, told = (
+        (~cast_shadow(setting.rays, RADIUS * normal, normal, pixels.light, None)).astype(np.float32)
+        for normal in (truth, pixels.normal.astype(float))
+    )
+    pixels = replace(pixels, visible=told)
+    setting = replace(setting, pixels=pixels)
+    effect = CameraPose.of(setting)
+    x = np.tile([6.0, 0.0, 0.0], len(effect.photos))
+    seen = effect.casting(setting, x)
+    found = seen.before(Situation.of(pixels), x).visible
+    facing = np.einsum("ij,ij->i", truth, pixels.light) > 0.05
+    missed = [np.abs(v - lit)[facing].mean() for v in (told, found)]
+    assert missed[0] > 0.015
+    assert missed[1] < 0.1 * missed[0]
+
+
+def _on_a_real_ball(boxes: bool = False):
+    """(The lit ball with a mesh, (n, 3) normals six pixels to the right of each pixel.) boxes: on
+    the three axes, beside it."""
     setting = lit_ball(3)
     ball = trimesh.creation.icosphere(subdivisions=5, radius=RADIUS)
+    if boxes:
+        ball += trimesh.util.concatenate(
+            [trimesh.creation.box(bounds=[at - 0.1, at + 0.1]) for at in 2 * RADIUS * np.eye(3)]
+        )
     rays = RayScene.build(Mesh(np.asarray(ball.vertices), np.asarray(ball.faces, np.int32)))
     pixels = setting.pixels
     view = pixels.view.astype(float)

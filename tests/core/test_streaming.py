@@ -228,7 +228,7 @@ def made_up(photo: int, pixels: np.ndarray) -> SampleTable:
         theta_h=flat, theta_d=flat, phi_d=flat, cos_i=flat, cos_o=flat, curvature=flat,
         radiance=vectors * pixels[:, None].astype(np.float32), normal=vectors, view=vectors,
         rho=vectors, light=vectors, irradiance=vectors, point=vectors.astype(float),
-        weight=np.ones(n, np.float32), read=np.ones(n, bool),
+        weight=np.ones(n, np.float32), response=np.ones((n, 3), np.float32),
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from hashlib import sha256
 from pathlib import Path
 
 ROOMS = ("patina.core.", "tools.hunt.")
-TOLD_ONLY = ("tools.hunt.table", "tools.hunt.picture", "tools.hunt.state")
+TOLD_ONLY = tuple(f"tools.hunt.{name}" for name in ("table", "plan", "picture", "state"))
 LENGTH = 8
 
 

@@ -16,13 +16,11 @@ from typing import TYPE_CHECKING
 
 from ..common import say
 from ..package import load_patina
+from .plan import NONES, SEEDS, STRENGTHS, captures
 from .state import state
 
 if TYPE_CHECKING:
     from .judged import Row
-
-STRENGTHS = (0.01, 0.03, 0.1)
-SEEDS = 5
 
 
 def main() -> int:
@@ -34,9 +32,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="run.py hunt", description=__doc__)
     parser.add_argument("causes", nargs="*", help=f"of none, {', '.join((*MAKERS, *OUTSIDERS))}, "
                         f"or two with a + between, the second of {', '.join(ON_PICTURES)}; "
-                        "default: none and all of the vocabulary")  # fmt: skip
-    parser.add_argument("--strengths", type=float, nargs="+", default=STRENGTHS, metavar="RMS")
-    parser.add_argument("--seeds", type=int, nargs="+", default=list(range(1, SEEDS + 1)))
+                        "default: the full table")  # fmt: skip
+    parser.add_argument("--strengths", type=float, nargs="+", default=STRENGTHS, metavar="RMS",
+                        help="of the causes that are given")  # fmt: skip
+    parser.add_argument("--seeds", type=int, nargs="+",
+                        help=f"default: 1 to {SEEDS}, of the full table to {NONES}")  # fmt: skip
     parser.add_argument("--rows", type=Path, metavar="FILE", help="rows found before (JSON lines): "
                         "they are not looked for again, and new ones are added")  # fmt: skip
     parser.add_argument("--threads", type=int, metavar="N")
@@ -47,7 +47,7 @@ def main() -> int:
     if unknown:
         parser.error(f"nothing hides {unknown[0]!r}; there are none, {', '.join(MAKERS)}")
     rows = read_rows(told.rows)
-    wanted = [] if told.only_print else list(_wanted(told, ("none", *MAKERS)))
+    wanted = [] if told.only_print else list(_wanted(told, tuple(MAKERS)))
     for cause, strength, seed in wanted:
         if any((r.cause, r.wanted, r.seed) == (cause, strength, seed) for r in rows):
             continue
@@ -62,10 +62,15 @@ def main() -> int:
     return 0
 
 
-def _wanted(told: argparse.Namespace, usual: Sequence[str]) -> Iterator[tuple[str, float, int]]:
+def _wanted(
+    told: argparse.Namespace, vocabulary: Sequence[str]
+) -> Iterator[tuple[str, float, int]]:
     """Seed by seed: what is the same for one is made once."""
-    for seed in told.seeds:
-        for cause in told.causes or usual:
+    if not told.causes:
+        yield from captures(vocabulary, told.seeds or range(1, NONES + 1))
+        return
+    for seed in told.seeds or range(1, SEEDS + 1):
+        for cause in told.causes:
             for strength in told.strengths if cause != "none" else (0.0,):
                 yield cause, strength, seed
 

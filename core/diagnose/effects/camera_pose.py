@@ -25,7 +25,7 @@ class CameraPose(Effect):
 
     A pixel shows the surface beside the one that it should. Over a pixel normals turn evenly, but
     what they reflect does not change so (a highlight has a top); beside the edge of a shadow it is
-    light that changes.
+    light that changes, evenly too until rays say where the edge is.
     """
 
     photos: tuple[int, ...]
@@ -60,12 +60,17 @@ class CameraPose(Effect):
         return found if self.seen is None else found.casting(setting, self.seen.x)
 
     def casting(self, setting: Setting, x: np.ndarray) -> CameraPose:
-        return replace(self, seen=MovedView.of(setting, self._moved(self.step, x), x.copy()))
+        beside = self._moved(self.step, x)
+        pixels = replace(setting.pixels, turn=self.turn, step=self.step)
+        margin = BESIDE + np.hypot(x[0::3], x[1::3])[self.photo]
+        seen = MovedView.of(replace(setting, pixels=pixels), beside, margin, x.copy())
+        return replace(self, seen=seen)
 
     @property
     def numbers(self) -> Numbers:
         names = [f"photo {p + 1}, {way}" for p in self.photos for way in ("right", "down", "turn")]
-        return Numbers.alike(names, "px", USUAL, -8.0, 8.0, step=0.01)
+        found = Numbers.alike(names, "px", USUAL, -8.0, 8.0, step=0.01)
+        return found if self.seen is None else replace(found, start=self.seen.x)
 
     @property
     def feels(self) -> NDArray[np.intp]:
@@ -74,16 +79,20 @@ class CameraPose(Effect):
     def before(self, now: Situation, x: np.ndarray) -> Situation:
         if not x.any():
             return now
-        turned = self._moved(self.turn, x)
+        turned = np.where(self.beside[:, None], 0, self._rest(self.turn, x))
+        visible = now.visible
         if self.seen is not None:
-            near = self.seen.more + self._moved(self.turn, x - self.seen.x)
-            turned = np.where(self.seen.known[:, None], near, turned)
-        normal = now.normal + np.where(self.beside[:, None], 0, turned)
+            turned += self.seen.more
+            more = self.seen.visible - now.pixels.visible
+            visible = np.clip(visible + more, 0, 1).astype(np.float32)
+        normal = now.normal + turned
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        return replace(now, normal=normal)
+        return replace(now, normal=normal, visible=visible)
 
     def after(self, radiance: Array, now: Situation, x: np.ndarray) -> Array:
-        return radiance + np.where(self.beside[:, None], self._moved(self.slope, x), 0)
+        if not x.any():
+            return radiance
+        return radiance + np.where(self.beside[:, None], self._rest(self.slope, x), 0)
 
     def _moved(self, slope: Array, x: np.ndarray) -> Array:
         """(n, 3) what a quantity of these slopes (n, 2, 3) is more at the place that is shown."""
@@ -91,6 +100,13 @@ class CameraPose(Effect):
         along = (right - turn * self.y)[:, None] * slope[:, 0]
         along += (down + turn * self.x)[:, None] * slope[:, 1]
         return np.asarray(along, np.float32)
+
+    def _rest(self, slope: Array, x: np.ndarray) -> Array:
+        """(n, 3) of that, what rays do not say already."""
+        moved = self._moved(slope, x)
+        if self.seen is None:
+            return moved
+        return moved - np.where(self.seen.known[:, None], self._moved(slope, self.seen.x), 0)
 
     def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
         far = np.hypot(x[0::3], x[1::3])
