@@ -8,7 +8,7 @@ the camera makes of it (``after``).
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -142,7 +142,7 @@ class Effect(ABC):
     of_highlights = False  # whether it changes nothing else
     fine = False  # judged on single pixels of the photos: only those beside one tell of it
     of_photo = False  # whether it needs what the photo shows about a pixel
-    accuracy = 0.0  # what its own sums may be off by, of its numbers
+    accuracy = 0.0  # what its own sums may be off by, relative
     of_brdf = False  # whether it is made of the BRDFs, and made anew when they are known better
 
     @classmethod
@@ -170,6 +170,10 @@ class Effect(ABC):
     def told(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(p,) the numbers without that part."""
         return x if self.anchor is None else self.anchor @ x
+
+    def own_error(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(p,) what numbers x may be off by for what the effect's own sums leave out."""
+        return self.accuracy * np.abs(x)
 
     @property
     def beginnings(self) -> Sequence[Effect]:
@@ -224,6 +228,17 @@ class Effect(ABC):
         surface that photos show where they lie elsewhere. Found once the effect is accepted, since
         rays take long. Most move neither."""
         return self
+
+    def sought(
+        self,
+        setting: Setting,
+        x: NDArray[np.float64],
+        shown: Callable[[Effect, NDArray[np.float64]], Array],
+    ) -> NDArray[np.float64]:
+        """(p,) where rays should be cast for, from numbers x that slopes led to: they may lead to
+        the nearest place that looks alike. shown: (n, 3) by the model with an effect and numbers of
+        it, the BRDFs as they were found."""
+        return x
 
     def before(self, now: Situation, x: NDArray[np.float64]) -> Situation:
         """Surface and light with the effect."""

@@ -8,64 +8,81 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry import RayScene
 from ..geometry.view import cast_shadow
 from .effect import Array, Setting
 from .part_lit import part_lit
 from .pixels import Pixels
 
 BEFORE = 0.03  # of the object's size, from which rays look back; twice as far is another surface
+ABOUT = 2.0 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])  # pixels right and down
 
 
 @dataclass(frozen=True)
 class MovedView:
     """Of a pose with numbers x (p,): more: (n, 3) the normal that pixels show, less the one that
     they should; visible: (n,) part of the light that arrives there; known: (n,) where rays met the
-    surface that is looked for."""
+    surface that is looked for; ends: (n,) where within two pixels of it, it or the light ends."""
 
     x: NDArray[np.float64]
     more: Array
     visible: Array
     known: NDArray[np.bool_]
+    ends: NDArray[np.bool_]
 
     @classmethod
-    def of(
-        cls, setting: Setting, beside: Array, margin: Array, x: NDArray[np.float64]
-    ) -> MovedView:
+    def of(cls, setting: Setting, beside: Array, x: NDArray[np.float64]) -> MovedView:
         """setting: with what its pixels' points and normals are more a pixel to the right and down.
-        beside: (n, 3) about how far the point that is shown lies from the one that should be.
-        margin: (n,) pixels from the edge of a shadow where a pixel may be lit in part."""
-        pixels, rays, back = setting.pixels, setting.rays, BEFORE * setting.size
-        view = pixels.view.astype(np.float64)
-        start = pixels.point + beside + back * view
-        hits = rays.first_hits(start, -view)
-        assert hits.distance is not None
-        met = (hits.face >= 0) & (hits.distance < 2 * back)
-        normal = np.zeros_like(view)
-        normal[met] = rays.normals(hits.select(met))
-        met &= np.einsum("ij,ij->i", normal, view) > 0
-        rows = np.flatnonzero(met)
-        shown = replace(
-            pixels.select(rows),
-            point=start[rows] - hits.distance[rows, None] * view[rows],
-            normal=normal[rows].astype(np.float32),
-        )
-        more = np.where(met[:, None], normal - pixels.normal, 0).astype(np.float32)
-        visible = pixels.visible.astype(np.float32)
-        visible[rows] = _lit(rays, shown, margin[rows])
-        return cls(x, more, visible, met)
+        beside: (n, 3) about how far the point that is shown lies from the one that should be."""
+        pixels, step = setting.pixels, setting.pixels.step
+        met, shown = _shown(setting, beside)
+        more, visible = np.zeros_like(pixels.normal), pixels.visible.astype(np.float32)
+        more[met] = shown.normal - pixels.normal[met]
+        lit = _lit(setting, met, shown)
+        ends = np.zeros(len(pixels), bool)
+        for right, down in ABOUT:
+            aside = _shown(setting, beside + right * step[:, 0] + down * step[:, 1])
+            ends |= _lit(setting, *aside) != lit
+        visible[met] = np.where(lit[met], 1, _turned_away(shown))
+        rows = np.flatnonzero((ends & met)[met])
+        some = shown.select(rows)
+        visible[np.flatnonzero(met)[rows]] = part_lit(setting.rays, some, some.light)
+        return cls(x, more, visible, met, ends)
+
+    @property
+    def dark_where_it_ends(self) -> MovedView:
+        """The same without light where nobody knows what a pixel shows."""
+        sure = self.known & ~self.ends
+        return replace(self, visible=np.where(sure, self.visible, np.float32(0)))
 
 
-def _lit(rays: RayScene, shown: Pixels, margin: Array) -> Array:
-    """(n,) part of the light that arrives at what is shown; edge: of a shadow, where it should
-    be."""
-    facing = np.einsum("ij,ij->i", shown.normal, shown.light) > 0
-    visible = np.ones(len(shown), np.float32)
+def _shown(setting: Setting, beside: Array) -> tuple[NDArray[np.bool_], Pixels]:
+    """((n,) whether rays meet the surface so far beside where pixels should look, those pixels with
+    the point and the normal that they meet)."""
+    pixels, back = setting.pixels, BEFORE * setting.size
+    view = pixels.view.astype(np.float64)
+    start = pixels.point + beside + back * view
+    hits = setting.rays.first_hits(start, -view)
+    assert hits.distance is not None
+    met = (hits.face >= 0) & (hits.distance < 2 * back)
+    normal = np.zeros_like(view)
+    normal[met] = setting.rays.normals(hits.select(met))
+    met &= np.einsum("ij,ij->i", normal, view) > 0
+    point = start - np.where(met, hits.distance, 0)[:, None] * view
+    shown = replace(pixels.select(met), point=point[met], normal=normal[met].astype(np.float32))
+    return met, shown
+
+
+def _lit(setting: Setting, met: NDArray[np.bool_], shown: Pixels) -> NDArray[np.bool_]:
+    """(n,) whether light arrives at what is shown; not where nothing is."""
+    facing = ~_turned_away(shown)
     rows = np.flatnonzero(facing)
-    visible[rows] = ~cast_shadow(
-        rays, shown.point[rows], shown.normal[rows], shown.light[rows], None
+    facing[rows] = ~cast_shadow(
+        setting.rays, shown.point[rows], shown.normal[rows], shown.light[rows], None
     )
-    rows = np.flatnonzero(shown.edge < margin)
-    some = shown.select(rows)
-    visible[rows] = part_lit(rays, some, some.light)
-    return visible
+    lit = np.zeros(len(met), bool)
+    lit[met] = facing
+    return lit
+
+
+def _turned_away(shown: Pixels) -> NDArray[np.bool_]:
+    return np.asarray(np.einsum("ij,ij->i", shown.normal, shown.light) <= 0)

@@ -53,6 +53,7 @@ TRIED, PROMISING = 4, 0.25  # so many are fitted at least; and all that promise 
 UNLIKELY = 0.05  # chance of effects of patches that are fitted
 MINOR = 0.05  # of what accepted effects gained: less is more likely what their model lacks
 CASTS = 3  # rounds in which rays are cast anew for a lamp or a photo that is found elsewhere
+MORE = 0.02  # of the gain, that another such round has to promise
 EXPECTATIONS = 1  # rounds in which patches say what is usual among them
 ALIKE = 2.0  # standard errors by which gains differ that the photos cannot tell apart
 
@@ -277,7 +278,7 @@ def _by_photos(trial: Trial) -> Trial:
     """With deviations that know what whole photos err by, and the effect's own sums."""
     variance = list(variances_by_photos(trial.fitted, trial.unseen.variance))
     place = trial.fitted.model.place_of(trial.effect.cause)
-    variance[place] = variance[place] + np.square(trial.effect.accuracy * trial.told)
+    variance[place] = variance[place] + np.square(trial.effect.own_error(trial.told))
     return replace(trial, unseen=replace(trial.unseen, variance=tuple(variance)))
 
 
@@ -286,6 +287,12 @@ def without_last(model: Model) -> Array:
     take much of it, as it takes the light that glare takes from all that is bright."""
     effect, x = model.effects[-1], model.x[-1]
     return replace(model, x=(*model.x[:-1], x - effect.told(x))).predicted()
+
+
+def _with_last(model: Model, effect: Effect, x: Vector) -> Array:
+    """(n, 3) what the model shows where its last effect is this one."""
+    last = replace(model, effects=(*model.effects[:-1], effect), x=(*model.x[:-1], x))
+    return last.predicted()
 
 
 def _remade(now: Fitted, costs: Costs, best: Trial, setting: Setting) -> Trial:
@@ -300,13 +307,17 @@ def _with_rays(now: Fitted, costs: Costs, best: Trial, setting: Setting) -> Tria
     """With shadows away from where it puts the lamp, and the surface that photos show where it puts
     them, if it moves either."""
     for _ in range(CASTS):
-        effect = best.effect.casting(setting, best.x)
+        x = best.effect.sought(setting, best.x, partial(_with_last, best.fitted.model))
+        effect = best.effect.casting(setting, x)
         if effect is best.effect:
             break
         again = _try(now, costs, Asked(effect, best.gain, best.chance))
         if again.gain < best.gain:  # the mesh is too coarse to say where they end
             break
+        settled = again.gain < (1 + MORE) * best.gain
         best = replace(again, ties=best.ties)
+        if settled:
+            break
     return best
 
 

@@ -169,6 +169,10 @@ def _off(trial: Trial, truth: Mapping[str, float], setting: Setting) -> list[flo
         x = np.hypot(*moved.T)
         deviation = np.hypot(*(moved * spread).T) / np.maximum(x, 1e-9)
         wanted = np.full(len(x), np.tan(truth["angle"]))
+    elif cause == "camera_pose":
+        shifts = [k for k, name in enumerate(trial.effect.numbers.names) if name in truth]
+        x, deviation = x[shifts], deviation[shifts]
+        wanted = np.array([truth[trial.effect.numbers.names[k]] for k in shifts])
     elif cause == "ambient_light":
         wanted = np.full(3, truth["radiance"] * np.pi / setting.level)
     elif cause == "cast_shadow":

@@ -70,7 +70,14 @@ def pose(scene: Scene) -> Hidden:
             out.append(replace(shot, camera=camera))
         return out
 
-    return _told(scene, told, 0.3, "pixels")
+    found = _told(scene, told, 0.3, "pixels")
+    shift = found.numbers["pixels"] * -np.array(turns)
+    each = {
+        f"photo {k + 1}, {way}": value
+        for k, both in enumerate(shift)
+        for way, value in zip(("right", "down"), both, strict=True)
+    }
+    return replace(found, numbers={**found.numbers, **each})
 
 
 def near(scene: Scene) -> Hidden:

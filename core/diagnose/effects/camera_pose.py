@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +13,8 @@ from ..moved_view import MovedView
 from ..situation import Situation
 
 USUAL = 1.0  # pixels
+AFAR = np.linspace(-7.5, 7.5, 7)  # pixels right, and down, that are tried,
+NEARER, TURNS = (1.0, 0.5, 0.25), 2  # then steps about the best, and how often each way
 BESIDE = 2.0  # pixels from the edge of a shadow, where light changes, not the normal alone
 
 
@@ -38,6 +41,7 @@ class CameraPose(Effect):
     y: Array
     seen: MovedView | None = None
     cause = "camera_pose"
+    accuracy = 0.05  # a camera that is turned does not shift all of its photo alike
     proof = "the same photos aligned again, with more landmarks"
 
     @classmethod
@@ -57,14 +61,62 @@ class CameraPose(Effect):
             step=self.step[near.photo], slope=pixels.slope, beside=pixels.edge < BESIDE,
             x=pixels.x, y=pixels.y, seen=None,
         )  # fmt: skip
-        return found if self.seen is None else found.casting(setting, self.seen.x)
+        if self.seen is None:
+            return found
+        return replace(found, seen=found._seen(setting, self.seen.x).dark_where_it_ends)
 
     def casting(self, setting: Setting, x: np.ndarray) -> CameraPose:
-        beside = self._moved(self.step, x)
+        return replace(self, seen=self._seen(setting, x.copy()))
+
+    def sought(
+        self, setting: Setting, x: np.ndarray, shown: Callable[[Effect, np.ndarray], Array]
+    ) -> np.ndarray:
+        """Photo by photo by trial, all photos at once: edges of shadows and outlines have no slope
+        that leads to them from afar, and to a robust fit they are outliers. Once is enough."""
+        if self.seen is not None:
+            return x
+        low, high = self.numbers.low[0], self.numbers.high[0]
+        # of roots neither highlights nor noise count most
+        truth = np.sqrt(np.maximum(setting.pixels.observed, 0))
+
+        def missed(x: np.ndarray) -> NDArray[np.float64]:
+            moved = self.casting(setting, x)
+            assert moved.seen is not None
+            off = np.sqrt(np.maximum(shown(moved, x), 0)) - truth
+            told = moved.seen.known & setting.pixels.usable
+            each = np.square(off).mean(axis=1)[told]
+            photo, count = self.photo[told], len(self.photos)
+            return np.bincount(photo, each, count) / np.maximum(np.bincount(photo, None, count), 1)
+
+        best, least = x, missed(x)
+
+        def better(tried: np.ndarray) -> None:
+            nonlocal best, least
+            tried = np.clip(tried, low, high)
+            costs = missed(tried)
+            best = np.where(np.repeat(costs < least, 3), tried, best)
+            least = np.minimum(costs, least)
+
+        for right, down in np.stack(np.meshgrid(AFAR, AFAR), axis=-1).reshape(-1, 2):
+            better(np.tile([right, down, 0.0], len(self.photos)))
+        for size in NEARER:
+            for way in np.concatenate([np.eye(3), -np.eye(3)] * TURNS):
+                better(best + np.tile(size * way, len(self.photos)))
+        return best
+
+    def _seen(self, setting: Setting, x: np.ndarray) -> MovedView:
         pixels = replace(setting.pixels, turn=self.turn, step=self.step)
-        margin = BESIDE + np.hypot(x[0::3], x[1::3])[self.photo]
-        seen = MovedView.of(replace(setting, pixels=pixels), beside, margin, x.copy())
-        return replace(self, seen=seen)
+        return MovedView.of(replace(setting, pixels=pixels), self._moved(self.step, x), x)
+
+    @property
+    def _ends(self) -> NDArray[np.bool_]:
+        """(n,) whether light may change there, not the normal alone."""
+        if self.seen is None:
+            return self.beside
+        return np.where(self.seen.known, self.seen.ends, self.beside)
+
+    def own_error(self, x: np.ndarray) -> np.ndarray:
+        return self.accuracy * np.repeat(np.hypot(x[0::3], x[1::3]), 3)
 
     @property
     def numbers(self) -> Numbers:
@@ -79,7 +131,7 @@ class CameraPose(Effect):
     def before(self, now: Situation, x: np.ndarray) -> Situation:
         if not x.any():
             return now
-        turned = np.where(self.beside[:, None], 0, self._rest(self.turn, x))
+        turned = np.where(self._ends[:, None], 0, self._rest(self.turn, x))
         visible = now.visible
         if self.seen is not None:
             turned += self.seen.more
@@ -92,7 +144,7 @@ class CameraPose(Effect):
     def after(self, radiance: Array, now: Situation, x: np.ndarray) -> Array:
         if not x.any():
             return radiance
-        return radiance + np.where(self.beside[:, None], self._rest(self.slope, x), 0)
+        return radiance + np.where(self._ends[:, None], self._rest(self.slope, x), 0)
 
     def _moved(self, slope: Array, x: np.ndarray) -> Array:
         """(n, 3) what a quantity of these slopes (n, 2, 3) is more at the place that is shown."""
