@@ -18,7 +18,7 @@ DARKER = 0.3  # of what is predicted, missed
 DIM = 0.02  # of the photos' bright pixels: darker ones give no ratio
 HIGHLIGHT = np.radians(12.0)  # θh, within which nothing is looked for
 BESIDE = 2.0  # pixels from the edge of a shadow of the object's own, whose place is not so exact
-APART_FROM = 6.0  # pixels from that edge that a spot keeps
+APART_FROM, TOUCHING = 6.0, 0.5  # pixels from that edge; part of a spot that may lie nearer
 AROUND, MOST = 8, 6  # pixels nearest in the photo, itself included; so many of them dark
 FEWEST = 12  # pixels of a spot
 ACROSS = 5  # squares along a photo's longer side that a spot is cut by: it may be of two shadows
@@ -29,8 +29,8 @@ def dark_spots(pixels: Pixels, shown: Array, fewest: int = FEWEST) -> NDArray[np
     pixels of a spot.
 
     A pixel belongs to a spot where nearly all pixels about it are too dark as well: single ones are
-    noise, dust, or a fold that the mesh does not have. A spot that the object's own shadow touches
-    is more likely that shadow, a little larger than the mesh makes it; and a highlight that is not
+    noise, dust, or a fold that the mesh does not have. A spot that lies along the object's own
+    shadow is more likely that shadow, a little larger than the mesh makes it; and a highlight that is not
     where it should be is the normals' doing.
     """
     level, seen = shown.sum(axis=1), pixels.observed.sum(axis=1)
@@ -54,7 +54,7 @@ def dark_spots(pixels: Pixels, shown: Array, fewest: int = FEWEST) -> NDArray[np
     inside[one] = inside[other] = True
     beside = np.bincount(spot, inside & (pixels.edge[rows] < APART_FROM))
     count = np.bincount(spot, inside)
-    kept = inside & (count[spot] >= fewest) & (beside[spot] == 0)
+    kept = inside & (count[spot] >= fewest) & (beside[spot] < TOUCHING * count[spot])
     cell = cell_numbers(pixels.photo, pixels.x, pixels.y, ACROSS)[rows]
     part = np.stack([spot[kept], cell[kept]])
     out[rows[kept]] = np.unique(part, axis=1, return_inverse=True)[1].ravel()

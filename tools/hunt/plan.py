@@ -25,16 +25,16 @@ PAIRS = {
         "second_material+vignetting",
     ),
     4: (
-        "cast_shadow+clipping", "clipping+light_intensity", "veiling_glare+light_intensity",
+        "cast_shadow+clipping", "light_intensity+clipping", "veiling_glare+light_intensity",
         "camera_pose+veiling_glare", "area_light+clipping", "vignetting+camera_response",
     ),
     5: (
-        "light_direction+vignetting", "camera_response+veiling_glare", "normal_error+clipping",
+        "light_direction+vignetting", "veiling_glare+camera_response", "normal_error+clipping",
         "ambient_light+light_intensity", "interreflection+vignetting",
         "second_material+camera_response",
     ),
 }  # fmt: skip
-"""By seed. Seven were chosen by hand, the others drawn such that every cause is in one and every
+"""By seed, in the order in which light meets them. Seven were chosen by hand, the others drawn such that every cause is in one and every
 effect that can be put on photos is the second of six."""
 
 BEYOND = {
