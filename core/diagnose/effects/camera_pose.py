@@ -15,6 +15,7 @@ from ..situation import Situation
 USUAL = 1.0  # pixels
 AFAR = np.linspace(-7.5, 7.5, 7)  # pixels right, and down, that are tried,
 NEARER, TURNS = (1.0, 0.5, 0.25), 2  # then steps about the best, and how often each way
+PART = 0.05  # of a pixel, which edges of shadows between facets are off by
 BESIDE = 2.0  # pixels from the edge of a shadow, where light changes, not the normal alone
 
 
@@ -116,7 +117,7 @@ class CameraPose(Effect):
         return np.where(self.seen.known, self.seen.ends, self.beside)
 
     def own_error(self, x: np.ndarray) -> np.ndarray:
-        return self.accuracy * np.repeat(np.hypot(x[0::3], x[1::3]), 3)
+        return np.repeat(np.hypot(self.accuracy * np.hypot(x[0::3], x[1::3]), PART), 3)
 
     @property
     def numbers(self) -> Numbers:
