@@ -30,8 +30,8 @@ def dark_spots(pixels: Pixels, shown: Array, fewest: int = FEWEST) -> NDArray[np
 
     A pixel belongs to a spot where nearly all pixels about it are too dark as well: single ones are
     noise, dust, or a fold that the mesh does not have. A spot that lies along the object's own
-    shadow is more likely that shadow, a little larger than the mesh makes it; and a highlight that is not
-    where it should be is the normals' doing.
+    shadow is more likely that shadow, a little larger than the mesh makes it; and a highlight that
+    is not where it should be is the normals' doing.
     """
     level, seen = shown.sum(axis=1), pixels.observed.sum(axis=1)
     lit = (level > DIM * np.percentile(level, 90)) & (pixels.visible > 0) & pixels.usable

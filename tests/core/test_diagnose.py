@@ -12,6 +12,7 @@ from patina.core.diagnose import chance
 from patina.core.diagnose import search as searching
 from patina.core.diagnose.brdfs import BRDFs
 from patina.core.diagnose.closer_look import about_dark_spots
+from patina.core.diagnose.dark_spots import dark_spots
 from patina.core.diagnose.deviation import as_found, pixel_deviation
 from patina.core.diagnose.effect import Setting, felt_by
 from patina.core.diagnose.effects import EFFECTS
@@ -127,6 +128,18 @@ def test_a_spot_without_light_is_a_shadow():
     trial = found.accepted[0]
     np.testing.assert_allclose(trial.told, -0.6, atol=0.03)
     assert (np.abs(trial.told + 0.6) < 3 * trial.deviation).all()
+
+
+def test_a_shadow_may_touch_the_objects_own():
+    """A spot beside whose end the object's own shadow begins is one; a band along that shadow is
+    that shadow, a little larger than the mesh makes it."""
+    setting = shadowed(lit_ball(8), 3, 0.12, 0.6)
+    pixels, shown = setting.pixels, lit_ball(8).pixels.observed
+    whole = dark_spots(pixels, shown) >= 0
+    for part, kept in ((0.3, True), (0.7, False)):
+        near = whole & (pixels.x < np.quantile(pixels.x[whole], part))
+        beside = replace(pixels, edge=np.where(near, np.float32(4), pixels.edge))
+        assert np.array_equal(dark_spots(beside, shown) >= 0, whole & kept)
 
 
 def test_highlights_that_end_at_a_plateau_are_clipped():

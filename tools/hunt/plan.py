@@ -34,8 +34,8 @@ PAIRS = {
         "second_material+camera_response",
     ),
 }  # fmt: skip
-"""By seed, in the order in which light meets them. Seven were chosen by hand, the others drawn such that every cause is in one and every
-effect that can be put on photos is the second of six."""
+"""By seed, in the order in which light meets them. Seven were chosen by hand, the others drawn such
+that every cause is in one and every effect that can be put on photos is in six or more."""
 
 BEYOND = {
     1: ("smudge", "moire", "white_balance"),

@@ -91,7 +91,9 @@ def read_rows(path: Path | None) -> list[Row]:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Markdown: every row, how many were right, and what was named for what."""
+    """Markdown: every row, how many were right, and what was named for what. An effect that cannot
+    be as strong as wanted makes one capture for two strengths: that counts once."""
+    rows = _apart(rows)
     lines = [
         "| hidden | RMS change | seed | named | gain | BRDF error ÷ without | error ÷ floor | in "
         "interval | made | diagnosed | state |",
@@ -112,6 +114,14 @@ def table(rows: Sequence[Row]) -> str:
             f"{row.over_floor:.2f} | {inside} | {made:.0f} s | {took:.0f} s | {row.state or '–'} |"
         )
     return "\n".join([*lines, "", *_sums(rows), "", *_confusion(rows)])
+
+
+def _apart(rows: Sequence[Row]) -> list[Row]:
+    """Without rows whose capture is that of a smaller wanted strength."""
+    kept: dict[tuple[str, int, float], Row] = {}
+    for row in sorted(rows, key=lambda r: r.wanted):
+        kept.setdefault((row.cause, row.seed, row.strength), row)
+    return list(kept.values())
 
 
 def _sums(rows: Sequence[Row]) -> list[str]:
