@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..dark_spots import DIM
 from ..effect import Array, Effect, Near, Numbers, Setting, felt_by
 from ..moved_view import MovedView
 from ..situation import Situation
@@ -15,6 +16,7 @@ from ..situation import Situation
 USUAL = 1.0  # pixels
 AFAR = np.linspace(-7.5, 7.5, 7)  # pixels right, and down, that are tried,
 NEARER, TURNS = (1.0, 0.5, 0.25), 2  # then steps about the best, and how often each way
+FEWEST = 50  # lit pixels of a photo that is sought so
 PART = 0.05  # of a pixel, which edges of shadows between facets are off by
 BESIDE = 2.0  # pixels from the edge of a shadow, where light changes, not the normal alone
 
@@ -89,7 +91,10 @@ class CameraPose(Effect):
             photo, count = self.photo[told], len(self.photos)
             return np.bincount(photo, each, count) / np.maximum(np.bincount(photo, None, count), 1)
 
-        best, least = x, missed(x)
+        lit = setting.pixels.observed.sum(axis=1)
+        lit = lit > DIM * np.percentile(lit, 90)
+        enough = np.bincount(self.photo, lit, len(self.photos)) >= FEWEST
+        best, least = x, np.where(enough, missed(x), -np.inf)
 
         def better(tried: np.ndarray) -> None:
             nonlocal best, least
