@@ -40,7 +40,7 @@ from .unseen_error import UnseenError, unseen_error
 
 Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
-Costs = Callable[[bool], Array]
+Costs = Callable[[bool, bool], Array]
 
 CHANCE = 0.02  # of a false alarm, over all effects that are tried
 LEAST_CHANGE = 0.005  # RMS of the photos: less is not worth a word,
@@ -52,6 +52,7 @@ NEARLY = 0.93  # of the best gain
 TRIED, PROMISING = 4, 0.25  # so many are fitted at least; and all that promise this of the best
 UNLIKELY = 0.05  # chance of effects of patches that are fitted
 MINOR = 0.05  # of what accepted effects gained: less is more likely what their model lacks
+SURER = 5.0  # standard errors of a gain that is as small and leaves nothing
 CASTS = 3  # rounds in which rays are cast anew for a lamp or a photo that is found elsewhere
 MORE = 0.02  # of the gain, that another such round has to promise
 EXPECTATIONS = 1  # rounds in which patches say what is usual among them
@@ -201,11 +202,13 @@ def search(
         rounds.append(tuple(trials))
         best = _simplest([t for t in trials if t.sure])
         gained = sum(t.gain for t in accepted)
-        if best is None or not best.convincing or best.gain < MINOR * gained:
+        if best is None or not best.convincing:
             break
         if best.effect.of_brdf:
             best = replace(_remade(now, costs, best, setting), ties=best.ties)
         best = _with_rays(now, costs, best, setting)
+        if best.gain < MINOR * gained and not _settles(best):
+            break
         accepted.append(best)
         now = best.fitted
         left = [e for e in left if e.cause != best.effect.cause]
@@ -219,6 +222,12 @@ def search(
         leftover(now),
         unseen_error(before, unseen[0], expected), unseen_error(now, unseen[1], expected),
     )  # fmt: skip
+
+
+def _settles(trial: Trial) -> bool:
+    """Whether nothing is left with it: the model of what was accepted before lacks nothing, and it
+    is not that which it stands for."""
+    return trial.gain > SURER * trial.error and leftover(trial.fitted).gain < 0
 
 
 def _promising(found: Sequence[Asked]) -> list[Asked]:
@@ -255,8 +264,11 @@ def _simplest(trials: Sequence[Trial]) -> Trial | None:
 
 
 def _try(now: Fitted, costs: Costs, one: Asked) -> Trial:
-    """costs: _costs(now): where large squares are left out (False), or single pixels."""
+    """costs: _costs(now)."""
     effect, fine = one.effect, one.effect.fine
+    # beside it the numbers of other patches stay as they are, and so they must without it: those
+    # of a square that is left out are known then too
+    settled = effect.patch is not None and now.model.patchy is not None
     fitted = fit(
         now.model.with_effect(effect, effect.guess(_missed_where_bright(now), now.shown)),
         now.deviation,
@@ -267,7 +279,7 @@ def _try(now: Fitted, costs: Costs, one: Asked) -> Trial:
         fitted = fit(replace(model, brdfs=fitted.model.brdfs, x=fitted.model.x), now.deviation)
     unseen = predict_unseen(fitted, fine)
     # what is confined to a few squares could never be sure
-    gained = by_square(squares(now, fine), costs(fine) - unseen.cost)
+    gained = by_square(squares(now, fine), costs(fine, settled) - unseen.cost)
     own = effect.patch is None and len(effect.numbers) > 0
     without = without_last(fitted.model) if own else now.shown
     change = rms_change(fitted.shown, without, now.deviation, effect.of_highlights)
@@ -322,16 +334,18 @@ def _with_rays(now: Fitted, costs: Costs, best: Trial, setting: Setting) -> Tria
 
 
 def _costs(now: Fitted) -> Costs:
-    """(n,) of the model as it is, found when they are asked for, and once."""
+    """(n,) of the model as it is, found when they are asked for, and once: where large squares are
+    left out (False), or single pixels; whether the numbers of patches stay as they are."""
     one_at_a_time = Lock()
 
     @cache
-    def costs(fine: bool) -> Array:
-        return predict_unseen(now, fine).cost
+    def costs(fine: bool, settled: bool) -> Array:
+        base = replace(now, model=now.model.settled()) if settled else now
+        return predict_unseen(base, fine).cost
 
-    def locked(fine: bool) -> Array:
+    def locked(fine: bool, settled: bool) -> Array:
         with one_at_a_time:
-            return costs(fine)
+            return costs(fine, settled)
 
     return locked
 

@@ -1,4 +1,8 @@
-"""The mesh is smoother or rougher than the surface: its normals are off, patch by patch."""
+"""The mesh is smoother or rougher than the surface: its normals are off, patch by patch.
+
+A patch is tilted as a whole first. Once that is accepted it may bend as well: bumps are round, and
+what steps from patch to patch leave of deep ones is more than noise.
+"""
 
 from __future__ import annotations
 
@@ -9,20 +13,25 @@ import numpy as np
 from ...angles.vectors import tangents
 from ..effect import Array, Near, Numbers, Setting
 from ..patch_effect import PatchEffect
-from ..patches import surface_patches
+from ..patches import ACROSS, surface_patches
 from ..situation import Situation
 
 USUAL = np.radians(2.0)
+BENT = np.radians(1.0)  # over half a patch
 FARTHEST = np.radians(25.0)
 
 
 @dataclass(frozen=True)
 class NormalError(PatchEffect):
     """numbers: for each patch of the surface the tangents of two angles that its normal is tilted
-    by, along ``first`` and ``other``, (n, 3) unit."""
+    by, along ``first`` and ``other``, (n, 3) unit; of one that bends what these grow by over half
+    its width: the first along first, both across, the second along other. middle: (P, 3) of each
+    patch; place: (n, 2) of a pixel from there, along both, in half widths."""
 
     first: Array
     other: Array
+    middle: Array
+    place: Array
     cause = "normal_error"
     proof = "a closer scan of a part of the surface"
 
@@ -32,33 +41,65 @@ class NormalError(PatchEffect):
         known = np.flatnonzero(patch >= 0)
         if not len(known):
             return None
-        normal = setting.pixels.normal.astype(np.float64)
-        sums = [np.bincount(patch[known], normal[known, k]) for k in range(3)]
-        mean = np.stack(sums, axis=1).astype(np.float64)
+        mean = _means(patch[known], setting.pixels.normal[known])
         mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9)
-        at = [v[patch].astype(np.float32) for v in tangents(mean)]
-        return cls(patch, (USUAL,) * 2, *at)
+        first, other = (v[patch].astype(np.float32) for v in tangents(mean))
+        middle = _means(patch[known], setting.pixels.point[known])
+        place = _place(setting, middle[patch], first, other)
+        return cls(patch, (USUAL,) * 2, first, other, middle, place)
 
     def elsewhere(self, setting: Setting, near: Near) -> NormalError:
         at = near.surface
-        return replace(self, parts=self.parts[at], first=self.first[at], other=self.other[at])
+        parts, first, other = self.parts[at], self.first[at], self.other[at]
+        place = _place(setting, self.middle[parts], first, other)
+        return replace(self, parts=parts, first=first, other=other, place=place)
+
+    @property
+    def bends(self) -> bool:
+        """Whether patches do."""
+        return len(self.usual) > 2
+
+    def casting(self, setting: Setting, x: np.ndarray) -> NormalError:
+        return self if self.bends else replace(self, usual=(*self.usual, *(BENT,) * 3))
 
     @property
     def numbers(self) -> Numbers:
-        names = [f"patch {k + 1}, {way}" for k in range(self.count) for way in ("first", "second")]
+        ways = ("first", "second", "bent first", "bent across", "bent second")[: len(self.usual)]
+        names = [f"patch {k + 1}, {way}" for k in range(self.count) for way in ways]
         alike = Numbers.alike(names, "rad", 1.0, -FARTHEST, FARTHEST)
         return replace(alike, deviation=self.deviation)
 
     def before(self, now: Situation, x: np.ndarray) -> Situation:
-        tilt = self.felt(x)
+        felt = self.felt(x)
+        tilt = felt[:, :2]
+        if self.bends:
+            along, across, second = felt[:, 2:].T
+            u, v = self.place.T
+            tilt = tilt + np.stack([along * u + across * v, across * u + second * v], axis=1)
         normal = now.normal + tilt[:, :1] * self.first + tilt[:, 1:] * self.other
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         return replace(now, normal=normal)
 
     def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
-        angle = np.degrees(np.hypot(x[0::2], x[1::2]))
+        tilt = x.reshape(self.count, -1)[:, :2]
+        angle = np.degrees(np.hypot(*tilt.T))
         return (
             "the mesh does not follow the surface: its normals are off by "
             f"{np.median(angle):.1f}° in the median and {np.percentile(angle, 95):.1f}° in the "
             "worst twentieth (too smooth a mesh, or a noisy one)"
         )
+
+
+def _means(patch: np.ndarray, values: Array) -> np.ndarray:
+    """(P, 3) of values (n, 3) by patch (n,)."""
+    count = np.maximum(np.bincount(patch), 1)
+    sums = [np.bincount(patch, values[:, k].astype(np.float64)) for k in range(3)]
+    return np.stack(sums, axis=1) / count[:, None]
+
+
+def _place(setting: Setting, middle: Array, first: Array, other: Array) -> Array:
+    """(n, 2) of the setting's pixels from the middles (n, 3) of their patches, in half widths of
+    one; a nearest patch that does not hold a pixel bends no further than to its edge."""
+    away = (setting.pixels.point - middle) / (0.5 * setting.size / ACROSS)
+    place = np.stack([np.sum(away * along, axis=1) for along in (first, other)], axis=1)
+    return np.clip(place, -1.5, 1.5).astype(np.float32)
