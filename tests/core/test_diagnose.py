@@ -230,7 +230,7 @@ class Whole(NormalError):
 
     @property
     def feels(self):
-        return felt_by(self.parts, 2)
+        return felt_by(self.parts, len(self.usual))
 
 
 def test_patches_eliminated_first_are_the_same_optimum():

@@ -1,7 +1,7 @@
 """The mesh is smoother or rougher than the surface: its normals are off, patch by patch.
 
-A patch is tilted as a whole first. Once that is accepted it may bend as well: bumps are round, and
-what steps from patch to patch leave of deep ones is more than noise.
+A patch is tilted, and bends: bumps are round, and what mere steps from patch to patch would leave
+of deep ones is more than noise.
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ from ..situation import Situation
 
 USUAL = np.radians(2.0)
 BENT = np.radians(1.0)  # over half a patch
+WAYS = ("first", "second", "bent along", "bent across", "bent aside")
 FARTHEST = np.radians(25.0)
 
 
 @dataclass(frozen=True)
 class NormalError(PatchEffect):
     """numbers: for each patch of the surface the tangents of two angles that its normal is tilted
-    by, along ``first`` and ``other``, (n, 3) unit; of one that bends what these grow by over half
-    its width: the first along first, both across, the second along other. middle: (P, 3) of each
+    by, along ``first`` and ``other``, (n, 3) unit, and what these grow by over half its width: the
+    first along first, each along the other's, the second along other. middle: (P, 3) of each
     patch; place: (n, 2) of a pixel from there, along both, in half widths."""
 
     first: Array
@@ -46,7 +47,7 @@ class NormalError(PatchEffect):
         first, other = (v[patch].astype(np.float32) for v in tangents(mean))
         middle = _means(patch[known], setting.pixels.point[known])
         place = _place(setting, middle[patch], first, other)
-        return cls(patch, (USUAL,) * 2, first, other, middle, place)
+        return cls(patch, (USUAL,) * 2 + (BENT,) * 3, first, other, middle, place)
 
     def elsewhere(self, setting: Setting, near: Near) -> NormalError:
         at = near.surface
@@ -55,33 +56,21 @@ class NormalError(PatchEffect):
         return replace(self, parts=parts, first=first, other=other, place=place)
 
     @property
-    def bends(self) -> bool:
-        """Whether patches do."""
-        return len(self.usual) > 2
-
-    def casting(self, setting: Setting, x: np.ndarray) -> NormalError:
-        return self if self.bends else replace(self, usual=(*self.usual, *(BENT,) * 3))
-
-    @property
     def numbers(self) -> Numbers:
-        ways = ("first", "second", "bent first", "bent across", "bent second")[: len(self.usual)]
-        names = [f"patch {k + 1}, {way}" for k in range(self.count) for way in ways]
+        names = [f"patch {k + 1}, {way}" for k in range(self.count) for way in WAYS]
         alike = Numbers.alike(names, "rad", 1.0, -FARTHEST, FARTHEST)
         return replace(alike, deviation=self.deviation)
 
     def before(self, now: Situation, x: np.ndarray) -> Situation:
-        felt = self.felt(x)
-        tilt = felt[:, :2]
-        if self.bends:
-            along, across, second = felt[:, 2:].T
-            u, v = self.place.T
-            tilt = tilt + np.stack([along * u + across * v, across * u + second * v], axis=1)
+        first, second, along, across, aside = self.felt(x).T
+        u, v = self.place.T
+        tilt = np.stack([first + along * u + across * v, second + across * u + aside * v], axis=1)
         normal = now.normal + tilt[:, :1] * self.first + tilt[:, 1:] * self.other
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         return replace(now, normal=normal)
 
     def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
-        tilt = x.reshape(self.count, -1)[:, :2]
+        tilt = x.reshape(-1, len(WAYS))[:, :2]
         angle = np.degrees(np.hypot(*tilt.T))
         return (
             "the mesh does not follow the surface: its normals are off by "
