@@ -30,14 +30,19 @@ class UnseenError:
 
 def unseen_error(fitted: Fitted, unseen: Unseen, expected: Array) -> UnseenError:
     """unseen: of left-out squares; expected: (n, 3) deviation before anything was fitted."""
-    whole = predict_unseen_photos(fitted)
     noise = np.sqrt(fitted.model.pixels.noise)
     return UnseenError(
         _rms(fitted, unseen),
-        None if whole is None else _rms(fitted, whole),
+        unseen_photos_error(fitted),
         _typical(fitted, unseen, expected),
         max(0.0, 1 - 1 / max(_typical(fitted, unseen, noise), 1e-9) ** 2),
     )
+
+
+def unseen_photos_error(fitted: Fitted) -> float | None:
+    """RMS error of left-out photos, relative to what the photos show up to white; None of one."""
+    whole = predict_unseen_photos(fitted)
+    return None if whole is None else _rms(fitted, whole)
 
 
 def _typical(fitted: Fitted, unseen: Unseen, unit: Array) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Generator, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,21 +20,11 @@ from .beside import beside
 from .diagnose_job import DiagnoseJob
 from .fit_job import CaptureResult, MaterialResult, with_portable
 from .job import Job, Step, finished
+from .refused import Again, seen_jointly, worse
 
 STAGE = "fitting with what was found"
 FEWEST = 50  # samples of a material that are left
 CORRECTING = 0.3  # of the time
-MORE = 0.03  # ln of what errors of unseen photos may grow by
-
-
-@dataclass(frozen=True)
-class Again:
-    """A material's second fit. material: None where it could not be fitted; light: RMS radiance of
-    its samples, as photos show it, over that of all they show; warnings: what is to be said."""
-
-    material: MaterialResult | None
-    light: float
-    warnings: tuple[str, ...]
 
 
 class RefitJob(Job):
@@ -67,17 +57,17 @@ class RefitJob(Job):
         dropped: list[str] = []
         attempt = 0.5
         while chosen:
-            again, applied = yield from self._with(before, found, chosen, 1 - 2 * attempt)
-            worse = None if self.exactly else _worse(before.materials, again)
-            if worse is None:
+            again, model, refusal = yield from self._with(before, found, chosen, 1 - 2 * attempt)
+            if refusal is None:
                 materials = [
                     replace(m, warnings=(*m.warnings, *a.warnings, *dropped))
                     for m, a in zip(_proposed(before, again), again, strict=True)
                 ]
-                used = applied if any(a.material is not None for a in again) else ()
+                taken = chosen if any(a.material is not None for a in again) else []
+                used = tuple(_applied(trial, model) for trial in taken)
                 yield from self._finish(replace(before, effects=used), materials, 1 - attempt)
                 return
-            dropped.append(f"{chosen.pop().effect.cause} is not taken into account: {worse}")
+            dropped.append(f"{chosen.pop().effect.cause} is not taken into account: {refusal}")
             attempt /= 2
         materials = [replace(m, warnings=(*m.warnings, *dropped)) for m in before.materials]
         yield from self._finish(before, materials, 1 - 2 * attempt)
@@ -95,23 +85,27 @@ class RefitJob(Job):
 
     def _with(
         self, before: CaptureResult, found: Found, chosen: Sequence[Trial], done: float
-    ) -> Generator[Step, None, tuple[list[Again], tuple[Applied, ...]]]:
-        """One material after the other; done: of the job, of which this takes half the rest."""
-        causes = [trial.effect.cause for trial in chosen]
+    ) -> Generator[Step, None, tuple[list[Again], Model, str | None]]:
+        """Second fits, the model they are of, and why they are refused; done: of the job, of which
+        this takes half the rest."""
         step = Step(STAGE, done)
         yield step
+        causes = [trial.effect.cause for trial in chosen]
         fitted = yield from beside(lambda: with_causes(found, causes), step)
-        applied = tuple(_applied(trial, fitted.model) for trial in chosen)
-        out = []
+        again = []
         share = 0.5 * (1 - done) / len(before.materials)
         for index, material in enumerate(before.materials):
             start = done + index * share
             try:
-                out.append((yield from self._again(index, material, fitted.model, start, share)))
+                one = yield from self._again(index, material, fitted.model, start, share)
             except PatinaError as error:
                 said = f"fitted without {', '.join(causes)}: {error}"
-                out.append(Again(None, 1.0, (said,)))
-        return out, applied
+                one = Again(None, 1.0, (said,))
+            again.append(one)
+        if self.exactly:
+            return again, fitted.model, None
+        jointly = yield from beside(lambda: seen_jointly(found, fitted), step)
+        return again, fitted.model, worse(before.materials, again, jointly)
 
     def _again(
         self, index: int, material: MaterialResult, model: Model, start: float, share: float
@@ -151,26 +145,6 @@ def _proposed(before: CaptureResult, again: Sequence[Again]) -> list[MaterialRes
     """The second fit's where there is one."""
     both = zip(before.materials, again, strict=True)
     return [one if a.material is None else a.material for one, a in both]
-
-
-def _worse(before: Sequence[MaterialResult], after: Sequence[Again]) -> str | None:
-    """In words, where unseen photos are predicted worse than without: a model may explain what it
-    was fitted to by something that is not there. Both errors are relative to all that photos show:
-    in light that a steep curve was taken from, the same error is another part."""
-    known = [
-        (one.held_out.error, other.material.held_out.error * other.light)
-        for one, other in zip(before, after, strict=True)
-        if other.material is not None
-        and one.held_out is not None
-        and other.material.held_out is not None
-    ]
-    if not known:
-        return None
-    grown = np.mean([np.log(max(b, 1e-9) / max(a, 1e-9)) for a, b in known])
-    if grown < MORE:
-        return None
-    said = ", ".join(f"{100 * a:.1f} to {100 * b:.1f} %" for a, b in known)
-    return f"with it, RMS errors of unseen photos grow from {said}"
 
 
 def _applied(trial: Trial, model: Model) -> Applied:

@@ -1,0 +1,81 @@
+"""Whether a second fit is refused: a model may explain the photos it was fitted to by something
+that is not there, and it then predicts photos that it has not seen worse than without."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..diagnose.fitted import Fitted
+from ..diagnose.search import Found
+from ..diagnose.unseen_error import unseen_photos_error
+from ..fit.held_out import HeldOut
+from .fit_job import MaterialResult
+
+MORE = 0.03  # ln of what errors of unseen photos may grow by
+
+
+@dataclass(frozen=True)
+class Again:
+    """A material's second fit. material: None where it could not be fitted; light: RMS radiance of
+    its samples, as photos show it, over that of all they show; warnings: what is to be said."""
+
+    material: MaterialResult | None
+    light: float
+    warnings: tuple[str, ...]
+
+
+def seen_jointly(found: Found, fitted: Fitted) -> float:
+    """ln of what the error of unseen photos grew by where the materials and all causes are fitted
+    together; 0 of one photo. fitted: with the causes that the second fit takes into account."""
+    before = found.error_before.photos
+    if before is None:
+        return 0.0
+    known = fitted is found.after
+    after = found.error_after.photos if known else unseen_photos_error(fitted)
+    return 0.0 if after is None else _grown(before, after)
+
+
+def worse(
+    before: Sequence[MaterialResult], after: Sequence[Again], jointly: float = 0.0
+) -> str | None:
+    """In words, where unseen photos are predicted worse than without.
+
+    Every photo counts alike, beside itself without the causes: over all photos together, the worst
+    would decide. Both errors are relative to all that photos show: in light that a steep curve was
+    taken from, the same error is another part. jointly: the same of the materials and causes fitted
+    together, whose photos are unseen, too: of eight photos, what the materials' own fits say is
+    chance by a few percent.
+    """
+    known = [
+        (one.held_out, other.material.held_out, other.light)
+        for one, other in zip(before, after, strict=True)
+        if other.material is not None
+        and one.held_out is not None
+        and other.material.held_out is not None
+    ]
+    grown = [g for g in (_by_photo(*both) for both in known) if g is not None]
+    if not grown or np.mean(grown) + jointly < MORE:
+        return None
+    said = ", ".join(
+        f"{100 * a.error:.1f} to {100 * b.error * light:.1f} %" for a, b, light in known
+    )
+    return (
+        f"with it, errors of unseen photos grow by {100 * np.expm1(np.mean(grown)):.0f} % "
+        f"(RMS of all: {said})"
+    )
+
+
+def _by_photo(before: HeldOut, after: HeldOut, light: float) -> float | None:
+    """Mean ln of what the error of a photo grew by; None where no photo has both."""
+    photos = sorted(before.per_photo.keys() & after.per_photo.keys())
+    if not photos:
+        return None
+    grown = [_grown(before.per_photo[p], after.per_photo[p] * light) for p in photos]
+    return float(np.mean(grown))
+
+
+def _grown(before: float, after: float) -> float:
+    return float(np.log(max(after, 1e-9) / max(before, 1e-9)))
