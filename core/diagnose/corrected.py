@@ -23,6 +23,7 @@ from .of_samples import nearest
 from .pixels import Pixels
 
 CHUNK = 20_000  # samples at a time: what each sees around itself takes a kilobyte
+SIGHTS = 20  # directions: what is off in one sample is not in the next
 NUDGE = 1e-2  # of the prediction
 LEAST_RESPONSE = 0.2  # ∂ ln recorded/∂ ln light: less is a plateau, or the veil of another place
 LEAST_COS, LEAST_LIGHT = 0.05, 0.5  # θi; part of the lamp's light that arrives
@@ -43,7 +44,7 @@ def corrected(
     for start in range(0, len(known), CHUNK):
         yield start / len(known)
         rows = known[start : start + CHUNK]
-        here = replace(setting, pixels=pixels.select(rows), brdfs=model.brdfs)
+        here = replace(setting, pixels=pixels.select(rows), brdfs=model.brdfs, sights=SIGHTS)
         parts.append(_corrected(table.select(rows), elsewhere(model, here, near.select(rows))))
     if not parts:
         return SampleTable.empty(), 1.0

@@ -87,7 +87,9 @@ class Setting:
     names; distant: which of them are. centre: (3,) of what the photos show; size: its extent, scan
     units. level: typical irradiance. scale: (materials,) what each material's reflectance was
     multiplied by, and irradiance on it divided by, where that is not known. brdfs: before any
-    effect. rays: the scan's mesh."""
+    effect. rays: the scan's mesh. sights: directions of either kind (surroundings.py) that a pixel
+    looks into: what sums over too few of them are off by is no light, and dilutes what is found of
+    the light that is there (of a bounce half at 20, a twentieth at 100)."""
 
     pixels: Pixels
     brdfs: BRDFs
@@ -99,6 +101,7 @@ class Setting:
     size: float
     level: float
     scale: NDArray[np.float32]
+    sights: int = 100
 
     @property
     def own_level(self) -> Array:
@@ -112,9 +115,16 @@ class Setting:
 
         return Surroundings.of(self)
 
+    @cached_property
+    def faces_seen(self) -> NDArray[np.int32]:
+        """(f, directions) faces of the mesh that each face of it sees, −1 for the open."""
+        from .exchange import faces_seen
+
+        return faces_seen(self.rays)
+
     def glow(self, photo: int) -> Array:
         """(f, 3) radiance that every face of the mesh sends off in a photo, as a matte surface of
-        the same albedo would; 0 where the lamp does not reach it."""
+        the same albedo would, of the lamp's light and of what other faces send off."""
         from .glow import face_glow
 
         return face_glow(self, photo)

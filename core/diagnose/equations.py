@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, sparray
 
 from .fitted import Fitted, weights
 from .slopes import Slopes
@@ -23,6 +23,7 @@ Vector = NDArray[np.float64]
 
 CHUNK = 4096  # rows at a time
 DENSE = 48  # numbers, up to which a full matrix is faster
+FULL = 0.2  # of it is filled: a full matrix is faster however many they are
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ class Equations:
                     r = r * root
                     blocks[index, c] += a.T @ a
                     pull[index, c] += a.T @ r
-                    x = scaled(slopes.matrix(mine, c), root) if p else None
+                    x = _full_if_faster(scaled(slopes.matrix(mine, c), root)) if p else None
                     if x is not None:
                         own += _square(x)
                         coupling[index, c] += (x.T @ a).T
@@ -86,7 +87,7 @@ class Equations:
                         local_pull += y.T @ r
                         local += _by_patch(slopes, mine, c, root)
                         if x is not None:
-                            local_own += (x.T @ y).toarray()
+                            local_own += _full(x.T @ y)
         size = m * 3 * k
         return cls(
             blocks, coupling.reshape(size, p), own, pull.reshape(size), own_pull, local,
@@ -208,12 +209,18 @@ def _blockwise(inverse: Array, pull: Vector) -> Vector:
     return np.asarray(np.einsum("pef,pf->pe", inverse, pull.reshape(count, e)).ravel())
 
 
-def _square(x: csr_array) -> Array:
+def _full_if_faster(x: csr_array) -> Array | csr_array:
+    count = x.shape[1]
+    return x.toarray() if count <= DENSE or x.nnz > FULL * x.shape[0] * count else x
+
+
+def _square(x: Array | csr_array) -> Array:
     """(p, p) xᵀ x."""
-    if x.shape[1] <= DENSE:
-        full = x.toarray()
-        return np.asarray(full.T @ full)
-    return np.asarray((x.T @ x).toarray())
+    return _full(x.T @ x)
+
+
+def _full(x: Array | sparray) -> Array:
+    return np.asarray(x.toarray() if isinstance(x, sparray) else x)
 
 
 def _held(fitted: Fitted, pull: Vector) -> NDArray[np.bool_]:

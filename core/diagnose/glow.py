@@ -1,4 +1,4 @@
-"""What every face of the mesh sends off under the lamp: the light of a first bounce."""
+"""What every face of the mesh sends off under the lamp, however often light bounced before."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from ..appearance.energy import directional_albedo
 from ..geometry.view import cast_shadow
 from .effect import Setting
+from .exchange import to_and_fro
 
 Array = NDArray[np.floating]
 
@@ -18,7 +19,7 @@ NEAREST = 8  # pixels that say what a face is made of
 
 def face_glow(setting: Setting, photo: int) -> Array:
     """(f, 3) radiance; a face's material is that of the nearest pixels, its light that of the
-    photo's pixels (a distant lamp's is the same everywhere)."""
+    photo's pixels (a distant lamp's is the same everywhere) and of other faces."""
     pixels, mesh = setting.pixels, setting.rays.mesh
     centre = mesh.vertices[mesh.faces].mean(axis=1)
     normal = mesh.face_normals
@@ -44,4 +45,5 @@ def face_glow(setting: Setting, photo: int) -> Array:
     albedo /= setting.scale[:, None]
     irradiance = pixels.irradiance[one] * setting.scale[pixels.material[one]]
     light = irradiance * np.where(dark, 0, cosine)[:, None]
-    return np.asarray(albedo[material] / np.pi * light, np.float32)
+    own = np.asarray(albedo[material], np.float32)
+    return to_and_fro(own / np.pi * light, own, setting.faces_seen)

@@ -245,7 +245,7 @@ def _promising(found: Sequence[Asked]) -> list[Asked]:
 
 
 def _simplest(trials: Sequence[Trial]) -> Trial | None:
-    """Of convincing trials, best first, the simplest that gains nearly as much as the best: sixteen
+    """Of convincing trials, best first, the simplest that gains nearly as much as the best: many
     spots of light can stand for an even room, which is one thing."""
     if not trials:
         return None

@@ -23,10 +23,9 @@ from .pixels import Pixels
 
 Array = NDArray[np.floating]
 
-EACH = 20  # directions of either kind
 ALPHA = 0.15  # of the lobe that the second half is drawn from
 ACCURACY = 0.02  # of what such sums say of the light about an object
-CHUNK = 8192  # pixels at a time
+CHUNK = 2048  # pixels at a time
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class Surroundings:
     def of(cls, setting: Setting) -> Surroundings:
         """Of all pixels of a diagnosis, the BRDFs as they were before any effect."""
         parts = [
-            _part(setting.pixels.select(rows), setting.brdfs, setting.rays, seed)
+            _part(setting.pixels.select(rows), setting.brdfs, setting.rays, setting.sights, seed)
             for seed, rows in enumerate(_chunks(len(setting.pixels)))
         ]
         return cls(*(np.concatenate([p[k] for p in parts]) for k in range(4)))
@@ -61,13 +60,15 @@ def _chunks(n: int) -> Iterator[slice]:
         yield slice(start, min(start + CHUNK, n))
 
 
-def _part(pixels: Pixels, brdfs: BRDFs, rays: RayScene, seed: int) -> tuple[NDArray, ...]:
+def _part(
+    pixels: Pixels, brdfs: BRDFs, rays: RayScene, each: int, seed: int
+) -> tuple[NDArray, ...]:
     rng = np.random.default_rng(seed)
-    n, d = len(pixels), 2 * EACH
+    n, d = len(pixels), 2 * each
     normal, view = pixels.normal.astype(np.float64), pixels.view.astype(np.float64)
     frame = np.stack([*tangents(normal), normal], axis=1)  # (n, 3, 3), rows
-    u = (np.arange(EACH) + rng.random((n, EACH))) / EACH
-    turn = 2 * np.pi * (0.61803399 * np.arange(EACH) + rng.random((n, 1)))
+    u = (np.arange(each) + rng.random((n, each))) / each
+    turn = 2 * np.pi * (0.61803399 * np.arange(each) + rng.random((n, 1)))
     sine = np.sqrt(u)
     matte = np.stack([sine * np.cos(turn), sine * np.sin(turn), np.sqrt(1 - u)], axis=-1)
     tangent2 = ALPHA**2 * u / np.maximum(1 - u, 1e-6)

@@ -11,8 +11,8 @@ from ..effect import Array, Effect, Numbers, Setting
 from ..situation import Situation
 from ..surroundings import ACCURACY
 
-LOBES = 16  # directions that the surroundings are described by
-SHARP = 5.0  # of each: a bright spot about 25° wide
+LOBES = 64  # directions that the surroundings are described by
+SHARP = 21.0  # of each: half as bright 15° from its middle, which is about as far as the next
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class EnvironmentReflection(Effect):
         return Numbers.alike(names, "of E/π", 0.2, 0.0, 20.0)
 
     def added(self, now: Situation, brdfs: BRDFs, x: np.ndarray) -> Array:
-        return np.einsum("lnc,l->nc", self.reflected, x.astype(np.float32))
+        return np.tensordot(x.astype(np.float32), self.reflected, 1)
 
     def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
         bright = self.directions[int(np.argmax(x))]
