@@ -31,10 +31,10 @@ class BRDFs:
     def of(cls, brdfs: Sequence[PrincipalBRDF]) -> BRDFs:
         """Fitted BRDFs of one basis, with a little slack."""
         basis = brdfs[0].basis
-        coefficients = np.zeros((len(brdfs), 3, basis.count + slack.COUNT))
+        variance = slack.variances(basis, slack.LITTLE)
+        coefficients = np.zeros((len(brdfs), 3, len(variance)))
         for index, brdf in enumerate(brdfs):
             coefficients[index, :, : brdf.coefficients.shape[1]] = brdf.coefficients
-        variance = slack.variances(basis, slack.LITTLE)
         return cls(slack.with_slack(basis), coefficients, variance)
 
     def tight(self) -> BRDFs:
