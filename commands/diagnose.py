@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..core.capture import read_capture
 from ..core.diagnose.effects import EFFECTS
-from ..core.diagnose.search import Found
+from ..core.diagnose.found import Found
 from ..core.job import FitJob, finished
 from ..core.job.check_job import CheckJob
 from ..core.report import diagnosis, diagnosis_json
@@ -63,7 +63,7 @@ def diagnose_to_folder(
 
 def _tell_causes(found: Found) -> None:
     for trial in found.accepted:
-        print(f"{trial.effect.cause}: {trial.sentence()}")
+        print(f"{trial.effect.cause}: {found.sentence(trial)}")
     if found.unexplained:
         print(f"unknown: {found.left.sentence()}")
     if not found.causes:

@@ -58,7 +58,7 @@ explain, name the cause, and fit again with it in the model"""
         if mesh is not None and not paint_evidence(mesh, vertices, setting.pixels, found):
             self.report({"WARNING"}, f"{mesh.name} no longer has the scan's vertices: not coloured")
         for trial in found.accepted:
-            self.report({"WARNING"}, f"{trial.effect.cause}: {trial.sentence()}")
+            self.report({"WARNING"}, f"{trial.effect.cause}: {found.sentence(trial)}")
         if not found.causes:
             self.report({"INFO"}, "Nothing that can be named is wrong")
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from ..core.diagnose.found import Found
 from ..core.diagnose.pixels import Pixels
-from ..core.diagnose.search import Found
 
 Array = NDArray[np.floating]
 

@@ -57,7 +57,7 @@ def _row(label: str, path: Path) -> list[str]:
         f"{whole:.0f}, {search:.0f} |",
         flush=True,
     )
-    said = [trial.sentence() for trial in found.accepted]
+    said = [found.sentence(trial) for trial in found.accepted]
     if found.unexplained:
         said.append(found.left.sentence())
     for before, material in zip(job.checked.result.materials, after.materials, strict=True):
@@ -66,5 +66,4 @@ def _row(label: str, path: Path) -> list[str]:
                 f"{material.name}: unseen photos by the first fit {100 * before.held_out.error:.1f}"
                 f" % off, by the second {100 * material.held_out.error:.1f} % (relative RMS)"
             )
-        said += [w for w in material.warnings if "not taken into account" in w]
     return said

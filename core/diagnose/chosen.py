@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from .fitted import Fitted
-from .search import Found, Trial
+from .found import Found, Trial
 from .solve import fit
 
 NO_CORRECTION = ("outside_basis",)  # it frees the BRDF, and changes no sample

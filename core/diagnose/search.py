@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 from threading import Lock
 
@@ -24,8 +24,8 @@ from .deviation import as_found
 from .effect import Effect, Setting
 from .effects.outside_basis import OutsideBasis
 from .fitted import Fitted
+from .found import MINOR, SURE, Found, Trial, without_last
 from .held_out import (
-    Unseen,
     by_square,
     error_of_sum,
     predict_unseen,
@@ -33,138 +33,25 @@ from .held_out import (
     variances,
     variances_by_photos,
 )
-from .leftover import Leftover, leftover
+from .leftover import leftover
 from .model import Model
 from .solve import fit
-from .unseen_error import UnseenError, unseen_error
+from .unseen_error import unseen_error
 
 Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
 Costs = Callable[[bool, bool], Array]
 
-CHANCE = 0.02  # of a false alarm, over all effects that are tried
-LEAST_CHANGE = 0.005  # RMS of the photos: less is not worth a word,
-PLAIN = 0.05  # nats a pixel and channel, unless it gains this much
 OUTSIDE = 0.002  # RMS of the photos that the slack beside the basis has to explain to be named
 MOST_EFFECTS = 4
-SURE = 3.0  # standard errors over squares that a gain is above 0
 NEARLY = 0.93  # of the best gain
 TRIED, PROMISING = 4, 0.25  # so many are fitted at least; and all that promise this of the best
 UNLIKELY = 0.05  # chance of effects of patches that are fitted
-MINOR = 0.05  # of what accepted effects gained: less is more likely what their model lacks
 SURER = 5.0  # standard errors of a gain that is as small and leaves nothing
 CASTS = 3  # rounds in which rays are cast anew for a lamp or a photo that is found elsewhere
 MORE = 0.02  # of the gain, that another such round has to promise
 EXPECTATIONS = 1  # rounds in which patches say what is usual among them
 ALIKE = 2.0  # standard errors by which gains differ that the photos cannot tell apart
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One effect added to a model. fitted: with it; unseen: its prediction of left-out squares.
-    gain: nats that it predicts them better, by_block (b,) of each square; change: RMS of what it
-    changes in the prediction, relative. chance: that all of it is chance, over all effects tried at
-    once. ties: effects that explain the photos as well."""
-
-    effect: Effect
-    fitted: Fitted
-    unseen: Unseen
-    by_block: Vector
-    change: float
-    chance: float
-    ties: tuple[Effect, ...] = ()
-
-    @property
-    def gain(self) -> float:
-        """Nats."""
-        return float(self.by_block.sum())
-
-    @property
-    def error(self) -> float:
-        """Standard error of the gain, over squares."""
-        return error_of_sum(self.by_block)
-
-    @property
-    def convincing(self) -> bool:
-        """Whether it may be named."""
-        return self.sure and self.effect.worth(self.told)
-
-    @property
-    def sure(self) -> bool:
-        """Whether it is no chance, and may be named or stand for what has no name."""
-        sure = self.gain > SURE * self.error and self.chance < CHANCE
-        told = self.effect.fine or self.effect.worth(self.told)
-        plain = self.gain > PLAIN * self.unseen.residual.size
-        return sure and (self.change > LEAST_CHANGE or plain) and told
-
-    def sentence(self) -> str:
-        """What it means, and what photo would tell it from what explains the photos as well."""
-        said = self.effect.sentence(self.told, self.deviation)
-        if not self.ties:
-            return said
-        others = " or ".join(e.cause for e in self.ties)
-        proofs = "; or ".join(dict.fromkeys(e.proof for e in (self.effect, *self.ties)))
-        return f"{said}. The photos cannot tell it from {others}; this would: {proofs}"
-
-    def changed(self) -> Array:
-        """(n, 3) radiance that the effect adds to what the photos show, the BRDF the same."""
-        return self.fitted.shown - without_last(self.fitted.model)
-
-    @property
-    def x(self) -> Vector:
-        """The effect's numbers."""
-        return self.fitted.model.numbers_of(self.effect.cause)
-
-    @property
-    def told(self) -> Vector:
-        """The numbers without what the BRDF could as well have."""
-        return self.effect.told(self.x)
-
-    @property
-    def deviation(self) -> Vector:
-        """Of the numbers as they are told."""
-        place = self.fitted.model.place_of(self.effect.cause)
-        return np.sqrt(np.maximum(self.unseen.variance[place], 0.0))
-
-
-@dataclass(frozen=True)
-class Found:
-    """accepted: what is missed most of the whole model first, with their numbers in it; the slack
-    beside the basis last. rounds: what was fitted at each, best first; the last is the one that
-    found nothing. before, after: the fits
-    without and with all accepted. left: structure that nothing accepted explains. error_before,
-    error_after: of left-out parts and photos."""
-
-    accepted: tuple[Trial, ...]
-    rounds: tuple[tuple[Trial, ...], ...]
-    before: Fitted
-    after: Fitted
-    unseen_before: Unseen
-    unseen_after: Unseen
-    left: Leftover
-    error_before: UnseenError
-    error_after: UnseenError
-
-    @property
-    def ranked(self) -> list[Trial]:
-        """What is accepted, then the rest of the first round, best first."""
-        first = self.rounds[0] if self.rounds else ()
-        named = {t.effect.cause for t in self.accepted}
-        return [*self.accepted, *(t for t in first if t.effect.cause not in named)]
-
-    @property
-    def causes(self) -> tuple[str, ...]:
-        """By the words of the vocabulary, as accepted; ``unknown`` for what is left of
-        structure."""
-        named = tuple(trial.effect.cause for trial in self.accepted)
-        return (*named, "unknown") if self.unexplained else named
-
-    @property
-    def unexplained(self) -> bool:
-        """Whether structure is left that no cause explains, and that is not merely what the model
-        of an accepted one lacks."""
-        gained = sum(trial.gain for trial in self.accepted)
-        return self.left.convincing and self.left.gain > MINOR * gained
 
 
 def search(
@@ -292,13 +179,6 @@ def _by_photos(trial: Trial) -> Trial:
     place = trial.fitted.model.place_of(trial.effect.cause)
     variance[place] = variance[place] + np.square(trial.effect.own_error(trial.told))
     return replace(trial, unseen=replace(trial.unseen, variance=tuple(variance)))
-
-
-def without_last(model: Model) -> Array:
-    """(n, 3) what the model shows without its last effect, the BRDF the same: another BRDF would
-    take much of it, as it takes the light that glare takes from all that is bright."""
-    effect, x = model.effects[-1], model.x[-1]
-    return replace(model, x=(*model.x[:-1], x - effect.told(x))).predicted()
 
 
 def _with_last(model: Model, effect: Effect, x: Vector) -> Array:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from dataclasses import replace
 
 from .diagnose_job import DiagnoseJob
 from .fit_job import CaptureResult, FitJob
-from .job import Job, Step
+from .job import Job, Step, finished
 from .refit_job import RefitJob
 
 SHARE = 0.85  # of the job, before the second fit
@@ -14,7 +15,8 @@ SHARE = 0.85  # of the job, before the second fit
 
 class CheckJob(Job):
     """``checked`` is the diagnosis with the fit as it was, ``result`` the fit with what was named
-    in the model, but without the causes ``without``; they are there when the job is done. Its
+    in the model, but without the causes ``without``; they are there when the job is done. What the
+    second fit does not bear out is named no more (Found.doubted). Its
     materials have portable forms where those of ``fit`` would have."""
 
     def __init__(self, fit: FitJob, without: Collection[str] = ()) -> None:
@@ -32,3 +34,4 @@ class CheckJob(Job):
         for step in again.run():
             yield Step(step.stage, SHARE + (1 - SHARE) * step.fraction)
         self.result = again.result
+        self.checked.found = replace(finished(self.checked.found), doubted=again.doubted)

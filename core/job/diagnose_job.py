@@ -14,8 +14,9 @@ from ..diagnose.choose import choose_pixels
 from ..diagnose.deviation import pixel_deviation
 from ..diagnose.effect import Setting
 from ..diagnose.effects import made_for
+from ..diagnose.found import Found
 from ..diagnose.model import Model
-from ..diagnose.search import Found, search
+from ..diagnose.search import search
 from ..fit.measured_result import MeasuredResult
 from ..steps import relayed
 from .beside import stepped_beside

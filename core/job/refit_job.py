@@ -9,9 +9,9 @@ import numpy as np
 
 from ..diagnose.chosen import can_be_applied, with_causes
 from ..diagnose.corrected import corrected
+from ..diagnose.found import Found, Trial
 from ..diagnose.model import Model
 from ..diagnose.of_samples import pixels_of_samples
-from ..diagnose.search import Found, Trial
 from ..errors import PatinaError
 from ..samples import SampleTable
 from ..steps import relayed
@@ -29,6 +29,7 @@ CORRECTING = 0.3  # of the time
 
 class RefitJob(Job):
     """``result`` is the fit with the effects in the model; where none is, the fit as it was.
+    ``doubted`` are causes that were left out for what they do to unseen photos, and what that is.
 
     checked: a finished diagnosis. without: causes that it named and that are left out. exactly: the
     rest is taken into account even where unseen photos are then predicted worse. portable: whether
@@ -48,6 +49,7 @@ class RefitJob(Job):
         self.exactly = exactly
         self.portable = portable
         self.result: CaptureResult | None = None
+        self.doubted: dict[str, str] = {}
 
     def run(self) -> Iterator[Step]:
         """With all causes; where unseen photos are then predicted worse, without the one of them
@@ -67,7 +69,9 @@ class RefitJob(Job):
                 used = tuple(_applied(trial, model) for trial in taken)
                 yield from self._finish(replace(before, effects=used), materials, 1 - attempt)
                 return
-            dropped.append(f"{chosen.pop().effect.cause} is not taken into account: {refusal}")
+            cause = chosen.pop().effect.cause
+            self.doubted[cause] = refusal
+            dropped.append(f"{cause} is not taken into account: {refusal}")
             attempt /= 2
         materials = [replace(m, warnings=(*m.warnings, *dropped)) for m in before.materials]
         yield from self._finish(before, materials, 1 - 2 * attempt)

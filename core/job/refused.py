@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..diagnose.fitted import Fitted
-from ..diagnose.search import Found
+from ..diagnose.found import Found
 from ..diagnose.unseen_error import unseen_photos_error
 from ..fit.held_out import HeldOut
 from .fit_job import MaterialResult

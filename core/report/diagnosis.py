@@ -10,7 +10,7 @@ import numpy as np
 
 from ..diagnose.coordinates import coordinates, trend
 from ..diagnose.effect import Setting
-from ..diagnose.search import Found, Trial
+from ..diagnose.found import Found, Trial
 from ..job import CaptureResult
 from ..photo import write_png
 from ..views.sphere import write_sphere
@@ -60,7 +60,7 @@ def _pictures(folder: Path, found: Found, setting: Setting) -> str:
 def section(found: Found, setting: Setting) -> str:
     """HTML: the ranking, then the residual along what betrays causes."""
     left = f"<p>{escape(found.left.sentence())}</p>" if found.unexplained else ""
-    rows = "".join(_row(t, t in found.accepted) for t in found.ranked)
+    rows = "".join(_row(t, found) for t in found.ranked)
     named = ", ".join(found.causes) or "nothing that can be named"
     return (
         f"<h2>What is wrong</h2><p><b>{escape(named)}</b></p>{left}"
@@ -153,11 +153,13 @@ def _materials(folder: Path, before: CaptureResult, after: CaptureResult) -> str
     )
 
 
-def _row(trial: Trial, accepted: bool) -> str:
+def _row(trial: Trial, found: Found) -> str:
+    accepted = trial in found.accepted
     sure = trial.gain / max(trial.error, 1e-9)
     width = int(np.clip(12 * sure, 0, 160))
-    said = trial.sentence() if accepted else ""
-    style = "background:#2f6fb0" if accepted else "background:#bbb"
+    said = found.sentence(trial) if accepted else ""
+    sound = accepted and trial.effect.cause not in found.doubted
+    style = "background:#2f6fb0" if sound else "background:#bbb"
     return (
         f"<tr><th>{escape(trial.effect.cause)}</th><td>{sure:.1f}</td><td><div style='height:10px;"
         f"width:{width}px;{style}'></div></td><td>{escape(said)}</td></tr>"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ..diagnose.search import Found, Trial
+from ..diagnose.found import Found, Trial
 from ..diagnose.unseen_error import UnseenError
 from ..job import CaptureResult
 from .diagnosis import evidence_file
@@ -25,7 +25,7 @@ def describe(found: Found, before: CaptureResult, after: CaptureResult) -> dict[
         "named": list(found.causes) or ["none"],
         "baseline": _errors(found.error_before),
         "extended": _errors(found.error_after),
-        "causes": [_cause(t, t in found.accepted) for t in found.ranked],
+        "causes": [_cause(t, found) for t in found.ranked],
         "unexplained": found.unexplained,
         "left": {
             "gain": found.left.gain,
@@ -65,13 +65,15 @@ def _errors(error: UnseenError) -> dict[str, float | None]:
     }
 
 
-def _cause(trial: Trial, accepted: bool) -> dict[str, Any]:
+def _cause(trial: Trial, found: Found) -> dict[str, Any]:
     numbers = trial.effect.numbers
+    accepted = trial in found.accepted
     drawn = accepted and len(numbers) > 0
     return {
         "cause": trial.effect.cause,
         "accepted": accepted,
-        "sentence": trial.sentence(),
+        "doubted": found.doubted.get(trial.effect.cause) if accepted else None,
+        "sentence": found.sentence(trial) if accepted else trial.sentence(),
         "ties": [effect.cause for effect in trial.ties],
         "held_out_gain": trial.gain,
         "standard_error": trial.error,

@@ -24,6 +24,7 @@ from patina.core.diagnose.effects.light_intensity import LightIntensity
 from patina.core.diagnose.effects.near_light import NearLight
 from patina.core.diagnose.effects.normal_error import NormalError
 from patina.core.diagnose.effects.vignetting import Vignetting
+from patina.core.diagnose.found import Found
 from patina.core.diagnose.held_out import predict_unseen, variances
 from patina.core.diagnose.model import Model
 from patina.core.diagnose.situation import Situation
@@ -35,7 +36,7 @@ from tests.make_lit_ball import NOISE, SIZE, changed, lit_ball, shadowed
 
 
 def searched(setting: Setting, kinds=(LightDirection, LightIntensity, NearLight, CameraResponse,
-                                      Vignetting), pool=None) -> searching.Found:  # fmt: skip
+                                      Vignetting), pool=None) -> Found:  # fmt: skip
     deviation = pixel_deviation(setting.pixels, setting.brdfs, np.radians(0.2))
     effects = [kind.of(setting) for kind in kinds]
     model = Model(setting.pixels, setting.brdfs)
@@ -57,6 +58,9 @@ def test_a_lamp_that_drifts_is_named_and_measured():
     x = found.accepted[0].x
     np.testing.assert_allclose(x - x.mean(), drift - drift.mean(), atol=0.02)
     assert found.unseen_after.mean < found.unseen_before.mean
+    doubted = replace(found, doubted={"light_intensity": "errors grow by 8 %"})
+    assert doubted.causes == () and doubted.accepted == found.accepted
+    assert "errors grow by 8 %" in doubted.sentence(found.accepted[0])
 
 
 def test_a_dark_corner_is_named_and_measured():

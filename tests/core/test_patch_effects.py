@@ -16,6 +16,7 @@ from patina.core.diagnose.deviation import pixel_deviation
 from patina.core.diagnose.effect import Setting
 from patina.core.diagnose.effects.normal_error import NormalError
 from patina.core.diagnose.effects.second_material import SecondMaterial
+from patina.core.diagnose.found import SURE
 from patina.core.diagnose.model import Model
 from patina.core.diagnose.situation import Situation
 from patina.core.diagnose.solve import fit
@@ -72,7 +73,7 @@ def test_bumps_are_not_taken_for_paint_as_well():
     model = Model(setting.pixels, setting.brdfs).with_effect(NormalError.of(setting))
     now = fit(model, deviation_of(setting))
     paint = searching._try(now, searching._costs(now), Asked(SecondMaterial.of(setting), 0.0, 0.0))
-    assert paint.gain < searching.SURE * paint.error
+    assert paint.gain < SURE * paint.error
     assert not paint.convincing
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import pytest
 
 from patina.core.fit.held_out import HeldOut
-from patina.core.job.refused import worse
+from patina.core.job import refit_job
+from patina.core.job.job import Step
+from patina.core.job.refused import Again, worse
 
 
 def with_errors(*errors: float | None) -> list[SimpleNamespace]:
@@ -61,3 +64,37 @@ def test_errors_are_of_the_light_as_it_was():
 def test_a_material_that_could_not_be_fitted_again_says_nothing():
     none = SimpleNamespace(material=None, light=1.0)
     assert worse(with_errors(0.1), [none]) is None
+
+
+def test_what_unseen_photos_speak_against_is_doubted_and_left_out(monkeypatch):
+    """The cause that gained least is tried out; without it the second fit stands."""
+
+    def cause(name: str) -> SimpleNamespace:
+        return SimpleNamespace(effect=SimpleNamespace(cause=name))
+
+    chosen = [cause("near_light"), cause("camera_response")]
+    monkeypatch.setattr(refit_job, "can_be_applied", lambda found: chosen)
+    monkeypatch.setattr(refit_job, "_applied", lambda trial, model: trial.effect.cause)
+
+    @dataclass(frozen=True)
+    class Material:
+        warnings: tuple[str, ...]
+
+    @dataclass(frozen=True)
+    class Result:
+        materials: tuple[Material, ...]
+        effects: tuple[str, ...] = ()
+
+    def fitted(self, before, found, taken, done):
+        yield Step("fitting", done)
+        again = [Again(Material(("again",)), 1.0, ())]
+        return again, None, "errors grow by 8 %" if len(taken) > 1 else None
+
+    monkeypatch.setattr(refit_job.RefitJob, "_with", fitted)
+    checked = SimpleNamespace(result=Result((Material(("first",)),)), found=SimpleNamespace())
+    job = refit_job.RefitJob(checked, portable=False)
+    job.drain()
+    assert job.doubted == {"camera_response": "errors grow by 8 %"}
+    assert job.result.effects == ("near_light",)
+    said = job.result.materials[0].warnings
+    assert said == ("again", "camera_response is not taken into account: errors grow by 8 %")

@@ -14,7 +14,7 @@ import numpy as np
 from patina.core.basis import Basis, PrincipalBRDF, mapping
 from patina.core.capture import read_capture
 from patina.core.diagnose.effect import Setting
-from patina.core.diagnose.search import Trial
+from patina.core.diagnose.found import Trial
 from patina.core.fit.spread import directions
 from patina.core.job import CaptureResult, FitJob
 from patina.core.job.check_job import CheckJob
