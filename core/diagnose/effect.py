@@ -233,6 +233,13 @@ class Effect(ABC):
         kind = type(self)
         return kind.before is not Effect.before or kind.lamps is not Effect.lamps
 
+    def remade(self, setting: Setting, x: NDArray[np.float64]) -> Effect:
+        """Where it is made of_brdf: the same of the setting's BRDFs, x: as it was found with
+        others."""
+        effect = type(self).of(setting)
+        assert effect is not None
+        return effect
+
     def casting(self, setting: Setting, x: NDArray[np.float64]) -> Effect:
         """The same, with rays cast anew: shadows away from where these numbers put the lamp, the
         surface that photos show where they lie elsewhere. Found once the effect is accepted, since

@@ -190,8 +190,7 @@ def _with_last(model: Model, effect: Effect, x: Vector) -> Array:
 def _remade(now: Fitted, costs: Costs, best: Trial, setting: Setting) -> Trial:
     """With the BRDFs that are found when the effect is in the model: those without it hold a part
     of it."""
-    effect = best.effect.of(replace(setting, brdfs=best.fitted.model.brdfs))
-    assert effect is not None
+    effect = best.effect.remade(replace(setting, brdfs=best.fitted.model.brdfs), best.x)
     return _try(now, costs, Asked(effect, best.gain, best.chance))
 
 

@@ -5,22 +5,28 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..brdfs import BRDFs
-from ..effect import Array, Effect, Numbers, Setting
+from ..effect import Array, Effect, Near, Numbers, Setting
 from ..situation import Situation
 from ..surroundings import ACCURACY
 
 LOBES = 64  # directions that the surroundings are described by
 SHARP = 21.0  # of each: half as bright 15° from its middle, which is about as far as the next
+FINER = 8  # times as many directions are looked into where it is bright, so much sharper,
+MOST = 128  # no more of them than that,
+DIM = 0.1  # of the brightest: is not
 
 
 @dataclass(frozen=True)
 class EnvironmentReflection(Effect):
     """numbers: how bright the surroundings are about each of ``directions`` (l, 3), radiance over
-    the lamp's irradiance / π. reflected: (l, n, 3) of a radiance of 1 there."""
+    the lamp's irradiance / π; sharp: (l,) of each. reflected: (l, n, 3) of a radiance of 1
+    there."""
 
     directions: Array
+    sharp: Array
     reflected: Array
     cause = "environment_reflection"
     of_brdf = True
@@ -29,31 +35,59 @@ class EnvironmentReflection(Effect):
 
     @classmethod
     def of(cls, setting: Setting) -> EnvironmentReflection:
+        return cls._towards(setting, _evenly(LOBES), np.full(LOBES, SHARP))
+
+    @classmethod
+    def _towards(cls, setting: Setting, directions: Array, sharp: Array) -> EnvironmentReflection:
         around = setting.surroundings
-        k = np.arange(LOBES)
-        z, turn = 1 - (2 * k + 1) / LOBES, np.pi * (3 - np.sqrt(5)) * k
-        r = np.sqrt(1 - z**2)
-        directions = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
         level = setting.own_level / np.pi
         open_ = (around.face < 0).astype(np.float32)
         reflected = []
-        for d in directions.astype(np.float32):
-            bright = np.exp(SHARP * (around.towards @ d - 1)) * open_
+        for d, k in zip(directions.astype(np.float32), sharp.astype(np.float32), strict=True):
+            bright = np.exp(k * (around.towards @ d - 1)) * open_
             reflected.append(level * around.under(bright))
-        return cls(directions, np.stack(reflected))
+        return cls(directions, sharp, np.stack(reflected))
+
+    def elsewhere(self, setting: Setting, near: Near) -> EnvironmentReflection:
+        return self._towards(setting, self.directions, self.sharp)
+
+    def remade(self, setting: Setting, x: np.ndarray) -> EnvironmentReflection:
+        """With more and sharper directions about what is bright: the edge of a window, mirrored, is
+        sharp, and what is too soft here would be taken by a tone curve."""
+        finer = _evenly(FINER * LOBES)
+        radiance = self.radiance(finer, x)
+        brightest = np.argsort(-radiance)[:MOST]
+        brightest = brightest[radiance[brightest] > DIM * radiance.max()]
+        directions = np.concatenate([_evenly(LOBES), finer[brightest]])
+        sharp = np.repeat([SHARP, FINER * SHARP], [LOBES, len(brightest)])
+        return self._towards(setting, directions, sharp)
+
+    def radiance(self, towards: Array, x: np.ndarray) -> Array:
+        """(m,) of the surroundings towards (m, 3), over the lamp's irradiance / π."""
+        return np.asarray(np.exp(self.sharp * (towards @ self.directions.T - 1)) @ x)
 
     @property
     def numbers(self) -> Numbers:
-        names = [f"({x:.1f}, {y:.1f}, {z:.1f})" for x, y, z in self.directions]
+        names = [f"({x:.2f}, {y:.2f}, {z:.2f})" for x, y, z in self.directions]
         return Numbers.alike(names, "of E/π", 0.2, 0.0, 20.0)
 
     def added(self, now: Situation, brdfs: BRDFs, x: np.ndarray) -> Array:
         return np.tensordot(x.astype(np.float32), self.reflected, 1)
 
     def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
-        bright = self.directions[int(np.argmax(x))]
+        radiance = self.radiance(self.directions, x)
+        bright = self.directions[int(np.argmax(radiance))]
         return (
             "the object mirrors its surroundings, brightest towards "
             f"({bright[0]:.1f}, {bright[1]:.1f}, {bright[2]:.1f}) of the scan's frame: "
-            f"{100 * float(x.max()):.0f} % of the light a white wall under the lamp would send"
+            f"{100 * float(radiance.max()):.0f} % of the light a white wall under the lamp would "
+            "send"
         )
+
+
+def _evenly(count: int) -> NDArray[np.float64]:
+    """(count, 3) directions on a Fibonacci spiral."""
+    k = np.arange(count)
+    z, turn = 1 - (2 * k + 1) / count, np.pi * (3 - np.sqrt(5)) * k
+    r = np.sqrt(1 - z**2)
+    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)

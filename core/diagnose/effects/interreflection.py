@@ -15,8 +15,8 @@ from ..surroundings import ACCURACY
 
 @dataclass(frozen=True)
 class Interreflection(Effect):
-    """numbers: the bounced light over what one bounce of the fitted materials gives. reflected:
-    (n, 3) that bounce; glow: by photo, (f, 3) what every face of the mesh sends off."""
+    """numbers: the bounced light over what the fitted materials bounce. reflected: (n, 3) that
+    light; glow: by photo, (f, 3) what every face of the mesh sends off."""
 
     reflected: Array
     glow: dict[int, Array]
@@ -46,7 +46,7 @@ class Interreflection(Effect):
         most = 100 * float(np.percentile(x[0] * self.reflected.mean(axis=1), 99))
         return (
             "light bounced from one part of the object to another: folds are brighter than the "
-            f"lamp makes them ({x[0]:.1f} times what one bounce of the fitted material gives; up "
+            f"lamp makes them ({x[0]:.1f} times what the fitted material would bounce; up "
             f"to {most:.2g} in units of 1/100 radiance)"
         )
 

@@ -1,0 +1,46 @@
+"""Surroundings as lobes: finer ones where it is bright."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import nnls
+
+from patina.core.diagnose.effects.environment_reflection import LOBES, MOST, EnvironmentReflection
+from tests.make_lit_ball import lit_ball
+
+WINDOW = np.array([0.6, -0.3, 0.7]) / np.linalg.norm([0.6, -0.3, 0.7])
+HALF = np.radians(20)
+
+
+def described(effect: EnvironmentReflection, shown: np.ndarray) -> tuple[np.ndarray, float]:
+    """Numbers that describe shown (n, 3) best, and what they leave of it, relative RMS."""
+    matrix = effect.reflected.reshape(len(effect.numbers), -1).T.astype(float)
+    x, left = nnls(matrix, shown.ravel().astype(float))
+    return x, float(left / np.linalg.norm(shown))
+
+
+def test_the_edge_of_a_window_is_found_once_it_is_known_where_it_is_bright():
+    setting = lit_ball()
+    around = setting.surroundings
+    inside = (around.towards @ WINDOW.astype(np.float32) > np.cos(HALF)) & (around.face < 0)
+    shown = setting.own_level / np.pi * around.under(inside.astype(np.float32))
+    effect = EnvironmentReflection.of(setting)
+    x, left = described(effect, shown)
+    finer = effect.remade(setting, x)
+    x_finer, left_finer = described(finer, shown)
+    assert LOBES < len(finer.numbers) <= LOBES + MOST
+    assert len(set(finer.numbers.names)) == len(finer.numbers)
+    assert left_finer < 0.5 * left
+    angle = np.radians(np.arange(0, 90, 1.0))
+    aside = np.cross(WINDOW, [0.0, 0.0, 1.0])
+    aside /= np.linalg.norm(aside)
+    away = np.cos(angle)[:, None] * WINDOW + np.sin(angle)[:, None] * aside
+    radiance = finer.radiance(away, x_finer)
+    assert abs(radiance[angle < 0.5 * HALF].mean() - 1) < 0.15
+    assert radiance[angle > 2 * HALF].max() < 0.1
+
+
+def test_a_room_that_is_bright_all_over_stays_within_bounds():
+    setting = lit_ball()
+    finer = EnvironmentReflection.of(setting).remade(setting, np.ones(LOBES))
+    assert len(finer.numbers) == LOBES + MOST
