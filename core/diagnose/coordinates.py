@@ -43,7 +43,7 @@ def coordinates(setting: Setting) -> list[Coordinate]:
     angles = now.angles
     cos_o = dot(pixels.normal, pixels.view)
     cos_i = dot(pixels.normal, pixels.light)
-    open_ = setting.surroundings.share * (setting.surroundings.face < 0)
+    open_ = setting.surroundings.share * setting.surroundings.open
     place = pixels.point - setting.centre
     degrees = [
         ("half angle θh", angles.theta_h), ("difference angle θd", angles.theta_d),

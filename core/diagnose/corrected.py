@@ -13,6 +13,7 @@ from collections.abc import Generator
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..angles import half_difference
 from ..angles.vectors import dot
@@ -21,6 +22,8 @@ from .effect import Near, Setting
 from .model import Model
 from .of_samples import nearest
 from .pixels import Pixels
+
+Array = NDArray[np.floating]
 
 CHUNK = 20_000  # samples at a time: what each sees around itself takes a kilobyte
 SIGHTS = 20  # directions: what is off in one sample is not in the next
@@ -32,9 +35,9 @@ FARTHEST = 3.0  # factor by which a prediction may correct
 
 def corrected(
     table: SampleTable, pixels: Pixels, model: Model, setting: Setting
-) -> Generator[float, None, tuple[SampleTable, float]]:
-    """Samples (n,) → (those, m ≤ n, that can be corrected, the RMS of the radiance of those, as the
-    photos show it, over that of all the light they show); yields the fraction done.
+) -> Generator[float, None, tuple[SampleTable, dict[int, float]]]:
+    """Samples (n,) → (those, m ≤ n, that can be corrected, for each photo the RMS of the radiance
+    of those, as it shows it, over that of all the light they show); yields the fraction done.
     pixels: of the samples (of_samples.py); model: with the effects, at its optimum; setting: that
     it was made for."""
     parts = []
@@ -47,9 +50,12 @@ def corrected(
         here = replace(setting, pixels=pixels.select(rows), brdfs=model.brdfs, sights=SIGHTS)
         parts.append(_corrected(table.select(rows), elsewhere(model, here, near.select(rows))))
     if not parts:
-        return SampleTable.empty(), 1.0
+        return SampleTable.empty(), {}
     tables, left, whole = zip(*parts, strict=True)
-    return SampleTable.concatenate(tables), float(np.sqrt(sum(left) / max(sum(whole), 1e-30)))
+    found = SampleTable.concatenate(tables)
+    of_lamp, of_all = (np.bincount(found.photo, np.concatenate(each)) for each in (left, whole))
+    ratio = np.sqrt(of_lamp / np.maximum(of_all, 1e-30))
+    return found, {int(photo): float(ratio[photo]) for photo in np.unique(found.photo)}
 
 
 def elsewhere(model: Model, setting: Setting, near: Near) -> Model:
@@ -63,9 +69,9 @@ def elsewhere(model: Model, setting: Setting, near: Near) -> Model:
     return Model(setting.pixels, model.brdfs, tuple(effects), tuple(x))
 
 
-def _corrected(table: SampleTable, model: Model) -> tuple[SampleTable, float, float]:
-    """(samples, sum of squares of their radiance as the photos show it, and of all that they
-    show)."""
+def _corrected(table: SampleTable, model: Model) -> tuple[SampleTable, Array, Array]:
+    """(samples, squares of their radiance as the photos show it, and of all that they show; 0 of
+    what they do not tell)."""
     now = model.situation()
     lamps = model.lamps(now)
     reflected = model.reflected(lamps)
@@ -111,5 +117,6 @@ def _corrected(table: SampleTable, model: Model) -> tuple[SampleTable, float, fl
         light=np.asarray(now.light, np.float32),
         response=(table.response * response).astype(np.float32),
     ).select(rows)
-    rows = rows[found.read]
-    return found, float(np.sum(lamp[rows] ** 2)), float(np.sum(table.radiance[rows] ** 2))
+    counted = found.weight * found.read
+    left, whole = (counted * np.sum(each[rows] ** 2, axis=1) for each in (lamp, table.radiance))
+    return found, left, whole

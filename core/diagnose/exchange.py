@@ -2,7 +2,7 @@
 
 Radiosity (Goral, Torrance, Greenberg and Battaile 1984), its form factors summed by rays that are
 drawn by the cosine: as many a face as keep their number the same for every mesh. A coarse sum for
-each of a million faces is a fine one for the thousands of them that a pixel sees.
+each of a million faces is a fine one over all of them that a pixel sees.
 """
 
 from __future__ import annotations
@@ -10,20 +10,22 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles.vectors import tangents
+from ..angles.vectors import dot, tangents
 from ..geometry import RayScene
 from ..geometry.lift import SHADOW_LIFT
+from ..scan import Mesh
 
 Array = NDArray[np.floating]
 
 RAYS = 1_500_000  # of all faces
 MOST = 24  # of a face
 BOUNCES = 6  # of light, the first one included; white folds still give a percent at the fifth
+OPEN, BEHIND = -1, -2  # what a ray meets that meets no face from before
 
 
 def faces_seen(rays: RayScene) -> NDArray[np.int32]:
-    """(f, each) faces that each face of the mesh sees in directions drawn by their cosine; −1 for
-    the open."""
+    """(f, each) faces that each face of the mesh sees in directions drawn by their cosine, from
+    before; negative for the open and for what is seen from behind."""
     mesh = rays.mesh
     count = len(mesh.faces)
     real = mesh.face_normals.any(axis=1)  # faces without area see nothing
@@ -40,8 +42,21 @@ def faces_seen(rays: RayScene) -> NDArray[np.int32]:
         towards = np.sqrt(1 - sine2)[:, None] * normal
         for axis, part in zip(frame, (np.cos(turn), np.sin(turn)), strict=True):
             towards = towards + (sine * part)[:, None] * axis
-        seen[:, one] = np.where(real, rays.first_hits(start, towards).face, -1)
+        face = seen_from_before(mesh, rays.first_hits(start, towards).face, towards)
+        seen[:, one] = np.where(real, face, OPEN)
     return seen
+
+
+def seen_from_before(
+    mesh: Mesh, face: NDArray[np.integer], towards: Array
+) -> NDArray[np.integer]:
+    """Faces (n,) that rays ``towards`` (n, 3) hit, BEHIND for those hit from behind: where a scan
+    has a hole, what is seen through it is its inside, which is no surface and sends off nothing."""
+    hit = np.flatnonzero(face >= 0)
+    behind = dot(mesh.face_normals[face[hit]], towards[hit]) > 0
+    face = face.copy()
+    face[hit[behind]] = BEHIND
+    return face
 
 
 def to_and_fro(sent: Array, albedo: Array, seen: NDArray[np.int32]) -> NDArray[np.float32]:

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from .effect import Effect
 from .fitted import Fitted
-from .held_out import Unseen, error_of_sum
+from .held_out import Unseen, error_of_sum, variances_by_photos
 from .leftover import Leftover
-from .model import Model
 from .unseen_error import UnseenError
 
 Array = NDArray[np.floating]
@@ -74,7 +73,7 @@ class Trial:
 
     def changed(self) -> Array:
         """(n, 3) radiance that the effect adds to what the photos show, the BRDF the same."""
-        return self.fitted.shown - without_last(self.fitted.model)
+        return self.fitted.shown - self.fitted.model.without(self.effect.cause)
 
     @property
     def x(self) -> Vector:
@@ -92,14 +91,22 @@ class Trial:
         place = self.fitted.model.place_of(self.effect.cause)
         return np.sqrt(np.maximum(self.unseen.variance[place], 0.0))
 
+    def by_photos(self) -> Trial:
+        """With deviations that know what whole photos err by, and the effect's own sums."""
+        variance = list(variances_by_photos(self.fitted, self.unseen.variance))
+        place = self.fitted.model.place_of(self.effect.cause)
+        variance[place] = variance[place] + np.square(self.effect.own_error(self.told))
+        return replace(self, unseen=replace(self.unseen, variance=tuple(variance)))
+
 
 @dataclass(frozen=True)
 class Found:
     """accepted: what is missed most of the whole model first, with their numbers in it; the slack
     beside the basis last. rounds: what was fitted at each, best first; the last is the one that
-    found nothing. before, after: the fits without and with all accepted. left: structure that
-    nothing accepted explains. error_before, error_after: of left-out parts and photos. doubted: of
-    the accepted, causes that the second fit does not bear out, and why, in words."""
+    found nothing. before, after: the fits without and with those that are named. left: structure
+    that these do not explain. error_before, error_after: of left-out parts and photos. expected:
+    (n, 3) deviation before anything was fitted. doubted: of the accepted, causes that the second
+    fit does not bear out, and why, in words."""
 
     accepted: tuple[Trial, ...]
     rounds: tuple[tuple[Trial, ...], ...]
@@ -110,6 +117,7 @@ class Found:
     left: Leftover
     error_before: UnseenError
     error_after: UnseenError
+    expected: Array
     doubted: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -120,29 +128,26 @@ class Found:
         return [*self.accepted, *(t for t in first if t.effect.cause not in named)]
 
     @property
+    def named(self) -> tuple[Trial, ...]:
+        """The accepted that nothing speaks against."""
+        return tuple(t for t in self.accepted if t.effect.cause not in self.doubted)
+
+    @property
     def causes(self) -> tuple[str, ...]:
-        """That are named, by the words of the vocabulary: those accepted that nothing speaks
-        against; ``unknown`` for what is left of structure."""
-        accepted = (trial.effect.cause for trial in self.accepted)
-        named = tuple(cause for cause in accepted if cause not in self.doubted)
-        return (*named, "unknown") if self.unexplained else named
+        """That are named, by the words of the vocabulary; ``unknown`` for what is left of
+        structure."""
+        causes = tuple(trial.effect.cause for trial in self.named)
+        return (*causes, "unknown") if self.unexplained else causes
 
     def sentence(self, trial: Trial) -> str:
         """What one of the accepted means, and what speaks against it."""
         doubt = self.doubted.get(trial.effect.cause)
         said = trial.sentence()
-        return said if doubt is None else f"{said}. Doubtful, and not taken into account: {doubt}"
+        return said if doubt is None else f"{said}. But that is doubtful: {doubt}"
 
     @property
     def unexplained(self) -> bool:
         """Whether structure is left that no cause explains, and that is not merely what the model
         of an accepted one lacks."""
-        gained = sum(trial.gain for trial in self.accepted)
+        gained = sum(trial.gain for trial in self.named)
         return self.left.convincing and self.left.gain > MINOR * gained
-
-
-def without_last(model: Model) -> Array:
-    """(n, 3) what the model shows without its last effect, the BRDF the same: another BRDF would
-    take much of it, as it takes the light that glare takes from all that is bright."""
-    effect, x = model.effects[-1], model.x[-1]
-    return replace(model, x=(*model.x[:-1], x - effect.told(x))).predicted()

@@ -42,8 +42,9 @@ def face_glow(setting: Setting, photo: int) -> Array:
     else:
         near = cKDTree(pixels.point).query(centre, NEAREST)[1]
         material = np.round(np.median(pixels.material[near], axis=1)).astype(np.int64)
-    albedo /= setting.scale[:, None]
     irradiance = pixels.irradiance[one] * setting.scale[pixels.material[one]]
     light = irradiance * np.where(dark, 0, cosine)[:, None]
+    # what the lamp gives is in the photos' unit; from then on an albedo is a part of the light
+    scale = setting.scale[material][:, None]
     own = np.asarray(albedo[material], np.float32)
-    return to_and_fro(own / np.pi * light, own, setting.faces_seen)
+    return to_and_fro(own / (np.pi * scale) * light, own, setting.faces_seen)

@@ -65,16 +65,36 @@ class Model:
             x[self.patchy] = np.zeros(0)
         return replace(self, effects=tuple(effects), x=tuple(x))
 
+    @property
+    def causes(self) -> list[str]:
+        """Of the effects, whether their numbers are searched for or not."""
+        return [e.inner.cause if isinstance(e, Fixed) else e.cause for e in self.effects]
+
     def place_of(self, cause: str) -> int:
-        """Of the effect in the model, whether its numbers are searched for or not."""
-        effects = [e.inner if isinstance(e, Fixed) else e for e in self.effects]
-        return [e.cause for e in effects].index(cause)
+        """Of the effect in the model."""
+        return self.causes.index(cause)
+
+    def is_settled(self, cause: str) -> bool:
+        """Whether the effect's numbers are no longer searched for."""
+        return isinstance(self.effects[self.place_of(cause)], Fixed)
 
     def numbers_of(self, cause: str) -> Vector:
         """(p,) of the effect."""
         place = self.place_of(cause)
         effect = self.effects[place]
         return effect.x if isinstance(effect, Fixed) else self.x[place]
+
+    def without(self, cause: str) -> Array:
+        """(n, 3) what the model shows without one of its effects, the BRDF the same: another BRDF
+        would take much of it, as it takes the light that glare takes from all that is bright."""
+        place, x = self.place_of(cause), self.numbers_of(cause)
+        effects, numbers = list(self.effects), list(self.x)
+        effect = effects[place]
+        if isinstance(effect, Fixed):
+            effects[place] = Fixed(effect.inner, x - effect.inner.told(x))
+        else:
+            numbers[place] = x - effect.told(x)
+        return replace(self, effects=tuple(effects), x=tuple(numbers)).predicted()
 
     @property
     def everywhere(self) -> list[int]:

@@ -24,14 +24,13 @@ from .deviation import as_found
 from .effect import Effect, Setting
 from .effects.outside_basis import OutsideBasis
 from .fitted import Fitted
-from .found import MINOR, SURE, Found, Trial, without_last
+from .found import MINOR, SURE, Found, Trial
 from .held_out import (
     by_square,
     error_of_sum,
     predict_unseen,
     squares,
     variances,
-    variances_by_photos,
 )
 from .leftover import leftover
 from .model import Model
@@ -101,13 +100,14 @@ def search(
         left = [e for e in left if e.cause != best.effect.cause]
     now, kept = _missed(before, now, accepted, pool)
     # what is missed most first
-    kept = tuple(sorted(map(_by_photos, kept), key=lambda t: -t.gain))
+    kept = tuple(sorted((trial.by_photos() for trial in kept), key=lambda t: -t.gain))
     kept = (*kept, *_outside(now, kept))
     unseen = predict_unseen(before), predict_unseen(now)
     return Found(
         kept, tuple(rounds), before, now, *unseen,
         leftover(now),
         unseen_error(before, unseen[0], expected), unseen_error(now, unseen[1], expected),
+        expected,
     )  # fmt: skip
 
 
@@ -168,17 +168,9 @@ def _try(now: Fitted, costs: Costs, one: Asked) -> Trial:
     # what is confined to a few squares could never be sure
     gained = by_square(squares(now, fine), costs(fine, settled) - unseen.cost)
     own = effect.patch is None and len(effect.numbers) > 0
-    without = without_last(fitted.model) if own else now.shown
+    without = fitted.model.without(effect.cause) if own else now.shown
     change = rms_change(fitted.shown, without, now.deviation, effect.of_highlights)
     return Trial(effect, fitted, unseen, gained, change, one.chance)
-
-
-def _by_photos(trial: Trial) -> Trial:
-    """With deviations that know what whole photos err by, and the effect's own sums."""
-    variance = list(variances_by_photos(trial.fitted, trial.unseen.variance))
-    place = trial.fitted.model.place_of(trial.effect.cause)
-    variance[place] = variance[place] + np.square(trial.effect.own_error(trial.told))
-    return replace(trial, unseen=replace(trial.unseen, variance=tuple(variance)))
 
 
 def _with_last(model: Model, effect: Effect, x: Vector) -> Array:
@@ -189,9 +181,14 @@ def _with_last(model: Model, effect: Effect, x: Vector) -> Array:
 
 def _remade(now: Fitted, costs: Costs, best: Trial, setting: Setting) -> Trial:
     """With the BRDFs that are found when the effect is in the model: those without it hold a part
-    of it."""
-    effect = best.effect.remade(replace(setting, brdfs=best.fitted.model.brdfs), best.x)
-    return _try(now, costs, Asked(effect, best.gain, best.chance))
+    of it. In finer detail where that gains more."""
+    setting = replace(setting, brdfs=best.fitted.model.brdfs)
+    finer = best.effect.remade(setting, best.x)
+    found = _try(now, costs, Asked(finer, best.gain, best.chance))
+    plain = best.effect.of(setting)
+    if len(finer.numbers) == len(best.effect.numbers) or found.gain > best.gain or plain is None:
+        return found
+    return _try(now, costs, Asked(plain, best.gain, best.chance))
 
 
 def _with_rays(now: Fitted, costs: Costs, best: Trial, setting: Setting) -> Trial:

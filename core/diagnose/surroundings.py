@@ -19,6 +19,7 @@ from ..geometry import RayScene
 from ..geometry.lift import SHADOW_LIFT
 from .brdfs import BRDFs
 from .effect import Setting
+from .exchange import OPEN, seen_from_before
 from .pixels import Pixels
 
 Array = NDArray[np.floating]
@@ -32,7 +33,7 @@ CHUNK = 2048  # pixels at a time
 class Surroundings:
     """towards: (n, d, 3) unit, float32. share: (n, d) what each direction counts in an integral
     over the hemisphere, cosθ/density, 0 below the horizon. face: (n, d) int32 of the mesh that is
-    seen there, −1 for the open. reflected: (n, d, 3) what ρ makes of it: ρ·share."""
+    seen there, OPEN or BEHIND (exchange.py). reflected: (n, d, 3) what ρ makes of it: ρ·share."""
 
     towards: NDArray[np.float32]
     share: NDArray[np.float32]
@@ -47,6 +48,11 @@ class Surroundings:
             for seed, rows in enumerate(_chunks(len(setting.pixels)))
         ]
         return cls(*(np.concatenate([p[k] for p in parts]) for k in range(4)))
+
+    @property
+    def open(self) -> NDArray[np.bool_]:
+        """(n, d) whether nothing of the object is there."""
+        return self.face == OPEN
 
     def under(self, radiance: Array) -> Array:
         """(n, 3) what is reflected of light (n, d) or (n, d, 3) from each direction."""
@@ -89,7 +95,8 @@ def _part(
     towards = np.einsum("ndi,nij->ndj", local, frame).astype(np.float32).reshape(-1, 3)
     lift = SHADOW_LIFT * rays.mesh.size
     start = np.repeat(pixels.point + lift * normal, d, axis=0)
-    face = rays.first_hits(start, towards).face.reshape(n, d)
+    hit = rays.first_hits(start, towards).face
+    face = seen_from_before(rays.mesh, hit, towards).astype(np.int32).reshape(n, d)
     wide = [np.repeat(v, d, axis=0) for v in (pixels.normal, pixels.view)]
     angles = half_difference(wide[0], towards, wide[1])
     rho = brdfs.evaluate(angles, np.repeat(pixels.material, d)).reshape(n, d, 3)

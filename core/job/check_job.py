@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from dataclasses import replace
 
-from .diagnose_job import DiagnoseJob
+from ..diagnose.chosen import doubting
+from .beside import beside
+from .diagnose_job import LOOKING, DiagnoseJob
 from .fit_job import CaptureResult, FitJob
 from .job import Job, Step, finished
 from .refit_job import RefitJob
@@ -31,7 +32,10 @@ class CheckJob(Job):
         for step in self.checked.run():
             yield Step(step.stage, SHARE * step.fraction)
         again = RefitJob(self.checked, without=self.without, portable=self.portable)
-        for step in again.run():
-            yield Step(step.stage, SHARE + (1 - SHARE) * step.fraction)
+        step = Step(LOOKING, SHARE)
+        for inner in again.run():
+            step = Step(inner.stage, SHARE + (1 - SHARE) * inner.fraction)
+            yield step
+        found = finished(self.checked.found)
+        self.checked.found = yield from beside(lambda: doubting(found, again.doubted), step)
         self.result = again.result
-        self.checked.found = replace(finished(self.checked.found), doubted=again.doubted)

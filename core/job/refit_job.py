@@ -104,7 +104,7 @@ class RefitJob(Job):
                 one = yield from self._again(index, material, fitted.model, start, share)
             except PatinaError as error:
                 said = f"fitted without {', '.join(causes)}: {error}"
-                one = Again(None, 1.0, (said,))
+                one = Again(None, {}, (said,))
             again.append(one)
         if self.exactly:
             return again, fitted.model, None
@@ -124,7 +124,7 @@ class RefitJob(Job):
 
     def _corrected(
         self, index: int, name: str, model: Model, step: Step
-    ) -> Generator[Step, None, tuple[SampleTable, float]]:
+    ) -> Generator[Step, None, tuple[SampleTable, dict[int, float]]]:
         before, setting = finished(self.checked.result), finished(self.checked.setting)
         table = self.checked.fit.samples[name]
         read = any(effect.of_photo for effect in model.effects)

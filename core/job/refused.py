@@ -3,7 +3,7 @@ that is not there, and it then predicts photos that it has not seen worse than w
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,11 +19,12 @@ MORE = 0.03  # ln of what errors of unseen photos may grow by
 
 @dataclass(frozen=True)
 class Again:
-    """A material's second fit. material: None where it could not be fitted; light: RMS radiance of
-    its samples, as photos show it, over that of all they show; warnings: what is to be said."""
+    """A material's second fit. material: None where it could not be fitted; light: of each photo
+    the RMS radiance of its samples, as it shows it, over that of all it shows; warnings: what is to
+    be said."""
 
     material: MaterialResult | None
-    light: float
+    light: Mapping[int, float]
     warnings: tuple[str, ...]
 
 
@@ -44,37 +45,40 @@ def worse(
     """In words, where unseen photos are predicted worse than without.
 
     Every photo counts alike, beside itself without the causes: over all photos together, the worst
-    would decide. Both errors are relative to all that photos show: in light that a steep curve was
-    taken from, the same error is another part. jointly: the same of the materials and causes fitted
-    together, whose photos are unseen, too: of eight photos, what the materials' own fits say is
-    chance by a few percent.
+    would decide. Both errors are relative to all that a photo shows: in light that a steep curve
+    was taken from, the same error is another part. jointly: the same of the materials and causes
+    fitted together, whose photos are unseen, too: of eight photos, what the materials' own fits say
+    is chance by a few percent.
     """
-    known = [
-        (one.held_out, other.material.held_out, other.light)
+    judged = [
+        _by_photo(one.held_out, other.material.held_out, other.light)
         for one, other in zip(before, after, strict=True)
         if other.material is not None
         and one.held_out is not None
         and other.material.held_out is not None
     ]
-    grown = [g for g in (_by_photo(*both) for both in known) if g is not None]
+    errors = [each for each in judged if each is not None]
+    grown = [_grown(*each) for each in errors]
     if not grown or np.mean(grown) + jointly < MORE:
         return None
-    said = ", ".join(
-        f"{100 * a.error:.1f} to {100 * b.error * light:.1f} %" for a, b, light in known
-    )
+    said = ", ".join(f"{100 * a:.1f} to {100 * b:.1f} %" for a, b in errors)
     return (
         f"with it, errors of unseen photos grow by {100 * np.expm1(np.mean(grown)):.0f} % "
-        f"(RMS of all: {said})"
+        f"(of a usual photo: {said})"
     )
 
 
-def _by_photo(before: HeldOut, after: HeldOut, light: float) -> float | None:
-    """Mean ln of what the error of a photo grew by; None where no photo has both."""
-    photos = sorted(before.per_photo.keys() & after.per_photo.keys())
+def _by_photo(
+    before: HeldOut, after: HeldOut, light: Mapping[int, float]
+) -> tuple[float, float] | None:
+    """Geometric means of the errors of photos, over all that they show; None where no photo has
+    both."""
+    photos = sorted(before.per_photo.keys() & after.per_photo.keys() & light.keys())
     if not photos:
         return None
-    grown = [_grown(before.per_photo[p], after.per_photo[p] * light) for p in photos]
-    return float(np.mean(grown))
+    both = [(before.per_photo[p], after.per_photo[p] * light[p]) for p in photos]
+    first, second = np.exp(np.mean(np.log(np.maximum(both, 1e-9)), axis=0))
+    return float(first), float(second)
 
 
 def _grown(before: float, after: float) -> float:

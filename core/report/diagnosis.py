@@ -38,7 +38,7 @@ def _pictures(folder: Path, found: Found, setting: Setting) -> str:
     """HTML: what each photo shows more than the prediction, before and after."""
     pixels, rows = setting.pixels, []
     fits = {"before": found.before, "after": found.after}
-    if not found.accepted:
+    if not found.named:
         fits = {"before": found.before}
     for photo in np.unique(pixels.photo):
         pictures = ""
@@ -49,7 +49,7 @@ def _pictures(folder: Path, found: Found, setting: Setting) -> str:
             write_png(folder / file, residual_picture(pixels, residual, int(photo)))
             pictures += f"<img src='{file}' alt='{kind}'>"
         rows.append(f"<figure>{pictures}<figcaption>photo {photo + 1}</figcaption></figure>")
-    what = "before and after" if found.accepted else "as it is"
+    what = "before and after" if found.named else "as it is"
     return (
         f"<h2>Where it is wrong, {what}</h2><p class='sub'><span class='key'></span> prediction "
         "too dark … too bright, full colour at three times what such a pixel usually misses.</p>"
@@ -102,9 +102,9 @@ def evidence_file(cause: str) -> str:
 
 
 def _evidence(folder: Path, found: Found, setting: Setting) -> str:
-    """HTML: what each accepted cause changes, in the photo that it changes most."""
+    """HTML: what each cause that is named changes, in the photo that it changes most."""
     cells, pixels = "", setting.pixels
-    for trial in found.accepted:
+    for trial in found.named:
         changed = trial.changed() / found.before.deviation
         photo = photo_most_changed(pixels, changed)
         if photo is None:
@@ -154,12 +154,11 @@ def _materials(folder: Path, before: CaptureResult, after: CaptureResult) -> str
 
 
 def _row(trial: Trial, found: Found) -> str:
-    accepted = trial in found.accepted
+    accepted, named = trial in found.accepted, trial in found.named
     sure = trial.gain / max(trial.error, 1e-9)
     width = int(np.clip(12 * sure, 0, 160))
     said = found.sentence(trial) if accepted else ""
-    sound = accepted and trial.effect.cause not in found.doubted
-    style = "background:#2f6fb0" if sound else "background:#bbb"
+    style = "background:#2f6fb0" if named else "background:#bbb"
     return (
         f"<tr><th>{escape(trial.effect.cause)}</th><td>{sure:.1f}</td><td><div style='height:10px;"
         f"width:{width}px;{style}'></div></td><td>{escape(said)}</td></tr>"
@@ -184,7 +183,7 @@ def _charts(found: Found, setting: Setting) -> str:
     largest = max((float(np.abs(t.mean).max()) for _, _, ts in chosen for t in ts), default=0.05)
     most = next((s for s in STEPS if s >= largest), STEPS[-1])
     return "".join(
-        f"<figure>{trend_chart(c.name, c.unit, ts[0], ts[1] if found.accepted else None, most)}"
+        f"<figure>{trend_chart(c.name, c.unit, ts[0], ts[1] if found.named else None, most)}"
         "</figure>"
         for _, c, ts in chosen
     )

@@ -68,7 +68,7 @@ def _errors(error: UnseenError) -> dict[str, float | None]:
 def _cause(trial: Trial, found: Found) -> dict[str, Any]:
     numbers = trial.effect.numbers
     accepted = trial in found.accepted
-    drawn = accepted and len(numbers) > 0
+    drawn = trial in found.named and len(numbers) > 0
     return {
         "cause": trial.effect.cause,
         "accepted": accepted,

@@ -11,6 +11,7 @@ from patina.core.basis import Basis, PrincipalBRDF
 from patina.core.diagnose import chance
 from patina.core.diagnose import search as searching
 from patina.core.diagnose.brdfs import BRDFs
+from patina.core.diagnose.chosen import doubting
 from patina.core.diagnose.closer_look import about_dark_spots
 from patina.core.diagnose.dark_spots import dark_spots
 from patina.core.diagnose.deviation import as_found, pixel_deviation
@@ -61,6 +62,27 @@ def test_a_lamp_that_drifts_is_named_and_measured():
     doubted = replace(found, doubted={"light_intensity": "errors grow by 8 %"})
     assert doubted.causes == () and doubted.accepted == found.accepted
     assert "errors grow by 8 %" in doubted.sentence(found.accepted[0])
+
+
+def test_without_what_is_doubted_the_rest_is_told_as_it_is_then_found():
+    """A drift beside a dark corner: the corner doubted, the photos miss it again."""
+    setting = lit_ball(1)
+    drift = np.array([0.0, 0.08, -0.05, 0.03, 0.06, -0.12])
+    r2 = np.square(setting.pixels.x) + np.square(setting.pixels.y)
+    gains = np.exp(drift)[setting.pixels.photo] * (1 - 0.6 * r2)
+    found = searched(changed(setting, setting.pixels.observed * gains[:, None]))
+    assert set(found.causes) == {"light_intensity", "vignetting"}
+    left = doubting(found, {"vignetting": "errors grow by 8 %"})
+    assert left.causes[:1] == ("light_intensity",) and "vignetting" not in left.causes
+    assert [t.effect.cause for t in left.named] == ["light_intensity"]
+    assert left.after.model.causes == ["light_intensity"]
+    assert left.named[0].fitted is left.after
+    np.testing.assert_allclose(left.named[0].x - left.named[0].x.mean(), drift - drift.mean(),
+                               atol=0.04)  # fmt: skip
+    both, one = found.unseen_after.mean, left.unseen_after.mean
+    assert both < one < found.unseen_before.mean
+    assert left.left.gain > found.left.gain
+    assert doubting(found, {}) is found
 
 
 def test_a_dark_corner_is_named_and_measured():

@@ -22,7 +22,7 @@ def described(effect: EnvironmentReflection, shown: np.ndarray) -> tuple[np.ndar
 def test_the_edge_of_a_window_is_found_once_it_is_known_where_it_is_bright():
     setting = lit_ball()
     around = setting.surroundings
-    inside = (around.towards @ WINDOW.astype(np.float32) > np.cos(HALF)) & (around.face < 0)
+    inside = (around.towards @ WINDOW.astype(np.float32) > np.cos(HALF)) & around.open
     shown = setting.own_level / np.pi * around.under(inside.astype(np.float32))
     effect = EnvironmentReflection.of(setting)
     x, left = described(effect, shown)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 
-from patina.core.diagnose.exchange import BOUNCES, faces_seen, to_and_fro
+from patina.core.diagnose.exchange import BEHIND, BOUNCES, faces_seen, to_and_fro
 from patina.core.geometry import RayScene
 from patina.core.scan import Mesh
+from tests.make_lit_ball import lit_ball
 
 
 def rays_of(vertices: np.ndarray, faces: np.ndarray) -> RayScene:
@@ -53,11 +56,35 @@ def test_in_a_closed_room_light_adds_up_to_a_geometric_series(albedo):
     np.testing.assert_allclose(found, expected, rtol=1e-4)
 
 
+def test_the_inside_of_a_scan_sends_off_nothing():
+    """Through a hole one looks at faces from behind: the upper square turned over."""
+    vertices, faces = two_squares(1.0)
+    half = len(faces) // 2
+    faces[half:] = faces[half:, ::-1]
+    seen = faces_seen(rays_of(vertices, faces))
+    assert (seen < 0).all()
+    np.testing.assert_allclose((seen[:half] == BEHIND).mean(), 0.1998, atol=0.012)
+    sent = np.ones((len(seen), 3), np.float32)
+    np.testing.assert_array_equal(to_and_fro(sent, np.full((len(seen), 3), 0.9), seen), sent)
+
+
 def test_a_face_without_area_sees_nothing():
     vertices, faces = two_squares(1.0, cells=2)
     faces = np.concatenate([faces, [[0, 0, 1]]])
     seen = faces_seen(rays_of(vertices, faces))
     assert (seen[-1] < 0).all() and (seen[:-1] >= 0).any()
+
+
+def test_where_irradiance_is_not_known_bounces_are_as_bright_as_the_photos():
+    """Photos half as bright, of the same material under half the light: so is what faces send off,
+    of every bounce."""
+    setting = replace(lit_ball(), rays=rays_of(*two_squares(0.5)))
+    pixels = setting.pixels
+    dim = replace(pixels, irradiance=pixels.irradiance / 2)
+    half = replace(setting, pixels=dim, scale=np.full(1, 2, np.float32)).glow(0)
+    whole = setting.glow(0)
+    assert whole.max() > 0
+    np.testing.assert_allclose(half, whole / 2, rtol=1e-5)
 
 
 def test_what_sees_nothing_sends_off_what_the_lamp_gives():

@@ -22,8 +22,9 @@ def with_errors(*errors: float | None) -> list[SimpleNamespace]:
 
 
 def again(*errors: float | None, light: float = 1.0) -> list[SimpleNamespace]:
-    """The same of second fits."""
-    return [SimpleNamespace(material=m, light=light) for m in with_errors(*errors)]
+    """The same of second fits, in so much of each photo's light."""
+    by_photo = dict.fromkeys(range(3), light)
+    return [SimpleNamespace(material=m, light=by_photo) for m in with_errors(*errors)]
 
 
 def test_what_predicts_unseen_photos_worse_is_refused_with_its_figures():
@@ -42,9 +43,10 @@ def test_one_photo_of_many_does_not_decide():
     before = [SimpleNamespace(held_out=HeldOut(0.2, 0.1, {p: 0.1 for p in photos}))]
     other = {p: 0.2 if p == 0 else 0.08 for p in photos}
     after = SimpleNamespace(held_out=HeldOut(0.25, 0.1, other))
-    found = [SimpleNamespace(material=after, light=1.0)]
-    assert worse(before, found) is None
-    assert worse(before, [SimpleNamespace(material=after, light=2.0)]) is not None
+    found = SimpleNamespace(material=after, light=dict.fromkeys(photos, 1.0))
+    assert worse(before, [found]) is None
+    found = SimpleNamespace(material=after, light=dict.fromkeys(photos, 2.0))
+    assert worse(before, [found]) is not None
 
 
 def test_what_materials_and_causes_say_together_counts():
@@ -61,8 +63,18 @@ def test_errors_are_of_the_light_as_it_was():
     assert worse(with_errors(0.1), again(0.13, light=0.9)) is not None
 
 
+def test_each_photo_is_judged_in_its_own_light():
+    """A room is most of what the dark photo shows: there the lamp's light is missed by as much as
+    before of all its light, which is three times as much of the lamp's."""
+    before = [SimpleNamespace(held_out=HeldOut(0.1, 0.1, {0: 0.1, 1: 0.1}))]
+    after = SimpleNamespace(held_out=HeldOut(0.15, 0.15, {0: 0.1, 1: 0.3}))
+    assert worse(before, [SimpleNamespace(material=after, light={0: 1.0, 1: 1 / 3})]) is None
+    said = worse(before, [SimpleNamespace(material=after, light={0: 1.0, 1: 1.0})])
+    assert said is not None and "10.0 to 17.3 %" in said
+
+
 def test_a_material_that_could_not_be_fitted_again_says_nothing():
-    none = SimpleNamespace(material=None, light=1.0)
+    none = SimpleNamespace(material=None, light={})
     assert worse(with_errors(0.1), [none]) is None
 
 
@@ -87,7 +99,7 @@ def test_what_unseen_photos_speak_against_is_doubted_and_left_out(monkeypatch):
 
     def fitted(self, before, found, taken, done):
         yield Step("fitting", done)
-        again = [Again(Material(("again",)), 1.0, ())]
+        again = [Again(Material(("again",)), {}, ())]
         return again, None, "errors grow by 8 %" if len(taken) > 1 else None
 
     monkeypatch.setattr(refit_job.RefitJob, "_with", fitted)

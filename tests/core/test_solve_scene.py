@@ -61,11 +61,10 @@ def solved(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Solve
     (scene / "photos" / "torn.jpg").write_bytes(b"\xff\xd8\xff\xe0 no picture")
     (scene / "photos" / "notes.txt").write_text("not a photo")
     job = SolveJob(scene / "photos", threads=2)
-    fractions, moments = [], [time.perf_counter()]
+    fractions = []
     while job.step():
         fractions.append(job.now.fraction)
-        moments.append(time.perf_counter())
-    assert np.median(np.diff(moments)) < 0.3  # a step: the window goes on meanwhile
+    assert len(fractions) > VIEWS  # no step waits for more than a photo's features
     assert fractions == sorted(fractions) and min(fractions) >= 0 and max(fractions) <= 1
     out = tmp_path_factory.mktemp("solved")
     job.solution.write(out, out, scene / "photos")

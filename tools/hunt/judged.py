@@ -93,8 +93,8 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
         found, before, after = job.checked.found, job.checked.result, job.result
         assert found is not None and job.checked.setting is not None
         assert before is not None and after is not None
-        first = found.accepted[0] if found.accepted else None
-        of = {trial.effect.cause: trial for trial in found.accepted}
+        first = found.named[0] if found.named else None
+        of = {trial.effect.cause: trial for trial in found.named}
         off = [
             each
             for name in cause.split("+")

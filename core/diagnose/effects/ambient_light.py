@@ -27,7 +27,7 @@ class AmbientLight(Effect):
     def of(cls, setting: Setting) -> AmbientLight:
         around = setting.surroundings
         level = setting.own_level / np.pi
-        return cls(level * around.under((around.face < 0).astype(np.float32)))
+        return cls(level * around.under(around.open.astype(np.float32)))
 
     @property
     def numbers(self) -> Numbers:

@@ -13,7 +13,7 @@ from ..situation import Situation
 from ..surroundings import ACCURACY
 
 LOBES = 64  # directions that the surroundings are described by
-SHARP = 21.0  # of each: half as bright 15° from its middle, which is about as far as the next
+SHARP = 21.0  # of each: half as bright 15° from its middle; the next is 24° away
 FINER = 8  # times as many directions are looked into where it is bright, so much sharper,
 MOST = 128  # no more of them than that,
 DIM = 0.1  # of the brightest: is not
@@ -41,7 +41,7 @@ class EnvironmentReflection(Effect):
     def _towards(cls, setting: Setting, directions: Array, sharp: Array) -> EnvironmentReflection:
         around = setting.surroundings
         level = setting.own_level / np.pi
-        open_ = (around.face < 0).astype(np.float32)
+        open_ = around.open.astype(np.float32)
         reflected = []
         for d, k in zip(directions.astype(np.float32), sharp.astype(np.float32), strict=True):
             bright = np.exp(k * (around.towards @ d - 1)) * open_

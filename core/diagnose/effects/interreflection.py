@@ -60,4 +60,4 @@ def _bounced(setting: Setting, glow: Mapping[int, Array]) -> Array:
         face = around.face[rows]
         seen = np.where((face >= 0)[..., None], glow[int(photo)][np.maximum(face, 0)], 0)
         reflected[rows] = np.einsum("ndc,ndc->nc", around.reflected[rows], seen)
-    return reflected / setting.scale[pixels.material, None]
+    return reflected

@@ -88,7 +88,8 @@ def _means(patch: np.ndarray, values: Array) -> np.ndarray:
 
 def _place(setting: Setting, middle: Array, first: Array, other: Array) -> Array:
     """(n, 2) of the setting's pixels from the middles (n, 3) of their patches, in half widths of
-    one; a nearest patch that does not hold a pixel bends no further than to its edge."""
+    one; a patch that is the nearest to what it does not hold bends no further than a little beyond
+    its edge."""
     away = (setting.pixels.point - middle) / (0.5 * setting.size / ACROSS)
     place = np.stack([np.sum(away * along, axis=1) for along in (first, other)], axis=1)
     return np.clip(place, -1.5, 1.5).astype(np.float32)
