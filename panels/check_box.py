@@ -44,6 +44,7 @@ def draw_check(
         row.progress(text=name, factor=min(max(_sure(cause) / max(most, 1e-9), 0), 1), type="BAR")
         if cause["accepted"]:
             row.operator("patina.show_evidence", text="", icon="HIDE_OFF").cause = cause["cause"]
+        if cause["accepted"] or cause.get("doubted"):
             wrapped(box, with_lengths(cause["sentence"]), "BLANK1", IN_BOX)
     if len(causes):
         used = {cause.name for cause in causes if cause.use}

@@ -55,5 +55,5 @@ def doubting(found: Found, doubted: Mapping[str, str]) -> Found:
         unseen_after=unseen,
         left=leftover(after),
         error_after=unseen_error(after, unseen, found.expected),
-        doubted=dict(doubted),
+        doubted={**found.doubted, **doubted},
     )

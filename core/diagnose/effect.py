@@ -102,6 +102,7 @@ class Setting:
     level: float
     scale: NDArray[np.float32]
     sights: int = 100
+    materials: tuple[str, ...] = ()
 
     @property
     def own_level(self) -> Array:
@@ -232,6 +233,11 @@ class Effect(ABC):
         """Whether it changes surface or lamp, and so what the surface reflects of the lamp."""
         kind = type(self)
         return kind.before is not Effect.before or kind.lamps is not Effect.lamps
+
+    @property
+    def of_camera(self) -> bool:
+        """Whether the camera does it, which knows nothing of what the surface is made of."""
+        return type(self).after is not Effect.after
 
     def remade(self, setting: Setting, x: NDArray[np.float64]) -> Effect:
         """Where it is made of_brdf: the same of the setting's BRDFs, x: as it was found with

@@ -29,7 +29,8 @@ class Trial:
     """One effect added to a model. fitted: with it; unseen: its prediction of left-out squares.
     gain: nats that it predicts them better, by_block (b,) of each square; change: RMS of what it
     changes in the prediction, relative. chance: that all of it is chance, over all effects tried at
-    once. ties: effects that explain the photos as well."""
+    once. ties: effects that explain the photos as well. against: materials that a camera could not
+    tell from the others, and that are predicted worse with it."""
 
     effect: Effect
     fitted: Fitted
@@ -38,6 +39,7 @@ class Trial:
     change: float
     chance: float
     ties: tuple[Effect, ...] = ()
+    against: tuple[int, ...] = ()
 
     @property
     def gain(self) -> float:
@@ -52,7 +54,7 @@ class Trial:
     @property
     def convincing(self) -> bool:
         """Whether it may be named."""
-        return self.sure and self.effect.worth(self.told)
+        return self.sure and self.effect.worth(self.told) and not self.against
 
     @property
     def sure(self) -> bool:
@@ -105,8 +107,9 @@ class Found:
     beside the basis last. rounds: what was fitted at each, best first; the last is the one that
     found nothing. before, after: the fits without and with those that are named. left: structure
     that these do not explain. error_before, error_after: of left-out parts and photos. expected:
-    (n, 3) deviation before anything was fitted. doubted: of the accepted, causes that the second
-    fit does not bear out, and why, in words."""
+    (n, 3) deviation before anything was fitted. doubted: causes that gain, and what speaks against
+    them, in words: of those tried first that a material contradicts them, of the accepted that the
+    second fit does not bear them out."""
 
     accepted: tuple[Trial, ...]
     rounds: tuple[tuple[Trial, ...], ...]
@@ -133,6 +136,11 @@ class Found:
         return tuple(t for t in self.accepted if t.effect.cause not in self.doubted)
 
     @property
+    def told(self) -> tuple[Trial, ...]:
+        """Those that something is to be said of."""
+        return tuple(t for t in self.ranked if t in self.accepted or t.effect.cause in self.doubted)
+
+    @property
     def causes(self) -> tuple[str, ...]:
         """That are named, by the words of the vocabulary; ``unknown`` for what is left of
         structure."""
@@ -140,7 +148,7 @@ class Found:
         return (*causes, "unknown") if self.unexplained else causes
 
     def sentence(self, trial: Trial) -> str:
-        """What one of the accepted means, and what speaks against it."""
+        """What it means, and what speaks against it."""
         doubt = self.doubted.get(trial.effect.cause)
         said = trial.sentence()
         return said if doubt is None else f"{said}. But that is doubtful: {doubt}"

@@ -50,6 +50,7 @@ SURER = 5.0  # standard errors of a gain that is as small and leaves nothing
 CASTS = 3  # rounds in which rays are cast anew for a lamp or a photo that is found elsewhere
 MORE = 0.02  # of the gain, that another such round has to promise
 EXPECTATIONS = 1  # rounds in which patches say what is usual among them
+AGAINST = 2.0  # standard errors that a material loses by what a camera does: it should gain
 ALIKE = 2.0  # standard errors by which gains differ that the photos cannot tell apart
 
 
@@ -86,7 +87,7 @@ def search(
             yield (turn + (place + 1) / (len(promising) + 1)) / MOST_EFFECTS
         trials.sort(key=lambda t: -t.gain)
         rounds.append(tuple(trials))
-        best = _simplest([t for t in trials if t.sure])
+        best = _simplest([t for t in trials if t.sure and not t.against])
         gained = sum(t.gain for t in accepted)
         if best is None or not best.convincing:
             break
@@ -107,7 +108,7 @@ def search(
         kept, tuple(rounds), before, now, *unseen,
         leftover(now),
         unseen_error(before, unseen[0], expected), unseen_error(now, unseen[1], expected),
-        expected,
+        expected, _contradicted(rounds[0], kept, setting.materials),
     )  # fmt: skip
 
 
@@ -170,7 +171,33 @@ def _try(now: Fitted, costs: Costs, one: Asked) -> Trial:
     own = effect.patch is None and len(effect.numbers) > 0
     without = fitted.model.without(effect.cause) if own else now.shown
     change = rms_change(fitted.shown, without, now.deviation, effect.of_highlights)
-    return Trial(effect, fitted, unseen, gained, change, one.chance)
+    against = _against(now, costs(fine, settled) - unseen.cost) if effect.of_camera else ()
+    return Trial(effect, fitted, unseen, gained, change, one.chance, against=against)
+
+
+def _against(now: Fitted, gains: Array) -> tuple[int, ...]:
+    """Materials of which left-out squares are predicted worse."""
+    material = now.model.pixels.material
+    found = []
+    for index in np.unique(material):
+        mine = np.flatnonzero(material == index)
+        gained = by_square(squares(now)[mine], gains[mine])
+        if gained.sum() < -AGAINST * error_of_sum(gained):
+            found.append(int(index))
+    return tuple(found)
+
+
+def _contradicted(
+    tried: Sequence[Trial], kept: Sequence[Trial], materials: Sequence[str]
+) -> dict[str, str]:
+    """By cause, what speaks against those that gain but by one material at another's expense."""
+    accepted = {trial.effect.cause for trial in kept}
+    return {
+        t.effect.cause: "a camera does the same to all materials, but with it parts of "
+        f"{' and '.join(materials[k] for k in t.against)} that were left out are predicted worse"
+        for t in tried
+        if t.against and t.sure and t.effect.cause not in accepted
+    }
 
 
 def _with_last(model: Model, effect: Effect, x: Vector) -> Array:
@@ -283,7 +310,7 @@ def _missed(
 
     while len(kept) > 1:
         again = list(in_order(pool, anew, kept, ahead=len(kept)))
-        worst = min(range(len(kept)), key=lambda k: again[k].gain)
+        worst = min(range(len(kept)), key=lambda k: (not again[k].against, again[k].gain))
         if again[worst].convincing:
             return again[worst].fitted, tuple(again)
         kept.pop(worst)

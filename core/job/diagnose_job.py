@@ -93,6 +93,7 @@ def setting_of(
         size=2 * float(np.percentile(np.linalg.norm(pixels.point - middle, axis=1), 99)),
         level=level,
         scale=scale,
+        materials=tuple(material.name for material in result.materials),
     )
 
 

@@ -154,10 +154,10 @@ def _materials(folder: Path, before: CaptureResult, after: CaptureResult) -> str
 
 
 def _row(trial: Trial, found: Found) -> str:
-    accepted, named = trial in found.accepted, trial in found.named
+    named = trial in found.named
     sure = trial.gain / max(trial.error, 1e-9)
     width = int(np.clip(12 * sure, 0, 160))
-    said = found.sentence(trial) if accepted else ""
+    said = found.sentence(trial) if trial in found.told else ""
     style = "background:#2f6fb0" if named else "background:#bbb"
     return (
         f"<tr><th>{escape(trial.effect.cause)}</th><td>{sure:.1f}</td><td><div style='height:10px;"

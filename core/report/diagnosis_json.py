@@ -72,8 +72,8 @@ def _cause(trial: Trial, found: Found) -> dict[str, Any]:
     return {
         "cause": trial.effect.cause,
         "accepted": accepted,
-        "doubted": found.doubted.get(trial.effect.cause) if accepted else None,
-        "sentence": found.sentence(trial) if accepted else trial.sentence(),
+        "doubted": found.doubted.get(trial.effect.cause),
+        "sentence": found.sentence(trial),
         "ties": [effect.cause for effect in trial.ties],
         "held_out_gain": trial.gain,
         "standard_error": trial.error,

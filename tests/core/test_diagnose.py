@@ -85,6 +85,28 @@ def test_without_what_is_doubted_the_rest_is_told_as_it_is_then_found():
     assert doubting(found, {}) is found
 
 
+def test_a_curve_that_one_material_contradicts_is_doubted():
+    """Two materials, one of them shown as if by a curve: a camera would do it to both."""
+    setting = lit_ball(7)
+    pixels = setting.pixels
+    upper = pixels.point[:, 2] > 0
+    grey = pixels.observed.mean()
+    curved = pixels.observed * (pixels.observed / grey) ** -0.2
+    brdfs = BRDFs.of([PrincipalBRDF(setting.brdfs.basis, setting.brdfs.coefficients[0])] * 2)
+    two = replace(
+        changed(setting, np.where(upper[:, None], curved, pixels.observed)),
+        brdfs=brdfs, scale=np.ones(2, np.float32), materials=("glaze", "clay"),
+    )  # fmt: skip
+    two = replace(two, pixels=replace(two.pixels, material=np.where(upper, 0, 1).astype(np.int16)))
+    found = searched(two, kinds=(CameraResponse, Vignetting))
+    assert "camera_response" not in found.causes
+    assert "clay" in found.doubted["camera_response"]
+    (trial,) = [t for t in found.told if t.effect.cause == "camera_response"]
+    assert trial.gain > 0 and trial.against == (1,) and "clay" in found.sentence(trial)
+    both = replace(two, pixels=replace(two.pixels, observed=curved.astype(np.float32)))
+    assert searched(both, kinds=(CameraResponse, Vignetting)).causes == ("camera_response",)
+
+
 def test_a_dark_corner_is_named_and_measured():
     setting = lit_ball(2)
     r2 = np.square(setting.pixels.x) + np.square(setting.pixels.y)
