@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 
 from ..angles.vectors import dot
 from .effect import Setting
+from .pixels import Pixels
 from .situation import Situation
 
 Array = NDArray[np.floating]
 
 BINS, FEWEST = 12, 40
+UPRIGHT = np.radians(2.0)  # θh: nearer the normal, a half vector points nowhere on the surface
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,26 @@ def coordinates(setting: Setting) -> list[Coordinate]:
     found += [
         Coordinate(f"place on the object, {'xyz'[k]}", "scan units", place[:, k]) for k in range(3)
     ]
+    turns = half_vector_turns(pixels)
+    found += [
+        Coordinate(f"tangent direction, off {'xyz'[k]}", "°", turns[:, k]) for k in range(3)
+    ]
     return found
+
+
+def half_vector_turns(pixels: Pixels) -> Array:
+    """(n, 3) degrees on the surface between the half vector and each of the scan's axes, 0 along to
+    90 across: what is brushed or woven reflects otherwise along than across. NaN where the half
+    vector or the axis stands upright."""
+    normal = pixels.normal.astype(np.float64)
+    half = pixels.light + pixels.view
+    half = half / np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-9)
+    flat = half - normal * dot(half, normal)[:, None]
+    axes = np.eye(3) - normal[:, :, None] * normal[:, None, :]  # (n, axis, 3)
+    sizes = np.linalg.norm(flat, axis=1)[:, None], np.linalg.norm(axes, axis=2)
+    along = np.abs(np.einsum("nax,nx->na", axes, flat)) / np.maximum(sizes[0] * sizes[1], 1e-12)
+    there = (sizes[0] > np.sin(UPRIGHT)) & (sizes[1] > np.sin(UPRIGHT))
+    return np.where(there, np.degrees(np.arccos(np.clip(along, 0, 1))), np.nan)
 
 
 def trend(

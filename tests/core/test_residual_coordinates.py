@@ -1,0 +1,54 @@
+"""What a residual is drawn against, and whether a trend along it is what was put there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from patina.core.diagnose.coordinates import coordinates, half_vector_turns, trend
+from tests.make_lit_ball import lit_ball
+
+BETRAY = (
+    "half angle", "difference angle", "incidence", "view", "photo's centre", "photo", "brightness",
+    "curvature", "shadow's edge", "surroundings", "lamp", "place on the object",
+    "tangent direction",
+)  # fmt: skip
+
+
+def test_all_that_betrays_a_cause_is_there():
+    setting = lit_ball()
+    names = [c.name for c in coordinates(setting)]
+    assert len(set(names)) == len(names)
+    assert [each for each in BETRAY if not any(each in name for name in names)] == []
+    assert all(c.values.shape == (len(setting.pixels),) for c in coordinates(setting))
+
+
+@pytest.mark.parametrize(("tilt", "expected"), [
+    ((1, 0), (0, 90)), ((0, -1), (90, 0)), ((1, 1), (45, 45)), ((-1, 1), (45, 45)),
+])  # fmt: skip
+def test_tangent_directions_are_those_of_the_half_vector(tilt, expected):
+    """A surface that looks up, seen from above, the lamp tilted: off x and off y by so much; the
+    scan's z stands upright there."""
+    pixels = lit_ball().pixels.select(np.arange(1))
+    light = np.array([*tilt, 2.0]) / np.linalg.norm([*tilt, 2.0])
+    up = np.array([[0, 0, 1]], np.float32)
+    pixels = replace(pixels, normal=up, view=up, light=light[None].astype(np.float32))
+    np.testing.assert_allclose(half_vector_turns(pixels)[0, :2], expected, atol=1e-3)
+    assert np.isnan(half_vector_turns(pixels)[0, 2])
+    below = replace(pixels, light=up)
+    assert np.isnan(half_vector_turns(below)).all()
+
+
+def test_a_trend_is_what_was_put_there():
+    """3 % more light for each half diagonal, in photos of 1 % noise."""
+    setting = lit_ball(3)
+    pixels = setting.pixels
+    (away,) = [c for c in coordinates(setting) if "centre" in c.name]
+    shown = pixels.observed / (1 + 0.03 * away.values[:, None])
+    found = trend(away, pixels.observed - shown, shown, 0.01 * shown, pixels.block)
+    np.testing.assert_allclose(found.mean, 0.03 * found.at, atol=0.002)
+    turned = next(c for c in coordinates(setting) if c.name == "tangent direction, off z")
+    along = trend(turned, 0 * shown, shown, 0.01 * shown, pixels.block)
+    assert len(along.at) > 3 and np.abs(along.mean).max() == 0
