@@ -9,12 +9,13 @@ pixels.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .effect import Effect
 from .equations import Change, Equations
 from .fitted import Fitted, robust
 from .slopes import Slopes, slopes_of
@@ -60,10 +61,11 @@ def predict_unseen(fitted: Fitted, fine: bool = False) -> Unseen:
 
 
 def predict_unseen_photos(fitted: Fitted) -> Unseen | None:
-    """At an optimum, whole photos left out, a fifth of them at a time; numbers that are a photo's
-    own are then not known. None where there is one photo only."""
+    """At an optimum, whole photos left out, a fifth of them at a time. Numbers that are a photo's
+    own (its exposure, its pose) stay as they were found: no other photo could tell them, and it is
+    what all photos have in common that is judged. None where there is one photo only."""
     of = _photos(fitted, FOLDS)
-    return _unseen(fitted, of) if of.max() > 0 else None
+    return _unseen(fitted, of, own=True) if of.max() > 0 else None
 
 
 def _photos(fitted: Fitted, most: int) -> NDArray[np.int32]:
@@ -72,16 +74,40 @@ def _photos(fitted: Fitted, most: int) -> NDArray[np.int32]:
     return (place.ravel() % most).astype(np.int32)
 
 
-def _unseen(fitted: Fitted, of: NDArray[np.int32]) -> Unseen:
-    """of: (n,) fold of every pixel."""
+def _unseen(fitted: Fitted, of: NDArray[np.int32], own: bool = False) -> Unseen:
+    """of: (n,) fold of every pixel; own: numbers that the rest knows nothing of stay."""
     slopes = slopes_of(fitted)
     whole, others = _left_out(fitted, slopes, of)
     residual = np.array(fitted.residual, np.float64)
     for fold, change in enumerate(others):
         mine = np.flatnonzero(of == fold)
-        residual[mine] -= _moved(fitted, slopes, mine, change)
+        step = _keeping_own(fitted, whole, change) if own else change
+        residual[mine] -= _moved(fitted, slopes, mine, step)
     variance = _by_effect(fitted, whole, others)
     return Unseen(residual, robust(residual).sum(axis=1), variance)
+
+
+def _keeping_own(fitted: Fitted, whole: Change, other: Change) -> Change:
+    """The step without a part of the photos, but for numbers that are hardly known without it. What
+    all of them have in common, and the BRDF could as well have, they follow."""
+    x, at = other.x.copy(), 0
+    for place in fitted.model.everywhere:
+        effect = fitted.model.effects[place]
+        mine = slice(at, at + len(effect.numbers))
+        at = mine.stop
+        anchor = _anchor(effect)
+        plain, spread = (
+            np.diag(anchor @ each.covariance[mine, mine] @ anchor.T) for each in (whole, other)
+        )
+        unknown = spread > STILL_KNOWN * plain
+        for k in np.flatnonzero(unknown):
+            alike = np.flatnonzero((anchor[k] != 0) & ~unknown)
+            x[mine.start + k] = other.x[mine][alike].mean() if len(alike) else 0.0
+    return replace(other, x=x)
+
+
+def _anchor(effect: Effect) -> NDArray[np.float64]:
+    return np.eye(len(effect.numbers)) if effect.anchor is None else effect.anchor
 
 
 def _left_out(fitted: Fitted, slopes: Slopes, of: NDArray[np.int32]) -> tuple[Change, list[Change]]:
@@ -136,7 +162,7 @@ def _by_effect(fitted: Fitted, change: Change, others: Sequence[Change]) -> tupl
             variance.append(change.local_variance)
             continue
         mine = slice(at, at + count)
-        anchor = np.eye(count) if effect.anchor is None else effect.anchor
+        anchor = _anchor(effect)
         plain = np.diag(anchor @ change.covariance[mine, mine] @ anchor.T)
         moved = np.stack([other.x[mine] for other in others]) @ anchor.T
         spread = [np.diag(anchor @ o.covariance[mine, mine] @ anchor.T) for o in others]

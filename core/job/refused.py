@@ -32,11 +32,9 @@ def seen_jointly(found: Found, fitted: Fitted) -> float:
     """ln of what the error of unseen photos grew by where the materials and all causes are fitted
     together; 0 of one photo. fitted: with the causes that the second fit takes into account."""
     before = found.error_before.photos
-    if before is None:
-        return 0.0
     known = fitted is found.after
     after = found.error_after.photos if known else unseen_photos_error(fitted)
-    return 0.0 if after is None else _grown(before, after)
+    return 0.0 if before is None or after is None else _grown(before, after)
 
 
 def worse(
