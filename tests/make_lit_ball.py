@@ -18,12 +18,15 @@ PHOTOS, EACH, SIZE = 6, 900, 0.8
 NOISE = 0.01
 
 
-def lit_ball(seed: int = 0) -> Setting:
+SHARP, GLOSSY = 10, 21  # training materials: half as bright at well under 1°, and at 2.2°
+
+
+def lit_ball(seed: int = 0, material: int = SHARP) -> Setting:
     """Pixels of a ball in six photos under three lights, of a material of the basis, with noise;
     radiance is summed by hand here: ρ E cos θi."""
     rng = np.random.default_rng(seed)
     basis = Basis.default()
-    brdf = PrincipalBRDF(basis, basis.training[30:33])
+    brdf = PrincipalBRDF(basis, basis.training[3 * material : 3 * material + 3])
     parts = []
     for photo in range(PHOTOS):
         turn = 2 * np.pi * photo / PHOTOS

@@ -3,8 +3,8 @@
 What the camera did is taken back by one Newton step about the prediction, which no noise can throw
 far; light that was added is subtracted; directions, irradiance and shadows are what the effects
 make them; and what a lamp's size or a stretched highlight does is a ratio of two predictions. Of
-a channel that is clipped nothing can be taken back: it stands as the joint fit predicts it, which
-knows that it is brighter than the plateau, and counts as no evidence of what unseen photos show.
+a channel that is clipped nothing can be taken back: it stands as the joint fit draws it
+(beyond_plateau.py), and counts as no evidence of what unseen photos show.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..angles import half_difference
 from ..angles.vectors import dot
 from ..samples import SampleTable
+from .beyond_plateau import beyond_plateau, plateau_of
 from .effect import Near, Setting
 from .model import Model
 from .of_samples import nearest
@@ -29,17 +30,18 @@ CHUNK = 20_000  # samples at a time: what each sees around itself takes a kiloby
 SIGHTS = 20  # directions: what is off in one sample is not in the next
 NUDGE = 1e-2  # of the prediction
 LEAST_RESPONSE = 0.2  # ∂ ln recorded/∂ ln light: less is a plateau, or the veil of another place
+AT_PLATEAU = 0.03  # so near, relative, is at it
 LEAST_COS, LEAST_LIGHT = 0.05, 0.5  # θi; part of the lamp's light that arrives
 FARTHEST = 3.0  # factor by which a prediction may correct
 
 
 def corrected(
-    table: SampleTable, pixels: Pixels, model: Model, setting: Setting
+    table: SampleTable, pixels: Pixels, model: Model, setting: Setting, tilt: float = 0.0
 ) -> Generator[float, None, tuple[SampleTable, dict[int, float]]]:
     """Samples (n,) → (those, m ≤ n, that can be corrected, for each photo the RMS of the radiance
     of those, as it shows it, over that of all the light they show); yields the fraction done.
     pixels: of the samples (of_samples.py); model: with the effects, at its optimum; setting: that
-    it was made for."""
+    it was made for; tilt: radians along each tangent that the scan's normals are off by."""
     parts = []
     near = nearest(pixels, setting.pixels, setting.size)
     # of a photo that the diagnosis did not look at nothing is known
@@ -48,7 +50,8 @@ def corrected(
         yield start / len(known)
         rows = known[start : start + CHUNK]
         here = replace(setting, pixels=pixels.select(rows), brdfs=model.brdfs, sights=SIGHTS)
-        parts.append(_corrected(table.select(rows), elsewhere(model, here, near.select(rows))))
+        moved = elsewhere(model, here, near.select(rows))
+        parts.append(_corrected(table.select(rows), moved, tilt))
     if not parts:
         return SampleTable.empty(), {}
     tables, left, whole = zip(*parts, strict=True)
@@ -69,30 +72,36 @@ def elsewhere(model: Model, setting: Setting, near: Near) -> Model:
     return Model(setting.pixels, model.brdfs, tuple(effects), tuple(x))
 
 
-def _corrected(table: SampleTable, model: Model) -> tuple[SampleTable, Array, Array]:
+def _corrected(
+    table: SampleTable, model: Model, tilt: float
+) -> tuple[SampleTable, Array, Array]:
     """(samples, squares of their radiance as the photos show it, and of all that they show; 0 of
     what they do not tell)."""
     now = model.situation()
     lamps = model.lamps(now)
     reflected = model.reflected(lamps)
-    entering = model.entering(reflected, now)
+    predicted = model.entering(reflected, now)
+    added = predicted - reflected
+    plateau = plateau_of(model, now, np.maximum(predicted, table.radiance))
+    clipped = table.radiance > (1 - AT_PLATEAU) * plateau
+    # where only the prediction is beyond the plateau, the photo says how much light arrived
+    below = ~clipped & (predicted > (1 - AT_PLATEAU) * plateau)
+    entering = np.where(below, np.minimum(table.radiance, predicted), predicted)
     recorded = model.recorded(entering, now)
     step = NUDGE * np.maximum(entering, 1e-12)
     response = (model.recorded(entering + step, now) - recorded) / step
     relative = response * entering / np.where(recorded > 0, recorded, np.inf)
-    told = relative > LEAST_RESPONSE
-    # more light than the photo can say: how much, the rest of the photos knows best
-    plateau = ~told & (response < LEAST_RESPONSE) & (recorded < entering)
-    good = (told | plateau).all(axis=1)
+    good = ((relative > LEAST_RESPONSE) | clipped).all(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):  # of what is not good
         arrived = entering + (table.radiance - recorded) / response
-    arrived = np.where(plateau, entering, arrived)
-    radiance = arrived - (entering - reflected)
+    at = np.where(clipped, plateau, np.inf)
+    drawn = beyond_plateau(model, now, added, at, arrived, tilt)
+    radiance = np.where(clipped, drawn, arrived - added)
+    response = np.where(clipped, 0, response)
     lamp = response * radiance
-    response = np.where(plateau, 0, response)
     if len(lamps) > 1 or now.stretch is not None:
         point = model.brdfs.reflected(replace(now, stretch=None))
-        ratio = point / np.maximum(reflected, 1e-30)
+        ratio = np.where(clipped, 1, point / np.maximum(reflected, 1e-30))  # drawn of a point
         good &= ((ratio < FARTHEST) & (ratio > 1 / FARTHEST)).all(axis=1)
         radiance, response = radiance * ratio, response / ratio
     cos_i = dot(now.normal, now.light)

@@ -17,7 +17,7 @@ from ..samples import SampleTable
 from ..steps import relayed
 from .applied import Applied
 from .beside import beside
-from .diagnose_job import DiagnoseJob
+from .diagnose_job import DiagnoseJob, normal_deviation
 from .fit_job import CaptureResult, MaterialResult, with_portable
 from .job import Job, Step, finished
 from .refused import Again, seen_jointly, worse
@@ -130,7 +130,9 @@ class RefitJob(Job):
         read = any(effect.of_photo for effect in model.effects)
         steps = pixels_of_samples(table, index, before.capture, before.scan, before.photos, read)
         pixels = yield from relayed(steps, lambda _: step)
-        return (yield from relayed(corrected(table, pixels, model, setting), lambda _: step))
+        tilt = float(np.radians(normal_deviation(before)))
+        correcting = corrected(table, pixels, model, setting, tilt)
+        return (yield from relayed(correcting, lambda _: step))
 
 
 def _of_clipped(table: SampleTable) -> tuple[str, ...]:

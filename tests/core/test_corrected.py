@@ -26,7 +26,7 @@ from patina.core.diagnose.of_samples import nearest
 from patina.core.fit.held_out import predicted as unseen_photo
 from patina.core.samples import SampleTable
 from patina.core.steps import drained
-from tests.make_lit_ball import EACH, changed, lit_ball, shadowed
+from tests.make_lit_ball import EACH, GLOSSY, SHARP, changed, lit_ball, shadowed
 
 
 def table_of(setting: Setting) -> SampleTable:
@@ -87,30 +87,84 @@ def _brdf_of(setting: Setting):
     return PrincipalBRDF(brdfs.basis, brdfs.coefficients[0])
 
 
-def test_what_is_clipped_is_predicted_and_no_evidence():
-    """A red channel that ends at a plateau: red stands as the BRDF has it, and the sample counts
-    for nothing where unseen photos are judged; the other channels stay what the photo says."""
-    setting = lit_ball(4)
+def clipped_ball(
+    seed: int, part: float, channels: tuple[int, ...] = (0,), material: int = SHARP
+) -> tuple[Setting, Model, np.ndarray]:
+    """A ball whose channels end at a plateau, which this part of its pixels reaches, the model that
+    knows it, and what photos that are not clipped show (n, 3)."""
+    setting = lit_ball(seed, material)
     truth = setting.pixels.observed
-    top = np.array([np.percentile(truth[:, 0], 85), np.inf, np.inf])
+    top = np.full(3, np.inf)
+    for channel in channels:
+        top[channel] = np.percentile(truth[:, channel], 100 * (1 - part))
     setting = changed(setting, np.minimum(truth, top).astype(np.float32))
     effect = Clipping.of(setting)
     level = np.log(8.0) + np.log(effect.top / np.minimum(top, 8 * effect.top))
-    model = Model(setting.pixels, setting.brdfs).with_effect(effect, level)
-    found, _ = drained(corrected(table_of(setting), setting.pixels, model, setting))
+    return setting, Model(setting.pixels, setting.brdfs).with_effect(effect, level), truth
+
+
+def rows_of(table: SampleTable, setting: Setting) -> np.ndarray:
+    """Of a table's samples in the setting's pixels."""
     key = setting.pixels.photo.astype(int) * EACH + setting.pixels.pixel
-    shown = dict(zip(key.tolist(), truth, strict=True))
-    above = int(np.sum(truth[:, 0] > 1.1 * top[0]))
+    return np.searchsorted(key, table.photo.astype(int) * EACH + table.pixel)
+
+
+def test_what_is_clipped_is_predicted_and_no_evidence():
+    """A red channel that ends at a plateau: red stands as the BRDF has it, and the sample counts
+    for nothing where unseen photos are judged; the other channels stay what the photo says."""
+    setting, model, truth = clipped_ball(4, 0.15)
+    top = setting.pixels.observed[:, 0].max()
+    found, _ = drained(corrected(table_of(setting), setting.pixels, model, setting))
+    above = int(np.sum(truth[:, 0] > 1.02 * top))
     filled = found.select(~found.read)
-    assert len(filled) > 0.8 * above > 40
+    assert len(filled) > 0.95 * above > 40
     predicted = setting.brdfs.evaluate(filled.angles, np.zeros(len(filled), np.int16))
-    np.testing.assert_allclose(filled.rho[:, 0], predicted[:, 0], rtol=1e-3)
-    own = np.array([shown[k] for k in filled.photo.astype(int) * EACH + filled.pixel])
+    level = top / (filled.irradiance * filled.cos_i[:, None])[:, 0]
+    np.testing.assert_allclose(filled.rho[:, 0], np.maximum(predicted[:, 0], level), rtol=0.02)
+    own = truth[rows_of(filled, setting)]
     np.testing.assert_allclose(filled.radiance[:, 1:], own[:, 1:], rtol=1e-3)
     photo = int(filled.photo[0])
     judged = unseen_photo(found, photo, _brdf_of(setting))
     read = found.select((found.photo == photo) & found.read)
     assert judged.size == pytest.approx(float(np.sum(read.radiance**2)), rel=1e-3)
+
+
+@pytest.mark.parametrize("channels", [(0,), (0, 1, 2)])
+def test_what_was_clipped_is_as_high_as_a_scan_of_such_normals_would_have_it(channels):
+    """Normals are 1.5° off: what is clipped beside the highlight's middle is so since its normal is
+    another one, and the BRDF at the scan's would be too dark."""
+    setting, model, bright = clipped_ball(5, 0.04, channels, GLOSSY)
+    rng = np.random.default_rng(1)
+    tilt = np.radians(1.5)
+    told = setting.pixels.normal + tilt * rng.standard_normal(setting.pixels.normal.shape)
+    told = (told / np.linalg.norm(told, axis=1, keepdims=True)).astype(np.float32)
+    pixels = replace(setting.pixels, normal=told)
+    off = replace(setting, pixels=pixels)
+    model = replace(model, pixels=pixels, footprint=None)
+    errors = []
+    for known in (0.0, tilt):
+        found, _ = drained(corrected(table_of(off), pixels, model, off, known))
+        filled = found.select(~found.read)
+        true = bright[rows_of(filled, off), 0]
+        inner = filled.theta_h < np.median(filled.theta_h)
+        ratio = [filled.radiance[part, 0].mean() / true[part].mean() for part in (inner, ~inner)]
+        errors.append(np.abs(np.log(ratio)).max())
+    assert errors[1] < 0.12 and errors[1] < 0.5 * errors[0]
+
+
+def test_a_photo_that_is_not_clipped_says_what_arrived_though_the_prediction_is_beyond():
+    """The scan's normal puts a highlight where the photo shows none."""
+    setting, model, truth = clipped_ball(6, 0.1)
+    dark = (truth * np.float32(0.5)).astype(np.float32)
+    pixels = replace(setting.pixels, observed=np.minimum(dark, setting.pixels.observed))
+    off = replace(setting, pixels=pixels)
+    model = replace(model, pixels=pixels, footprint=None)
+    found, _ = drained(corrected(table_of(off), pixels, model, off))
+    beyond = truth[rows_of(found, off), 0] > setting.pixels.observed[:, 0].max()
+    beyond &= found.read
+    assert beyond.sum() > 30
+    own = pixels.observed[rows_of(found, off)][beyond]
+    np.testing.assert_allclose(found.radiance[beyond], own, rtol=0.02)
 
 
 def test_the_same_numbers_speak_of_other_pixels():
