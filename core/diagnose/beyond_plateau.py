@@ -38,7 +38,8 @@ def plateau_of(model: Model, now: Situation, radiance: Array) -> Array:
 def beyond_plateau(
     model: Model, now: Situation, added: Array, plateau: Array, arrived: Array, tilt: float
 ) -> Array:
-    """(n, 3) radiance of the lamp's light, drawn where ``plateau`` (n, 3) is finite, 0 elsewhere.
+    """(n, 3) radiance of the lamp's light on a surface that reflects alike along and across, drawn
+    where ``plateau`` (n, 3) is finite, 0 elsewhere.
     added: (n, 3) what else arrives; arrived: (n, 3) all that does, by the photo, where it says it;
     tilt: radians along each tangent, of the scan's normals."""
     out = np.zeros(plateau.shape)
@@ -51,14 +52,15 @@ def beyond_plateau(
     told = ~clipped & (said > 0)
     rng = np.random.default_rng(len(rows))
     frame = tangents(part.normal.astype(np.float64))
-    taken = np.zeros((len(rows), 3))
+    taken, plain = np.zeros((len(rows), 3)), np.zeros((len(rows), 3))
     nearest = np.full(len(rows), -np.inf)  # to being clipped, of those that are not
     total = np.zeros(len(rows))
     for _ in range(DRAWS):
         off = tilt * rng.standard_normal((2, len(rows), 1))
         normal = part.normal + off[0] * frame[0] + off[1] * frame[1]
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        radiance = model.brdfs.reflected(replace(part, normal=normal.astype(np.float32)))
+        there = replace(part, normal=normal.astype(np.float32))
+        radiance = model.brdfs.reflected(there)
         more = np.log(np.maximum(radiance + added, 1e-12) / np.where(clipped, at, said.clip(1e-12)))
         least = np.where(clipped, more, np.inf).min(axis=1)
         fits = least > 0
@@ -69,6 +71,9 @@ def beyond_plateau(
         chosen |= ~fits & (total == 0) & (least > nearest)
         nearest = np.where(fits, nearest, np.maximum(nearest, least))
         taken[chosen] = radiance[chosen]
+        if part.stretch is not None:
+            radiance = model.brdfs.reflected(replace(there, stretch=None))
+        plain[chosen] = radiance[chosen]
     least_light = np.where(clipped, np.maximum(at - added, 0), 0)
-    out[rows] = np.where(clipped, np.maximum(taken, least_light), 0)
+    out[rows] = np.where(clipped, plain * np.maximum(1, least_light / np.maximum(taken, 1e-12)), 0)
     return out

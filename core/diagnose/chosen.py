@@ -27,6 +27,8 @@ def with_causes(found: Found, causes: Collection[str]) -> Fitted:
     if set(found.after.model.causes).difference(NO_CORRECTION) == {t.effect.cause for t in chosen}:
         return found.after
     loose = [t for t in found.accepted if t.effect.cause in NO_CORRECTION]
+    if not set(found.after.model.causes).intersection(NO_CORRECTION):
+        loose = []  # it was named for what the little slack holds that every material has
     model = found.before.model
     for trial in (*chosen, *loose):
         model = model.with_effect(trial.effect, trial.x)
@@ -35,7 +37,7 @@ def with_causes(found: Found, causes: Collection[str]) -> Fitted:
 
 def doubting(found: Found, doubted: Mapping[str, str]) -> Found:
     """What is left to say where some causes are doubted (Found.doubted): the others have the
-    numbers that are found without these."""
+    numbers that are found without these (gains stay what they are missed by in the whole model)."""
     if not doubted:
         return found
     sound = {t.effect.cause for t in found.accepted}.difference(doubted)

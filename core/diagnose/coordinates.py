@@ -96,6 +96,8 @@ def trend(
     known = np.isfinite(coordinate.values) & np.isfinite(deviation).all(axis=1)
     known &= shown.mean(axis=1) > 0
     values = coordinate.values[known]
+    if not len(values):  # as a tangent direction on what is flat
+        return Trend(np.zeros(0), np.zeros(0), np.zeros(0))
     edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
     which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
     weight = np.sum(shown[known] ** 2 / deviation[known] ** 2, axis=1)

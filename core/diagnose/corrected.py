@@ -23,6 +23,7 @@ from .effect import Near, Setting
 from .model import Model
 from .of_samples import nearest
 from .pixels import Pixels
+from .situation import Situation
 
 Array = NDArray[np.floating]
 
@@ -30,6 +31,7 @@ CHUNK = 20_000  # samples at a time: what each sees around itself takes a kiloby
 SIGHTS = 20  # directions: what is off in one sample is not in the next
 NUDGE = 1e-2  # of the prediction
 LEAST_RESPONSE = 0.2  # ∂ ln recorded/∂ ln light: less is a plateau, or the veil of another place
+STEPS = 4  # of Newton, where the prediction is beyond a plateau
 AT_PLATEAU = 0.03  # so near, relative, is at it
 LEAST_COS, LEAST_LIGHT = 0.05, 0.5  # θi; part of the lamp's light that arrives
 FARTHEST = 3.0  # factor by which a prediction may correct
@@ -87,9 +89,11 @@ def _corrected(
     # where only the prediction is beyond the plateau, the photo says how much light arrived
     below = ~clipped & (predicted > (1 - AT_PLATEAU) * plateau)
     entering = np.where(below, np.minimum(table.radiance, predicted), predicted)
-    recorded = model.recorded(entering, now)
-    step = NUDGE * np.maximum(entering, 1e-12)
-    response = (model.recorded(entering + step, now) - recorded) / step
+    recorded, response = _response(model, now, entering)
+    for _ in range(STEPS if below.any() else 0):
+        nearer = entering + (table.radiance - recorded) / np.maximum(response, LEAST_RESPONSE)
+        entering = np.where(below, np.clip(nearer, entering / 2, predicted), entering)
+        recorded, response = _response(model, now, entering)
     relative = response * entering / np.where(recorded > 0, recorded, np.inf)
     good = ((relative > LEAST_RESPONSE) | clipped).all(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):  # of what is not good
@@ -99,9 +103,9 @@ def _corrected(
     radiance = np.where(clipped, drawn, arrived - added)
     response = np.where(clipped, 0, response)
     lamp = response * radiance
-    if len(lamps) > 1 or now.stretch is not None:
+    if len(lamps) > 1 or now.stretch is not None:  # what is drawn is of a point, not stretched
         point = model.brdfs.reflected(replace(now, stretch=None))
-        ratio = np.where(clipped, 1, point / np.maximum(reflected, 1e-30))  # drawn of a point
+        ratio = np.where(clipped, 1, point / np.maximum(reflected, 1e-30))
         good &= ((ratio < FARTHEST) & (ratio > 1 / FARTHEST)).all(axis=1)
         radiance, response = radiance * ratio, response / ratio
     cos_i = dot(now.normal, now.light)
@@ -129,3 +133,10 @@ def _corrected(
     counted = found.weight * found.read
     left, whole = (counted * np.sum(each[rows] ** 2, axis=1) for each in (lamp, table.radiance))
     return found, left, whole
+
+
+def _response(model: Model, now: Situation, entering: Array) -> tuple[Array, Array]:
+    """(n, 3) what photos show of this light, and how much more of a little more."""
+    recorded = model.recorded(entering, now)
+    step = NUDGE * np.maximum(entering, 1e-12)
+    return recorded, (model.recorded(entering + step, now) - recorded) / step

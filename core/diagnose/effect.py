@@ -118,7 +118,7 @@ class Setting:
 
     @cached_property
     def faces_seen(self) -> NDArray[np.int32]:
-        """(f, directions) faces of the mesh that each face of it sees, −1 for the open."""
+        """(f, directions) faces of the mesh that each face of it sees (exchange.py)."""
         from .exchange import faces_seen
 
         return faces_seen(self.rays)
@@ -154,6 +154,7 @@ class Effect(ABC):
     fine = False  # judged on single pixels of the photos: only those beside one tell of it
     of_photo = False  # whether it needs what the photo shows about a pixel
     accuracy = 0.0  # what its own sums may be off by, relative
+    of_camera = False  # whether the camera does it, which knows nothing of materials
     of_brdf = False  # whether it is made of the BRDFs, and made anew when they are known better
 
     @classmethod
@@ -233,11 +234,6 @@ class Effect(ABC):
         """Whether it changes surface or lamp, and so what the surface reflects of the lamp."""
         kind = type(self)
         return kind.before is not Effect.before or kind.lamps is not Effect.lamps
-
-    @property
-    def of_camera(self) -> bool:
-        """Whether the camera does it, which knows nothing of what the surface is made of."""
-        return type(self).after is not Effect.after
 
     def remade(self, setting: Setting, x: NDArray[np.float64]) -> Effect:
         """Where it is made of_brdf: the same of the setting's BRDFs, x: as it was found with

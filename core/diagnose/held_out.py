@@ -77,47 +77,57 @@ def _photos(fitted: Fitted, most: int) -> NDArray[np.int32]:
 def _unseen(fitted: Fitted, of: NDArray[np.int32], own: bool = False) -> Unseen:
     """of: (n,) fold of every pixel; own: numbers that the rest knows nothing of stay."""
     slopes = slopes_of(fitted)
-    whole, others = _left_out(fitted, slopes, of)
+    whole, others, parts = _left_out(fitted, slopes, of)
     residual = np.array(fitted.residual, np.float64)
-    for fold, change in enumerate(others):
+    for fold, (change, part) in enumerate(zip(others, parts, strict=True)):
         mine = np.flatnonzero(of == fold)
-        step = _keeping_own(fitted, whole, change) if own else change
+        step = _keeping_own(fitted, change, parts, part) if own else change
         residual[mine] -= _moved(fitted, slopes, mine, step)
     variance = _by_effect(fitted, whole, others)
     return Unseen(residual, robust(residual).sum(axis=1), variance)
 
 
-def _keeping_own(fitted: Fitted, whole: Change, other: Change) -> Change:
-    """The step without a part of the photos, but for numbers that are hardly known without it. What
-    all of them have in common, and the BRDF could as well have, they follow."""
-    x, at = other.x.copy(), 0
+def _keeping_own(
+    fitted: Fitted, change: Change, parts: Sequence[Equations], part: Equations
+) -> Change:
+    """The step without a part of the photos, but for numbers that no other part tells of. What all
+    of them have in common, and the BRDF could as well have, they follow."""
+    unknown = _told_by(part.own, [p.own for p in parts])
+    x, at = change.x.copy(), 0
     for place in fitted.model.everywhere:
         effect = fitted.model.effects[place]
-        mine = slice(at, at + len(effect.numbers))
-        at = mine.stop
-        anchor = _anchor(effect)
-        plain, spread = (
-            np.diag(anchor @ each.covariance[mine, mine] @ anchor.T) for each in (whole, other)
-        )
-        unknown = spread > STILL_KNOWN * plain
-        for k in np.flatnonzero(unknown):
-            alike = np.flatnonzero((anchor[k] != 0) & ~unknown)
-            x[mine.start + k] = other.x[mine][alike].mean() if len(alike) else 0.0
-    return replace(other, x=x)
+        count = len(effect.numbers)
+        anchor, lost = _anchor(effect), unknown[at : at + count]
+        for k in np.flatnonzero(lost):
+            alike = np.flatnonzero((anchor[k] != 0) & ~lost)
+            x[at + k] = change.x[at + alike].mean() if len(alike) else 0.0
+        at += count
+    gone = _told_by(part.local, [p.local for p in parts]).ravel()
+    return replace(change, x=x, local=np.where(gone, 0.0, change.local))
+
+
+def _told_by(part: Array, parts: Sequence[Array]) -> NDArray[np.bool_]:
+    """(..., e) numbers of which hardly anything is known without a part; (..., e, e) each: what
+    pixels say of them, the numbers alone."""
+    mine, whole = (np.diagonal(each, axis1=-2, axis2=-1) for each in (part, sum(parts)))
+    return np.asarray(whole - mine < whole / STILL_KNOWN)
 
 
 def _anchor(effect: Effect) -> NDArray[np.float64]:
     return np.eye(len(effect.numbers)) if effect.anchor is None else effect.anchor
 
 
-def _left_out(fitted: Fitted, slopes: Slopes, of: NDArray[np.int32]) -> tuple[Change, list[Change]]:
-    """The steps that all pixels ask for, and that they do without each of the parts (n,)."""
+def _left_out(
+    fitted: Fitted, slopes: Slopes, of: NDArray[np.int32]
+) -> tuple[Change, list[Change], list[Equations]]:
+    """The steps that all pixels ask for, and that they do without each of the parts (n,); the
+    parts' own equations."""
     parts = [
         Equations.of(fitted, slopes, np.flatnonzero(of == part)) for part in range(of.max() + 1)
     ]
     whole = reduce(Equations.plus, parts)
     others = [whole.plus(part, -1.0).solved(fitted) for part in parts]
-    return whole.solved(fitted, spread=True), others
+    return whole.solved(fitted, spread=True), others, parts
 
 
 def variances(fitted: Fitted) -> tuple[Array, ...]:
@@ -134,7 +144,8 @@ def variances_by_photos(fitted: Fitted, before: tuple[Array, ...]) -> tuple[Arra
     of = _photos(fitted, MOST_GROUPS)
     if of.max() < FEWEST_GROUPS - 1:
         return before
-    found = _by_effect(fitted, *_left_out(fitted, slopes_of(fitted), of))
+    whole, others, _ = _left_out(fitted, slopes_of(fitted), of)
+    found = _by_effect(fitted, whole, others)
     return tuple(np.maximum(a, b) for a, b in zip(found, before, strict=True))
 
 

@@ -50,7 +50,8 @@ SURER = 5.0  # standard errors of a gain that is as small and leaves nothing
 CASTS = 3  # rounds in which rays are cast anew for a lamp or a photo that is found elsewhere
 MORE = 0.02  # of the gain, that another such round has to promise
 EXPECTATIONS = 1  # rounds in which patches say what is usual among them
-AGAINST = 2.0  # standard errors that a material loses by what a camera does: it should gain
+AGAINST = 2.0  # standard errors that a material loses by what a camera does: it should gain;
+FEW = 10  # squares of it, that are too few to say so
 ALIKE = 2.0  # standard errors by which gains differ that the photos cannot tell apart
 
 
@@ -182,7 +183,7 @@ def _against(now: Fitted, gains: Array) -> tuple[int, ...]:
     for index in np.unique(material):
         mine = np.flatnonzero(material == index)
         gained = by_square(squares(now)[mine], gains[mine])
-        if gained.sum() < -AGAINST * error_of_sum(gained):
+        if len(gained) > FEW and gained.sum() < -AGAINST * error_of_sum(gained):
             found.append(int(index))
     return tuple(found)
 
@@ -210,12 +211,12 @@ def _remade(now: Fitted, costs: Costs, best: Trial, setting: Setting) -> Trial:
     """With the BRDFs that are found when the effect is in the model: those without it hold a part
     of it. In finer detail where that gains more."""
     setting = replace(setting, brdfs=best.fitted.model.brdfs)
-    finer = best.effect.remade(setting, best.x)
-    found = _try(now, costs, Asked(finer, best.gain, best.chance))
-    plain = best.effect.of(setting)
-    if len(finer.numbers) == len(best.effect.numbers) or found.gain > best.gain or plain is None:
-        return found
-    return _try(now, costs, Asked(plain, best.gain, best.chance))
+    effects = [best.effect.remade(setting, best.x)]
+    if len(effects[0].numbers) != len(best.effect.numbers):
+        plain = best.effect.of(setting)
+        effects += [] if plain is None else [plain]
+    tried = [_try(now, costs, Asked(effect, best.gain, best.chance)) for effect in effects]
+    return max(tried, key=lambda trial: trial.gain)
 
 
 def _with_rays(now: Fitted, costs: Costs, best: Trial, setting: Setting) -> Trial:
@@ -317,4 +318,6 @@ def _missed(
     if len(kept) == len(accepted):
         return now, tuple(kept)
     alone = _try(before, _costs(before), Asked(kept[0].effect, 0.0, kept[0].chance))
+    if alone.against:
+        return before, ()
     return alone.fitted, (replace(alone, ties=kept[0].ties),)

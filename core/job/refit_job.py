@@ -53,28 +53,40 @@ class RefitJob(Job):
 
     def run(self) -> Iterator[Step]:
         """With all causes; where unseen photos are then predicted worse, without the one of them
-        that gained least."""
+        that gained least, and so on. What was left out in vain before that helped is put back."""
         before, found = finished(self.checked.result), finished(self.checked.found)
-        chosen = [t for t in can_be_applied(found) if t.effect.cause not in self.without]
-        dropped: list[str] = []
-        attempt = 0.5
+        order = [t for t in can_be_applied(found) if t.effect.cause not in self.without]
+        chosen, left_out = list(order), list[Trial]()
+        stands: tuple[list[Again], Model] | None = None
+        begin = 0.0
         while chosen:
-            again, model, refusal = yield from self._with(before, found, chosen, 1 - 2 * attempt)
+            again, model, refusal = yield from self._with(before, found, chosen, begin)
+            begin += 0.5 * (1 - begin)
             if refusal is None:
-                materials = [
-                    replace(m, warnings=(*m.warnings, *a.warnings, *dropped))
-                    for m, a in zip(_proposed(before, again), again, strict=True)
-                ]
-                taken = chosen if any(a.material is not None for a in again) else []
-                used = tuple(_applied(trial, model) for trial in taken)
-                yield from self._finish(replace(before, effects=used), materials, 1 - attempt)
-                return
-            cause = chosen.pop().effect.cause
-            self.doubted[cause] = refusal
-            dropped.append(f"{cause} is not taken into account: {refusal}")
-            attempt /= 2
-        materials = [replace(m, warnings=(*m.warnings, *dropped)) for m in before.materials]
-        yield from self._finish(before, materials, 1 - 2 * attempt)
+                stands = again, model
+                break
+            left_out.append(chosen.pop())
+            self.doubted[left_out[-1].effect.cause] = refusal
+        for trial in left_out[-2::-1]:
+            more = [t for t in order if t in chosen or t is trial]
+            again, model, refusal = yield from self._with(before, found, more, begin)
+            begin += 0.5 * (1 - begin)
+            if refusal is None:
+                chosen, stands = more, (again, model)
+                del self.doubted[trial.effect.cause]
+        said = [f"{c} is not taken into account: {why}" for c, why in self.doubted.items()]
+        if stands is None:
+            materials = [replace(m, warnings=(*m.warnings, *said)) for m in before.materials]
+            yield from self._finish(before, materials, begin)
+            return
+        again, model = stands
+        materials = [
+            replace(m, warnings=(*m.warnings, *a.warnings, *said))
+            for m, a in zip(_proposed(before, again), again, strict=True)
+        ]
+        taken = chosen if any(a.material is not None for a in again) else []
+        used = tuple(_applied(trial, model) for trial in taken)
+        yield from self._finish(replace(before, effects=used), materials, begin)
 
     def _finish(
         self, result: CaptureResult, materials: Sequence[MaterialResult], start: float

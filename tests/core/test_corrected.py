@@ -13,6 +13,7 @@ from patina.core.diagnose.brdfs import BRDFs
 from patina.core.diagnose.corrected import corrected, elsewhere
 from patina.core.diagnose.effect import Setting
 from patina.core.diagnose.effects import EFFECTS
+from patina.core.diagnose.effects.anisotropy import Anisotropy
 from patina.core.diagnose.effects.area_light import AreaLight
 from patina.core.diagnose.effects.camera_response import CameraResponse
 from patina.core.diagnose.effects.cast_shadow import CastShadow
@@ -150,6 +151,28 @@ def test_what_was_clipped_is_as_high_as_a_scan_of_such_normals_would_have_it(cha
         ratio = [filled.radiance[part, 0].mean() / true[part].mean() for part in (inner, ~inner)]
         errors.append(np.abs(np.log(ratio)).max())
     assert errors[1] < 0.12 and errors[1] < 0.5 * errors[0]
+
+
+def test_what_is_clipped_of_a_brushed_surface_stands_unstretched():
+    """As its other samples do: ρ of the highlight that it has across and along alike."""
+    setting = lit_ball(5, GLOSSY)
+    numbers = np.array([0.5, -0.2, -0.3])
+    whole = Model(setting.pixels, setting.brdfs).with_effect(Anisotropy.of(setting), numbers)
+    shown = whole.predicted()
+    top = np.percentile(shown[:, 0], 94)
+    seen = shown.copy()
+    seen[:, 0] = np.minimum(seen[:, 0], top)
+    there = changed(setting, seen)
+    effect = Clipping.of(there)
+    level = np.log(8.0) + np.log(effect.top / np.minimum([top, np.inf, np.inf], 8 * effect.top))
+    model = Model(there.pixels, there.brdfs).with_effect(Anisotropy.of(there), numbers)
+    model = model.with_effect(effect, level)
+    found, _ = drained(corrected(table_of(there), there.pixels, model, there))
+    filled = found.select(~found.read)
+    clear = shown[rows_of(filled, there), 0] > 1.05 * top
+    truth = there.brdfs.evaluate(filled.angles, np.zeros(len(filled), np.int16))
+    assert clear.sum() > 40
+    np.testing.assert_allclose(filled.rho[clear], truth[clear], rtol=0.01)
 
 
 def test_a_photo_that_is_not_clipped_says_what_arrived_though_the_prediction_is_beyond():

@@ -28,9 +28,11 @@ from patina.core.diagnose.effects.vignetting import Vignetting
 from patina.core.diagnose.found import Found
 from patina.core.diagnose.held_out import predict_unseen, variances
 from patina.core.diagnose.model import Model
+from patina.core.diagnose.pixels import Pixels
 from patina.core.diagnose.situation import Situation
 from patina.core.diagnose.slopes import slopes_of
 from patina.core.diagnose.solve import fit
+from patina.core.diagnose.unseen_error import unseen_photos_error
 from patina.core.job.crew import crew
 from patina.core.steps import drained
 from tests.make_lit_ball import NOISE, SIZE, changed, lit_ball, shadowed
@@ -64,6 +66,29 @@ def test_a_lamp_that_drifts_is_named_and_measured():
     doubted = replace(found, doubted={"light_intensity": "errors grow by 8 %"})
     assert doubted.causes == () and doubted.accepted == found.accepted
     assert "errors grow by 8 %" in doubted.sentence(found.accepted[0])
+
+
+def test_left_out_photos_are_predicted_with_their_own_exposure_and_shadows():
+    """As many pixels as a diagnosis looks at: every photo's gain is far better known than a prior,
+    and still it is known of its own photo alone."""
+    one = lit_ball(1)
+    pixels = Pixels.join([one.pixels, *(lit_ball(k).pixels for k in (20, 21, 22))])
+    setting = replace(one, pixels=pixels)
+    drift = np.array([0.0, 0.08, -0.05, 0.03, 0.06, -0.12])
+    drifting = changed(setting, pixels.observed * np.exp(drift)[pixels.photo][:, None])
+    shaded = shadowed(setting, 2, 0.2, 0.8)
+    for there, kind in ((drifting, LightIntensity), (shaded, CastShadow)):
+        deviation = pixel_deviation(there.pixels, there.brdfs, np.radians(0.2))
+        plain = fit(Model(there.pixels, there.brdfs), deviation)
+        effect = kind.of(there)
+        start = effect.guess(there.pixels.observed - plain.shown, plain.shown)
+        with_it = fit(plain.model.with_effect(effect, start), deviation)
+        before, after = unseen_photos_error(plain), unseen_photos_error(with_it)
+        known = replace(with_it, model=with_it.model.settled())  # pixels of no spot stay as dark
+        assert after < 1.05 * unseen_photos_error(known) < 0.6 * before
+        if kind is LightIntensity:
+            bare = fit(Model(setting.pixels, setting.brdfs), deviation)
+            assert after < 1.2 * unseen_photos_error(bare)
 
 
 def test_without_what_is_doubted_the_rest_is_told_as_it_is_then_found():

@@ -41,6 +41,15 @@ def test_tangent_directions_are_those_of_the_half_vector(tilt, expected):
     assert np.isnan(half_vector_turns(below)).all()
 
 
+def test_what_is_flat_has_no_tangent_direction_off_its_own_axis():
+    setting = lit_ball()
+    up = np.broadcast_to(np.float32([0, 0, 1]), setting.pixels.normal.shape)
+    flat = replace(setting, pixels=replace(setting.pixels, normal=up))
+    (upright,) = [c for c in coordinates(flat) if c.name == "tangent direction, off z"]
+    shown = np.ones_like(setting.pixels.observed)
+    assert not len(trend(upright, 0 * shown, shown, 0.01 * shown, setting.pixels.block).at)
+
+
 def test_a_trend_is_what_was_put_there():
     """3 % more light for each half diagonal, in photos of 1 % noise."""
     setting = lit_ball(3)

@@ -64,7 +64,7 @@ def solved(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Solve
     fractions = []
     while job.step():
         fractions.append(job.now.fraction)
-    assert len(fractions) > VIEWS  # no step waits for more than a photo's features
+    assert len(fractions) > VIEWS  # a step that waited for a whole stage would come a few times
     assert fractions == sorted(fractions) and min(fractions) >= 0 and max(fractions) <= 1
     out = tmp_path_factory.mktemp("solved")
     job.solution.write(out, out, scene / "photos")

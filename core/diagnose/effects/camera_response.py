@@ -22,6 +22,7 @@ class CameraResponse(Effect):
 
     grey: float
     cause = "camera_response"
+    of_camera = True
     proof = "two photos of one view, one of them at half the exposure"
 
     @classmethod

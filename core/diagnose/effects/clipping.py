@@ -21,6 +21,7 @@ class Clipping(Effect):
     top: Array
     observed: Array
     cause = "clipping"
+    of_camera = True
     proof = "one photo of each view at a quarter of the exposure"
     of_highlights = True
     fine = True  # highlights lie in a few squares of the photos

@@ -18,6 +18,7 @@ class VeilingGlare(Effect):
 
     veil: Array
     cause = "veiling_glare"
+    of_camera = True
     of_photo = True
     accuracy = 0.03  # the veil lies over the photo that it is taken from
     proof = "one photo with a hood on the lens and black behind the object"

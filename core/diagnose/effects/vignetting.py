@@ -16,6 +16,7 @@ class Vignetting(Effect):
 
     r2: Array
     cause = "vignetting"
+    of_camera = True
     proof = "one photo with the object in a corner"
 
     @classmethod
