@@ -40,8 +40,9 @@ FARTHEST = 3.0  # factor by which a prediction may correct
 def corrected(
     table: SampleTable, pixels: Pixels, model: Model, setting: Setting, tilt: float = 0.0
 ) -> Generator[float, None, tuple[SampleTable, dict[int, float]]]:
-    """Samples (n,) → (those, m ≤ n, that can be corrected, for each photo the RMS of the radiance
-    of those, as it shows it, over that of all the light they show); yields the fraction done.
+    """Samples (n,) → (those, m ≤ n, that can be corrected, for each photo the RMS of what it tells
+    of the lamp's light on those, as it shows it, over that of all that it shows of them); yields
+    the fraction done.
     pixels: of the samples (of_samples.py); model: with the effects, at its optimum; setting: that
     it was made for; tilt: radians along each tangent that the scan's normals are off by."""
     parts = []
@@ -77,8 +78,8 @@ def elsewhere(model: Model, setting: Setting, near: Near) -> Model:
 def _corrected(
     table: SampleTable, model: Model, tilt: float
 ) -> tuple[SampleTable, Array, Array]:
-    """(samples, squares of their radiance as the photos show it, and of all that they show; 0 of
-    what they do not tell)."""
+    """(samples, squares of their radiance as the photos show it, 0 of what they do not tell, and of
+    all that they show)."""
     now = model.situation()
     lamps = model.lamps(now)
     reflected = model.reflected(lamps)
@@ -130,9 +131,9 @@ def _corrected(
         light=np.asarray(now.light, np.float32),
         response=(table.response * response).astype(np.float32),
     ).select(rows)
-    counted = found.weight * found.read
-    left, whole = (counted * np.sum(each[rows] ** 2, axis=1) for each in (lamp, table.radiance))
-    return found, left, whole
+    # what is clipped is shown as it is predicted: no miss, but a part of what the photo shows
+    left, whole = (found.weight * np.sum(e[rows] ** 2, axis=1) for e in (lamp, table.radiance))
+    return found, left * found.read, whole
 
 
 def _response(model: Model, now: Situation, entering: Array) -> tuple[Array, Array]:

@@ -20,7 +20,7 @@ from .beside import beside
 from .diagnose_job import DiagnoseJob, normal_deviation
 from .fit_job import CaptureResult, MaterialResult, with_portable
 from .job import Job, Step, finished
-from .refused import Again, seen_jointly, worse
+from .refused import Again, Refusal, seen_jointly, worse
 
 STAGE = "fitting with what was found"
 FEWEST = 50  # samples of a material that are left
@@ -29,7 +29,8 @@ CORRECTING = 0.3  # of the time
 
 class RefitJob(Job):
     """``result`` is the fit with the effects in the model; where none is, the fit as it was.
-    ``doubted`` are causes that were left out for what they do to unseen photos, and what that is.
+    ``doubted`` are causes that were left out for what they do to unseen photos, and what that is;
+    ``unused`` are those of which only the second fit makes nothing.
 
     checked: a finished diagnosis. without: causes that it named and that are left out. exactly: the
     rest is taken into account even where unseen photos are then predicted worse. portable: whether
@@ -50,6 +51,7 @@ class RefitJob(Job):
         self.portable = portable
         self.result: CaptureResult | None = None
         self.doubted: dict[str, str] = {}
+        self.unused: dict[str, str] = {}
 
     def run(self) -> Iterator[Step]:
         """With all causes; where unseen photos are then predicted worse, without the one of them
@@ -66,15 +68,18 @@ class RefitJob(Job):
                 stands = again, model
                 break
             left_out.append(chosen.pop())
-            self.doubted[left_out[-1].effect.cause] = refusal
+            told = self.doubted if refusal.of_cause else self.unused
+            told[left_out[-1].effect.cause] = refusal.words
         for trial in left_out[-2::-1]:
             more = [t for t in order if t in chosen or t is trial]
             again, model, refusal = yield from self._with(before, found, more, begin)
             begin += 0.5 * (1 - begin)
             if refusal is None:
                 chosen, stands = more, (again, model)
-                del self.doubted[trial.effect.cause]
-        said = [f"{c} is not taken into account: {why}" for c, why in self.doubted.items()]
+                for told in (self.doubted, self.unused):
+                    told.pop(trial.effect.cause, None)
+        reasons = {**self.doubted, **self.unused}.items()
+        said = [f"{cause} is not taken into account: {why}" for cause, why in reasons]
         if stands is None:
             materials = [replace(m, warnings=(*m.warnings, *said)) for m in before.materials]
             yield from self._finish(before, materials, begin)
@@ -101,7 +106,7 @@ class RefitJob(Job):
 
     def _with(
         self, before: CaptureResult, found: Found, chosen: Sequence[Trial], done: float
-    ) -> Generator[Step, None, tuple[list[Again], Model, str | None]]:
+    ) -> Generator[Step, None, tuple[list[Again], Model, Refusal | None]]:
         """Second fits, the model they are of, and why they are refused; done: of the job, of which
         this takes half the rest."""
         step = Step(STAGE, done)

@@ -15,6 +15,17 @@ from ..fit.held_out import HeldOut
 from .fit_job import MaterialResult
 
 MORE = 0.03  # ln of what errors of unseen photos may grow by
+USELESS = 0.1  # the same of the second fit alone, whatever the causes are worth
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """words: what speaks against a second fit; of_cause: whether it speaks against what it was rid
+    of, too. Else that is there, but what is known of it does not tell the materials better: under a
+    lamp as wide as a highlight none is seen."""
+
+    words: str
+    of_cause: bool
 
 
 @dataclass(frozen=True)
@@ -39,8 +50,8 @@ def seen_jointly(found: Found, fitted: Fitted) -> float:
 
 def worse(
     before: Sequence[MaterialResult], after: Sequence[Again], jointly: float = 0.0
-) -> str | None:
-    """In words, where unseen photos are predicted worse than without.
+) -> Refusal | None:
+    """Where unseen photos are predicted worse than without.
 
     Every photo counts alike, beside itself without the causes: over all photos together, the worst
     would decide. Both errors are relative to all that a photo shows: in light that a steep curve
@@ -57,13 +68,16 @@ def worse(
     ]
     errors = [each for each in judged if each is not None]
     grown = [_grown(*each) for each in errors]
-    if not grown or np.mean(grown) + jointly < MORE:
+    mean = float(np.mean(grown)) if grown else -np.inf
+    of_cause = mean + jointly > MORE
+    if not of_cause and mean < USELESS:
         return None
     said = ", ".join(f"{100 * a:.1f} to {100 * b:.1f} %" for a, b in errors)
-    return (
+    words = (
         f"with it, unseen photos are predicted worse: a usual one's error goes from {said}, and by "
         f"{100 * np.expm1(jointly):+.0f} % where materials and causes are fitted at once"
     )
+    return Refusal(words, of_cause)
 
 
 def _by_photo(

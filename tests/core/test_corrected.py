@@ -115,7 +115,12 @@ def test_what_is_clipped_is_predicted_and_no_evidence():
     for nothing where unseen photos are judged; the other channels stay what the photo says."""
     setting, model, truth = clipped_ball(4, 0.15)
     top = setting.pixels.observed[:, 0].max()
-    found, _ = drained(corrected(table_of(setting), setting.pixels, model, setting))
+    found, light = drained(corrected(table_of(setting), setting.pixels, model, setting))
+    for k, part in light.items():
+        mine = found.photo == k
+        seen = np.sum(setting.pixels.observed[rows_of(found, setting)][mine] ** 2, axis=1)
+        told = np.sum(seen * found.read[mine]) / np.sum(seen)  # what is clipped is no miss
+        assert part == pytest.approx(np.sqrt(told), rel=1e-3) and part < 1
     above = int(np.sum(truth[:, 0] > 1.02 * top))
     filled = found.select(~found.read)
     assert len(filled) > 0.95 * above > 40
