@@ -62,7 +62,7 @@ def diagnose_to_folder(
 
 
 def _tell_causes(found: Found) -> None:
-    for trial in found.told:
+    for trial in found.noted:
         print(f"{trial.effect.cause}: {found.sentence(trial)}")
     if found.unexplained:
         print(f"unknown: {found.left.sentence()}")

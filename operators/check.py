@@ -57,7 +57,7 @@ explain, name the cause, and fit again with it in the model"""
         mesh, vertices = scene.patina.mesh, setting.rays.mesh.vertices
         if mesh is not None and not paint_evidence(mesh, vertices, setting.pixels, found):
             self.report({"WARNING"}, f"{mesh.name} no longer has the scan's vertices: not coloured")
-        for trial in found.told:
+        for trial in found.noted:
             self.report({"WARNING"}, f"{trial.effect.cause}: {found.sentence(trial)}")
         if not found.causes:
             self.report({"INFO"}, "Nothing that can be named is wrong")

@@ -57,7 +57,7 @@ def _row(label: str, path: Path) -> list[str]:
         f"{whole:.0f}, {search:.0f} |",
         flush=True,
     )
-    said = [found.sentence(trial) for trial in found.told]
+    said = [found.sentence(trial) for trial in found.noted]
     if found.unexplained:
         said.append(found.left.sentence())
     for before, material in zip(job.checked.result.materials, after.materials, strict=True):

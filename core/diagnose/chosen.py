@@ -35,13 +35,14 @@ def with_causes(found: Found, causes: Collection[str]) -> Fitted:
     return fit(model, found.before.deviation)
 
 
-def doubting(found: Found, doubted: Mapping[str, str]) -> Found:
+def doubting(found: Found, doubted: Mapping[str, str], fitted: Fitted | None = None) -> Found:
     """What is left to say where some causes are doubted (Found.doubted): the others have the
-    numbers that are found without these (gains stay what they are missed by in the whole model)."""
+    numbers that are found without these (gains stay what they are missed by in the whole model).
+    fitted: with some of the causes, which is taken where they are the right ones."""
     if not doubted:
         return found
     sound = {t.effect.cause for t in found.accepted}.difference(doubted)
-    after = with_causes(found, sound)
+    after = with_causes(found if fitted is None else replace(found, after=fitted), sound)
     unseen = predict_unseen(after)
 
     def anew(trial: Trial) -> Trial:

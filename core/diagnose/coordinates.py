@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles.vectors import dot
+from .along_surface import axes_along, half_vector_along
 from .effect import Setting
 from .pixels import Pixels
 from .situation import Situation
@@ -79,10 +80,7 @@ def half_vector_turns(pixels: Pixels) -> Array:
     90 across: what is brushed or woven reflects otherwise along than across. NaN where the half
     vector or the axis stands upright."""
     normal = pixels.normal.astype(np.float64)
-    half = pixels.light + pixels.view
-    half = half / np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-9)
-    flat = half - normal * dot(half, normal)[:, None]
-    axes = np.eye(3) - normal[:, :, None] * normal[:, None, :]  # (n, axis, 3)
+    flat, axes = half_vector_along(normal, pixels.light, pixels.view), axes_along(normal)
     sizes = np.linalg.norm(flat, axis=1)[:, None], np.linalg.norm(axes, axis=2)
     along = np.abs(np.einsum("nax,nx->na", axes, flat)) / np.maximum(sizes[0] * sizes[1], 1e-12)
     there = (sizes[0] > np.sin(UPRIGHT)) & (sizes[1] > np.sin(UPRIGHT))

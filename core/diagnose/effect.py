@@ -86,10 +86,11 @@ class Setting:
     """What effects are made for. light: (photos,) which of the lights lit each. lights: their
     names; distant: which of them are. centre: (3,) of what the photos show; size: its extent, scan
     units. level: typical irradiance. scale: (materials,) what each material's reflectance was
-    multiplied by, and irradiance on it divided by, where that is not known. brdfs: before any
-    effect. rays: the scan's mesh. sights: directions of either kind (surroundings.py) that a pixel
-    looks into: what sums over too few of them are off by is no light, and dilutes what is found of
-    the light that is there (of a bounce half at 20, a twentieth at 100)."""
+    multiplied by, and irradiance on it divided by, where that is not known; materials: their
+    names. brdfs: before any effect. rays: the scan's mesh. sights: directions of either kind
+    (surroundings.py) that a pixel looks into: what sums over too few of them are off by is no
+    light, and dilutes what is found of the light that is there (of a bounce half at 20, a twentieth
+    at 100)."""
 
     pixels: Pixels
     brdfs: BRDFs

@@ -136,7 +136,7 @@ class Found:
         return tuple(t for t in self.accepted if t.effect.cause not in self.doubted)
 
     @property
-    def told(self) -> tuple[Trial, ...]:
+    def noted(self) -> tuple[Trial, ...]:
         """Those that something is to be said of."""
         return tuple(t for t in self.ranked if t in self.accepted or t.effect.cause in self.doubted)
 

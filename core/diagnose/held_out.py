@@ -92,7 +92,7 @@ def _keeping_own(
 ) -> Change:
     """The step without a part of the photos, but for numbers that no other part tells of. What all
     of them have in common, and the BRDF could as well have, they follow."""
-    unknown = _told_by(part.own, [p.own for p in parts])
+    unknown = _told_alone_by(part.own, [p.own for p in parts])
     x, at = change.x.copy(), 0
     for place in fitted.model.everywhere:
         effect = fitted.model.effects[place]
@@ -102,13 +102,13 @@ def _keeping_own(
             alike = np.flatnonzero((anchor[k] != 0) & ~lost)
             x[at + k] = change.x[at + alike].mean() if len(alike) else 0.0
         at += count
-    gone = _told_by(part.local, [p.local for p in parts]).ravel()
+    gone = _told_alone_by(part.local, [p.local for p in parts]).ravel()
     return replace(change, x=x, local=np.where(gone, 0.0, change.local))
 
 
-def _told_by(part: Array, parts: Sequence[Array]) -> NDArray[np.bool_]:
-    """(..., e) numbers of which hardly anything is known without a part; (..., e, e) each: what
-    pixels say of them, the numbers alone."""
+def _told_alone_by(part: Array, parts: Sequence[Array]) -> NDArray[np.bool_]:
+    """(..., e) whether hardly anything is known of a number without this part; (..., e, e) each:
+    what the parts' pixels say of the numbers, were all else known."""
     mine, whole = (np.diagonal(each, axis1=-2, axis2=-1) for each in (part, sum(parts)))
     return np.asarray(whole - mine < whole / STILL_KNOWN)
 

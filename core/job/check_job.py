@@ -37,5 +37,7 @@ class CheckJob(Job):
             step = Step(inner.stage, SHARE + (1 - SHARE) * inner.fraction)
             yield step
         found = finished(self.checked.found)
-        self.checked.found = yield from beside(lambda: doubting(found, again.doubted), step)
+        self.checked.found = yield from beside(
+            lambda: doubting(found, again.doubted, again.fitted), step
+        )
         self.result = again.result

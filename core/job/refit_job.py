@@ -9,6 +9,7 @@ import numpy as np
 
 from ..diagnose.chosen import can_be_applied, with_causes
 from ..diagnose.corrected import corrected
+from ..diagnose.fitted import Fitted
 from ..diagnose.found import Found, Trial
 from ..diagnose.model import Model
 from ..diagnose.of_samples import pixels_of_samples
@@ -30,7 +31,8 @@ CORRECTING = 0.3  # of the time
 class RefitJob(Job):
     """``result`` is the fit with the effects in the model; where none is, the fit as it was.
     ``doubted`` are causes that were left out for what they do to unseen photos, and what that is;
-    ``unused`` are those of which only the second fit makes nothing.
+    ``unused`` are those of which only the second fit makes nothing. ``fitted`` is the joint fit
+    that the second one rests on, None where it rests on none.
 
     checked: a finished diagnosis. without: causes that it named and that are left out. exactly: the
     rest is taken into account even where unseen photos are then predicted worse. portable: whether
@@ -52,6 +54,7 @@ class RefitJob(Job):
         self.result: CaptureResult | None = None
         self.doubted: dict[str, str] = {}
         self.unused: dict[str, str] = {}
+        self.fitted: Fitted | None = None
 
     def run(self) -> Iterator[Step]:
         """With all causes; where unseen photos are then predicted worse, without the one of them
@@ -59,38 +62,37 @@ class RefitJob(Job):
         before, found = finished(self.checked.result), finished(self.checked.found)
         order = [t for t in can_be_applied(found) if t.effect.cause not in self.without]
         chosen, left_out = list(order), list[Trial]()
-        stands: tuple[list[Again], Model] | None = None
+        again: list[Again] = []
         begin = 0.0
         while chosen:
-            again, model, refusal = yield from self._with(before, found, chosen, begin)
+            again, fitted, refusal = yield from self._with(before, found, chosen, begin)
             begin += 0.5 * (1 - begin)
             if refusal is None:
-                stands = again, model
+                self.fitted = fitted
                 break
             left_out.append(chosen.pop())
             told = self.doubted if refusal.of_cause else self.unused
             told[left_out[-1].effect.cause] = refusal.words
         for trial in left_out[-2::-1]:
             more = [t for t in order if t in chosen or t is trial]
-            again, model, refusal = yield from self._with(before, found, more, begin)
+            other, fitted, refusal = yield from self._with(before, found, more, begin)
             begin += 0.5 * (1 - begin)
             if refusal is None:
-                chosen, stands = more, (again, model)
+                chosen, again, self.fitted = more, other, fitted
                 for told in (self.doubted, self.unused):
                     told.pop(trial.effect.cause, None)
         reasons = {**self.doubted, **self.unused}.items()
         said = [f"{cause} is not taken into account: {why}" for cause, why in reasons]
-        if stands is None:
+        if self.fitted is None:
             materials = [replace(m, warnings=(*m.warnings, *said)) for m in before.materials]
             yield from self._finish(before, materials, begin)
             return
-        again, model = stands
         materials = [
             replace(m, warnings=(*m.warnings, *a.warnings, *said))
             for m, a in zip(_proposed(before, again), again, strict=True)
         ]
         taken = chosen if any(a.material is not None for a in again) else []
-        used = tuple(_applied(trial, model) for trial in taken)
+        used = tuple(_applied(trial, self.fitted.model) for trial in taken)
         yield from self._finish(replace(before, effects=used), materials, begin)
 
     def _finish(
@@ -106,9 +108,9 @@ class RefitJob(Job):
 
     def _with(
         self, before: CaptureResult, found: Found, chosen: Sequence[Trial], done: float
-    ) -> Generator[Step, None, tuple[list[Again], Model, Refusal | None]]:
-        """Second fits, the model they are of, and why they are refused; done: of the job, of which
-        this takes half the rest."""
+    ) -> Generator[Step, None, tuple[list[Again], Fitted, Refusal | None]]:
+        """Second fits, the joint fit they are of, and why they are refused; done: of the job, of
+        which this takes half the rest."""
         step = Step(STAGE, done)
         yield step
         causes = [trial.effect.cause for trial in chosen]
@@ -124,9 +126,9 @@ class RefitJob(Job):
                 one = Again(None, {}, (said,))
             again.append(one)
         if self.exactly:
-            return again, fitted.model, None
+            return again, fitted, None
         jointly = yield from beside(lambda: seen_jointly(found, fitted), step)
-        return again, fitted.model, worse(before.materials, again, jointly)
+        return again, fitted, worse(before.materials, again, jointly)
 
     def _again(
         self, index: int, material: MaterialResult, model: Model, start: float, share: float

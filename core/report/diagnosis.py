@@ -157,7 +157,7 @@ def _row(trial: Trial, found: Found) -> str:
     named = trial in found.named
     sure = trial.gain / max(trial.error, 1e-9)
     width = int(np.clip(12 * sure, 0, 160))
-    said = found.sentence(trial) if trial in found.told else ""
+    said = found.sentence(trial) if trial in found.noted else ""
     style = "background:#2f6fb0" if named else "background:#bbb"
     return (
         f"<tr><th>{escape(trial.effect.cause)}</th><td>{sure:.1f}</td><td><div style='height:10px;"

@@ -126,7 +126,10 @@ def test_what_is_clipped_is_predicted_and_no_evidence():
     assert len(filled) > 0.95 * above > 40
     predicted = setting.brdfs.evaluate(filled.angles, np.zeros(len(filled), np.int16))
     level = top / (filled.irradiance * filled.cos_i[:, None])[:, 0]
-    np.testing.assert_allclose(filled.rho[:, 0], np.maximum(predicted[:, 0], level), rtol=0.02)
+    beyond = predicted[:, 0] > level  # the rest is at the plateau by its noise alone
+    assert beyond.sum() > 0.8 * above
+    np.testing.assert_allclose(filled.rho[beyond, 0], predicted[beyond, 0], rtol=1e-3)
+    np.testing.assert_allclose(filled.rho[~beyond, 0], level[~beyond], rtol=0.02)
     own = truth[rows_of(filled, setting)]
     np.testing.assert_allclose(filled.radiance[:, 1:], own[:, 1:], rtol=1e-3)
     photo = int(filled.photo[0])

@@ -128,7 +128,7 @@ def test_a_curve_that_one_material_contradicts_is_doubted():
     found = searched(two, kinds=(CameraResponse, Vignetting))
     assert "camera_response" not in found.causes
     assert "clay" in found.doubted["camera_response"]
-    (trial,) = [t for t in found.told if t.effect.cause == "camera_response"]
+    (trial,) = [t for t in found.noted if t.effect.cause == "camera_response"]
     assert trial.gain > 0 and trial.against == (1,) and "clay" in found.sentence(trial)
     both = replace(two, pixels=replace(two.pixels, observed=curved.astype(np.float32)))
     assert searched(both, kinds=(CameraResponse, Vignetting)).causes == ("camera_response",)

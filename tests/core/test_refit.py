@@ -121,7 +121,8 @@ def test_what_unseen_photos_speak_against_is_left_out(monkeypatch, order, guilty
         yield Step("fitting", done)
         again = [Again(Material(("again",)), {}, ())]
         worse = any(t.effect.cause in guilty for t in taken)
-        return again, None, Refusal("errors grow by 8 %", of_cause) if worse else None
+        refusal = Refusal("errors grow by 8 %", of_cause) if worse else None
+        return again, SimpleNamespace(model=None), refusal
 
     monkeypatch.setattr(refit_job.RefitJob, "_with", fitted)
     checked = SimpleNamespace(result=Result((Material(("first",)),)), found=SimpleNamespace())

@@ -6,6 +6,7 @@ from __future__ import annotations
 import shutil
 import time
 import tomllib
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -61,10 +62,13 @@ def solved(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Solve
     (scene / "photos" / "torn.jpg").write_bytes(b"\xff\xd8\xff\xe0 no picture")
     (scene / "photos" / "notes.txt").write_text("not a photo")
     job = SolveJob(scene / "photos", threads=2)
-    fractions = []
+    fractions, stages = [], Counter()
     while job.step():
         fractions.append(job.now.fraction)
-    assert len(fractions) > VIEWS  # a step that waited for a whole stage would come a few times
+        stages[job.now.stage] += 1
+    # the window goes on meanwhile: no step waits for a stage, nor for more than a few photos
+    assert stages["finding features"] > VIEWS // 2
+    assert stages["matching"] > 3 and stages["placing cameras"] > 3
     assert fractions == sorted(fractions) and min(fractions) >= 0 and max(fractions) <= 1
     out = tmp_path_factory.mktemp("solved")
     job.solution.write(out, out, scene / "photos")

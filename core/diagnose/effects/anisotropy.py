@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..along_surface import axes_along, half_vector_along
 from ..effect import Array, Effect, Numbers, Setting
 from ..situation import Situation
 
@@ -22,7 +23,7 @@ class Anisotropy(Effect):
     @classmethod
     def of(cls, setting: Setting) -> Anisotropy:
         n = setting.pixels.normal.astype(np.float64)
-        axes = np.eye(3)[None] - n[:, :, None] * n[:, None, :]
+        axes = axes_along(n)
         return cls(axes / np.maximum(np.linalg.norm(axes, axis=2, keepdims=True), 1e-3))
 
     @property
@@ -30,9 +31,7 @@ class Anisotropy(Effect):
         return Numbers.alike(["x", "y", "z"], "ln", 0.3, -2.0, 2.0)
 
     def before(self, now: Situation, x: np.ndarray) -> Situation:
-        half = now.light + now.pixels.view
-        half = half / np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-9)
-        flat = half - now.normal * np.sum(half * now.normal, axis=1, keepdims=True)
+        flat = half_vector_along(now.normal, now.light, now.pixels.view)
         flat = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9)
         along = np.einsum("nax,nx->na", self.axes, flat)
         stretch = (along**2 - 0.5) @ x
