@@ -41,7 +41,9 @@ def draw_check(
         switch = causes.get(cause["cause"])
         if switch is not None and cause["accepted"]:
             row.prop(switch, "use", text="")
-        row.progress(text=name, factor=min(max(_sure(cause) / max(most, 1e-9), 0), 1), type="BAR")
+        bar = row.row()
+        bar.active = cause["accepted"] and not cause.get("doubted")  # else grey, as in the report
+        bar.progress(text=name, factor=min(max(_sure(cause) / max(most, 1e-9), 0), 1), type="BAR")
         if cause["accepted"]:
             row.operator("patina.show_evidence", text="", icon="HIDE_OFF").cause = cause["cause"]
         if cause["accepted"] or cause.get("doubted"):

@@ -2,15 +2,15 @@
 
 What the camera did is taken back by one Newton step about the prediction, which no noise can throw
 far; light that was added is subtracted; directions, irradiance and shadows are what the effects
-make them; and what a lamp's size or a stretched highlight does is a ratio of two predictions. Of
-a channel that is clipped nothing can be taken back: it stands as the joint fit draws it
-(beyond_plateau.py), and counts as no evidence of what unseen photos show.
+make them. What a lamp's size or a brushed surface does to highlights stays in the samples: blur.py
+takes it back. Of a channel that is clipped nothing can be taken back: it stands as the joint fit
+draws it (beyond_plateau.py), and counts as no evidence of what unseen photos show.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from dataclasses import replace
+from collections.abc import Generator, Iterator, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from ..angles import half_difference
 from ..angles.vectors import dot
 from ..samples import SampleTable
 from .beyond_plateau import beyond_plateau, plateau_of
+from .blur import Blur, Blurred, blurred, blurs
 from .effect import Near, Setting
 from .model import Model
 from .of_samples import nearest
@@ -34,34 +35,55 @@ LEAST_RESPONSE = 0.2  # ∂ ln recorded/∂ ln light: less is a plateau, or the 
 STEPS = 4  # of Newton, where the prediction is beyond a plateau
 AT_PLATEAU = 0.03  # so near, relative, is at it
 LEAST_COS, LEAST_LIGHT = 0.05, 0.5  # θi; part of the lamp's light that arrives
-FARTHEST = 3.0  # factor by which a prediction may correct
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """table: samples (m,) that can be corrected; light: for each photo the RMS of what it tells of
+    the lamp's light on those, as it shows it, over that of all that it shows of them; blur: of
+    their highlights, None where there is none."""
+
+    table: SampleTable
+    light: Mapping[int, float]
+    blur: Blur | None
 
 
 def corrected(
     table: SampleTable, pixels: Pixels, model: Model, setting: Setting, tilt: float = 0.0
-) -> Generator[float, None, tuple[SampleTable, dict[int, float]]]:
-    """Samples (n,) → (those, m ≤ n, that can be corrected, for each photo the RMS of what it tells
-    of the lamp's light on those, as it shows it, over that of all that it shows of them); yields
-    the fraction done.
+) -> Generator[float, None, Corrected]:
+    """Of samples (n,), photo by photo; yields the fraction done.
     pixels: of the samples (of_samples.py); model: with the effects, at its optimum; setting: that
     it was made for; tilt: radians along each tangent that the scan's normals are off by."""
-    parts = []
+    parts, wide = [], list[Blurred]()
+    blur = blurs(model)
     near = nearest(pixels, setting.pixels, setting.size)
-    # of a photo that the diagnosis did not look at nothing is known
-    known = np.flatnonzero(setting.pixels.photo[near.photo] == pixels.photo)
-    for start in range(0, len(known), CHUNK):
-        yield start / len(known)
-        rows = known[start : start + CHUNK]
+    done = 0
+    for rows in _chunks(pixels, near, setting):
+        yield done / len(pixels)
+        done += len(rows)
         here = replace(setting, pixels=pixels.select(rows), brdfs=model.brdfs, sights=SIGHTS)
         moved = elsewhere(model, here, near.select(rows))
-        parts.append(_corrected(table.select(rows), moved, tilt))
+        *part, good = _corrected(table.select(rows), moved, tilt)
+        parts.append(part)
+        if blur:
+            wide.append(blurred(int(table.photo[rows[0]]), moved, good))
     if not parts:
-        return SampleTable.empty(), {}
+        return Corrected(SampleTable.empty(), {}, None)
     tables, left, whole = zip(*parts, strict=True)
     found = SampleTable.concatenate(tables)
     of_lamp, of_all = (np.bincount(found.photo, np.concatenate(each)) for each in (left, whole))
     ratio = np.sqrt(of_lamp / np.maximum(of_all, 1e-30))
-    return found, {int(photo): float(ratio[photo]) for photo in np.unique(found.photo)}
+    light = {int(photo): float(ratio[photo]) for photo in np.unique(found.photo)}
+    return Corrected(found, light, Blur(tuple(wide)) if blur else None)
+
+
+def _chunks(pixels: Pixels, near: Near, setting: Setting) -> Iterator[NDArray[np.intp]]:
+    """Of one photo each. Of a photo that the diagnosis did not look at nothing is known."""
+    known = setting.pixels.photo[near.photo] == pixels.photo
+    for photo in np.unique(pixels.photo[known]):
+        rows = np.flatnonzero(known & (pixels.photo == photo))
+        for start in range(0, len(rows), CHUNK):
+            yield rows[start : start + CHUNK]
 
 
 def elsewhere(model: Model, setting: Setting, near: Near) -> Model:
@@ -77,9 +99,9 @@ def elsewhere(model: Model, setting: Setting, near: Near) -> Model:
 
 def _corrected(
     table: SampleTable, model: Model, tilt: float
-) -> tuple[SampleTable, Array, Array]:
+) -> tuple[SampleTable, Array, Array, NDArray[np.intp]]:
     """(samples, squares of their radiance as the photos show it, 0 of what they do not tell, and of
-    all that they show)."""
+    all that they show, the rows that they are of)."""
     now = model.situation()
     lamps = model.lamps(now)
     reflected = model.reflected(lamps)
@@ -101,14 +123,12 @@ def _corrected(
         arrived = entering + (table.radiance - recorded) / response
     at = np.where(clipped, plateau, np.inf)
     drawn = beyond_plateau(model, now, added, at, arrived, tilt)
+    if blurs(model):  # what is drawn is of a point, not stretched
+        point = model.brdfs.reflected(replace(now, stretch=None))
+        drawn *= reflected / np.maximum(point, 1e-30)
     radiance = np.where(clipped, drawn, arrived - added)
     response = np.where(clipped, 0, response)
     lamp = response * radiance
-    if len(lamps) > 1 or now.stretch is not None:  # what is drawn is of a point, not stretched
-        point = model.brdfs.reflected(replace(now, stretch=None))
-        ratio = np.where(clipped, 1, point / np.maximum(reflected, 1e-30))
-        good &= ((ratio < FARTHEST) & (ratio > 1 / FARTHEST)).all(axis=1)
-        radiance, response = radiance * ratio, response / ratio
     cos_i = dot(now.normal, now.light)
     cos_o = dot(now.normal, table.view)
     good &= (cos_i > LEAST_COS) & (cos_o > LEAST_COS) & (now.visible > LEAST_LIGHT)
@@ -133,7 +153,7 @@ def _corrected(
     ).select(rows)
     # what is clipped is shown as it is predicted: no miss, but a part of what the photo shows
     left, whole = (found.weight * np.sum(e[rows] ** 2, axis=1) for e in (lamp, table.radiance))
-    return found, left * found.read, whole
+    return found, left * found.read, whole, rows
 
 
 def _response(model: Model, now: Situation, entering: Array) -> tuple[Array, Array]:

@@ -155,6 +155,7 @@ class Effect(ABC):
     fine = False  # judged on single pixels of the photos: only those beside one tell of it
     of_photo = False  # whether it needs what the photo shows about a pixel
     accuracy = 0.0  # what its own sums may be off by, relative
+    blurs = False  # whether it makes highlights wider than the material does
     of_camera = False  # whether the camera does it, which knows nothing of materials
     of_brdf = False  # whether it is made of the BRDFs, and made anew when they are known better
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,9 @@ from ..errors import FitError
 from ..predict import predict_radiance
 from ..samples import SampleTable, weighted
 from .paper import PaperSettings, fit_paper
+
+Judge = Callable[[int, PrincipalBRDF], "LeftOut"]
+"""(photo, BRDF that was found without it) → how well it is predicted."""
 
 DARK = 0.05  # of the median radiance: below it relative errors are those of the noise
 
@@ -49,21 +52,31 @@ def photos_to_hold_out(table: SampleTable) -> list[int]:
 
 
 def leave_out(
-    table: SampleTable, photo: int, basis: Basis, settings: PaperSettings
+    table: SampleTable,
+    photo: int,
+    basis: Basis,
+    settings: PaperSettings,
+    judge: Judge | None = None,
 ) -> LeftOut | None:
-    """The paper's fit without a photo, predicting it; None where the rest is too little to fit."""
+    """The paper's fit without a photo, predicting it; None where the rest is too little to fit.
+    judge: how it is predicted, None: ``predicted``."""
     rest = table.select(table.photo != photo)
     try:
         fit = fit_paper(rest, basis, replace(settings, seed=settings.seed + 1))
     except FitError:
         return None
-    return predicted(table, photo, fit.brdf)
+    return predicted(table, photo, fit.brdf) if judge is None else judge(photo, fit.brdf)
 
 
 def predicted(table: SampleTable, photo: int, brdf: PrincipalBRDF) -> LeftOut:
     """How well a BRDF that was found without a photo predicts it, at the scan's own normals."""
     held = table.select((table.photo == photo) & table.read)
-    difference = predict_radiance(brdf, held) - held.radiance
+    return compared(photo, predict_radiance(brdf, held), held)
+
+
+def compared(photo: int, shown: NDArray[np.floating], held: SampleTable) -> LeftOut:
+    """A photo's samples beside the radiance (n, 3) that is predicted of them."""
+    difference = shown - held.radiance
     level = held.radiance.mean(axis=1)
     bright = level > max(DARK * weighted.median(level, held.weight), 0.0)
     weight = held.weight[:, None]

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
+from functools import partial
 
 from ..basis import Basis
 from ..capture import Capture
 from ..fit import PaperFit, fit_paper
-from ..fit.held_out import HeldOut, leave_out, photos_to_hold_out, predicted, summarise
+from ..fit.held_out import (
+    HeldOut,
+    Judge,
+    leave_out,
+    photos_to_hold_out,
+    predicted,
+    summarise,
+)
 from ..fit.measured.estimate import measured_steps
 from ..fit.measured_result import MeasuredResult
 from ..fit.spread import Spread, candidate_spread
@@ -30,14 +38,19 @@ class Estimate:
 Steps = Generator[tuple[str, float], None, Estimate]
 
 
-def estimate(table: SampleTable, basis: Basis, capture: Capture, name: str) -> Steps:
-    """By the capture's method; yields (what comes next, fraction done). Raises FitError."""
+def estimate(
+    table: SampleTable, basis: Basis, capture: Capture, name: str, judge: Judge | None = None
+) -> Steps:
+    """By the capture's method; yields (what comes next, fraction done). judge: how photos that are
+    held out are predicted, None: as the table's samples are. Raises FitError."""
+    if judge is None:
+        judge = partial(predicted, table)
     if capture.fit.method == "paper":
-        return _paper(table, basis, capture, name)
-    return _measured(table, basis, capture, name)
+        return _paper(table, basis, capture, name, judge)
+    return _measured(table, basis, capture, name, judge)
 
 
-def _measured(table: SampleTable, basis: Basis, capture: Capture, name: str) -> Steps:
+def _measured(table: SampleTable, basis: Basis, capture: Capture, name: str, judge: Judge) -> Steps:
     steps = stepped_beside(measured_steps(table, basis))
     while True:
         try:
@@ -51,13 +64,13 @@ def _measured(table: SampleTable, basis: Basis, capture: Capture, name: str) -> 
         yield f"predicting unseen photos of {name}", 0.85 + 0.1 * done / len(unseen)
         other = fit.without.pop(photo, None)  # let go: once evaluated each is a megabyte
         if other is not None:
-            parts.append(predicted(table, photo, other))
+            parts.append(judge(photo, other))
     yield f"how sure {name} is", 0.95
     kept = MeasuredResult.of(fit)
     return Estimate(kept, summarise(parts), kept.band.spread())
 
 
-def _paper(table: SampleTable, basis: Basis, capture: Capture, name: str) -> Steps:
+def _paper(table: SampleTable, basis: Basis, capture: Capture, name: str, judge: Judge) -> Steps:
     yield f"fitting {name}", 0.0
     settings = capture.fit.paper
     fit = yield from beside(lambda: fit_paper(table, basis, settings), (f"fitting {name}", 0.0))
@@ -65,7 +78,7 @@ def _paper(table: SampleTable, basis: Basis, capture: Capture, name: str) -> Ste
     parts = []
     for done, photo in enumerate(unseen):
         yield f"predicting unseen photos of {name}", 0.4 + 0.6 * done / len(unseen)
-        parts.append(leave_out(table, photo, basis, settings))
+        parts.append(leave_out(table, photo, basis, settings, judge))
     lost = [capture.photo_name(p) for p, part in zip(unseen, parts, strict=True) if part is None]
     return Estimate(
         fit=fit,

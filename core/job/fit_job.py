@@ -15,7 +15,7 @@ from ..basis import Basis
 from ..capture import Capture, LightEntry
 from ..errors import FitError
 from ..fit import PaperFit
-from ..fit.held_out import HeldOut
+from ..fit.held_out import HeldOut, Judge
 from ..fit.measured_result import MeasuredResult
 from ..fit.spread import Spread
 from ..geometry import RayScene
@@ -221,12 +221,19 @@ class FitJob(Job):
         )
 
     def fitted_again(
-        self, index: int, table: SampleTable, before: MaterialResult, start: float, share: float
+        self,
+        index: int,
+        table: SampleTable,
+        before: MaterialResult,
+        start: float,
+        share: float,
+        judge: Judge | None = None,
     ) -> Generator[Step, None, MaterialResult]:
-        """A material from other samples, in the unit of those it was fitted to before."""
+        """A material from other samples, in the unit of those it was fitted to before. judge: how
+        photos that are held out are predicted, None: as the samples are."""
         basis, counts = finished(self.result).basis, np.array(before.per_photo)
         unit = before.irradiance_known, before.scale
-        return (yield from self._material(index, table, basis, unit, counts, start, share))
+        return (yield from self._material(index, table, basis, unit, counts, start, share, judge))
 
     def _material(
         self,
@@ -237,12 +244,13 @@ class FitJob(Job):
         counts: NDArray[np.int64],
         start: float,
         share: float,
+        judge: Judge | None = None,
     ) -> Generator[Step, None, MaterialResult]:
         """unit: whether irradiance is known, and the samples' scale; counts: taken of every
         photo."""
         capture, name = self.capture, self.capture.materials[index].name
         known, scale = unit
-        found = yield from self._estimate(index, table, basis, start, 0.8 * share)
+        found = yield from self._estimate(index, table, basis, start, 0.8 * share, judge)
         warnings = material_warnings(table, found.fit, known)
         warnings += trust_warnings(found, capture)
         warnings += black_photos(table, capture) + found.notes
@@ -265,10 +273,16 @@ class FitJob(Job):
         return (yield from with_portable(material, start + 0.8 * share, self.threads))
 
     def _estimate(
-        self, index: int, table: SampleTable, basis: Basis, start: float, share: float
+        self,
+        index: int,
+        table: SampleTable,
+        basis: Basis,
+        start: float,
+        share: float,
+        judge: Judge | None = None,
     ) -> Generator[Step, None, Estimate]:
         """The fit itself, which takes the part ``share`` of the job from ``start`` on."""
-        steps = estimate(table, basis, self.capture, self.capture.materials[index].name)
+        steps = estimate(table, basis, self.capture, self.capture.materials[index].name, judge)
         while True:
             try:
                 stage, done = next(steps)

@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..diagnose.chosen import can_be_applied, with_causes
-from ..diagnose.corrected import corrected
+from ..diagnose.corrected import Corrected, corrected
 from ..diagnose.fitted import Fitted
 from ..diagnose.found import Found, Trial
 from ..diagnose.model import Model
 from ..diagnose.of_samples import pixels_of_samples
 from ..errors import PatinaError
+from ..fit.held_out import Judge
 from ..samples import SampleTable
 from ..steps import relayed
 from .applied import Applied
@@ -22,10 +23,15 @@ from .diagnose_job import DiagnoseJob, normal_deviation
 from .fit_job import CaptureResult, MaterialResult, with_portable
 from .job import Job, Step, finished
 from .refused import Again, Refusal, seen_jointly, worse
+from .sharpen import fitted_sharply
 
 STAGE = "fitting with what was found"
 FEWEST = 50  # samples of a material that are left
 CORRECTING = 0.3  # of the time
+AS_WIDE = (
+    "its highlights are as wide as the photos show them: made sharper, they predict unseen photos "
+    "no better; a photo under a smaller lamp would tell"
+)
 
 
 class RefitJob(Job):
@@ -92,6 +98,8 @@ class RefitJob(Job):
             for m, a in zip(_proposed(before, again), again, strict=True)
         ]
         taken = chosen if any(a.material is not None for a in again) else []
+        if all(a.blurred for a in again if a.material is not None):
+            taken = [t for t in taken if not t.effect.blurs]
         used = tuple(_applied(trial, self.fitted.model) for trial in taken)
         yield from self._finish(replace(before, effects=used), materials, begin)
 
@@ -133,17 +141,26 @@ class RefitJob(Job):
     def _again(
         self, index: int, material: MaterialResult, model: Model, start: float, share: float
     ) -> Generator[Step, None, Again]:
-        table, light = yield from self._corrected(index, material.name, model, Step(STAGE, start))
-        count = np.count_nonzero(table.read)
+        found = yield from self._corrected(index, material.name, model, Step(STAGE, start))
+        count = np.count_nonzero(found.table.read)
         if count < FEWEST:
             raise PatinaError(f"too few samples can be corrected: {count}")
         start, share = start + CORRECTING * share, (1 - CORRECTING) * share
-        fitted = yield from self.checked.fit.fitted_again(index, table, material, start, share)
-        return Again(fitted, light, _of_clipped(table))
+
+        def fitted_again(
+            table: SampleTable, judge: Judge | None, start: float, share: float
+        ) -> Generator[Step, None, MaterialResult]:
+            fit = self.checked.fit
+            return (yield from fit.fitted_again(index, table, material, start, share, judge))
+
+        fitted, sharp = yield from fitted_sharply(found, fitted_again, start, share)
+        blurred = found.blur is not None and not sharp
+        warnings = (*_of_clipped(found.table), *((AS_WIDE,) if blurred else ()))
+        return Again(fitted, found.light, warnings, blurred)
 
     def _corrected(
         self, index: int, name: str, model: Model, step: Step
-    ) -> Generator[Step, None, tuple[SampleTable, dict[int, float]]]:
+    ) -> Generator[Step, None, Corrected]:
         before, setting = finished(self.checked.result), finished(self.checked.setting)
         table = self.checked.fit.samples[name]
         read = any(effect.of_photo for effect in model.effects)

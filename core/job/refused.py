@@ -32,11 +32,12 @@ class Refusal:
 class Again:
     """A material's second fit. material: None where it could not be fitted; light: of each photo
     the RMS radiance of its samples, as it shows it, over that of all it shows; warnings: what is to
-    be said."""
+    be said; blurred: whether its highlights are still as wide as the photos show them."""
 
     material: MaterialResult | None
     light: Mapping[int, float]
     warnings: tuple[str, ...]
+    blurred: bool = False
 
 
 def seen_jointly(found: Found, fitted: Fitted) -> float:

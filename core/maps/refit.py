@@ -24,6 +24,7 @@ from scipy.spatial import cKDTree
 from ..angles import Angles
 from ..basis import Basis
 from ..capture import Capture
+from ..fit.held_out import Judge
 from ..fit.measured_result import MeasuredResult
 from ..job.beside import beside
 from ..job.estimators import Estimate, estimate
@@ -98,11 +99,17 @@ class PaintlessFitJob(FitJob):
         self.paint = paint
 
     def _estimate(
-        self, index: int, table: SampleTable, basis: Basis, start: float, share: float
+        self,
+        index: int,
+        table: SampleTable,
+        basis: Basis,
+        start: float,
+        share: float,
+        judge: Judge | None = None,
     ) -> Generator[Step, None, Estimate]:
         step = Step(f"fitting {self.capture.materials[index].name}", start)
         plain = yield from beside(lambda: self.paint.removed(index, table), step)
-        return (yield from super()._estimate(index, plain, basis, start, share))
+        return (yield from super()._estimate(index, plain, basis, start, share, judge))
 
 
 def levels_without_paint(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
 import numpy as np
 
-from ..diagnose.coordinates import coordinates, trend
+from ..diagnose.coordinates import Trend, coordinates, trend
 from ..diagnose.effect import Setting
 from ..diagnose.found import Found, Trial
 from ..job import CaptureResult
@@ -19,7 +20,7 @@ from .residual_picture import photo_most_changed, residual_picture
 from .trend_chart import trend_chart
 
 MOST_SHOWN = 6  # charts: those along which the residual changes most
-STEPS = (0.05, 0.1, 0.2, 0.5, 1.0)  # of a chart's vertical axis
+STEPS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # of a chart's vertical axis
 
 
 def write_pages(
@@ -174,16 +175,24 @@ def _charts(found: Found, setting: Setting) -> str:
             missed = setting.pixels.observed - fitted.shown
             trends.append(trend(coordinate, missed, fitted.shown, fitted.deviation, block))
         before = trends[0]
-        if not len(before.at):
-            continue
-        size = float(np.sqrt(np.mean(before.mean**2)))
-        drawn.append((size, coordinate, trends))
+        if len(before.at):
+            drawn.append((_sure_size(before), coordinate, trends))
     drawn.sort(key=lambda d: -d[0])
     chosen = drawn[:MOST_SHOWN]
-    largest = max((float(np.abs(t.mean).max()) for _, _, ts in chosen for t in ts), default=0.05)
-    most = next((s for s in STEPS if s >= largest), STEPS[-1])
     return "".join(
-        f"<figure>{trend_chart(c.name, c.unit, ts[0], ts[1] if found.named else None, most)}"
+        f"<figure>{trend_chart(c.name, c.unit, ts[0], ts[1] if found.named else None, _axis(ts))}"
         "</figure>"
         for _, c, ts in chosen
     )
+
+
+def _sure_size(one: Trend) -> float:
+    """RMS of what it certainly is off by: a bin of few dark pixels is not the largest trend."""
+    return float(np.sqrt(np.mean(np.maximum(np.abs(one.mean) - 2 * one.error, 0) ** 2)))
+
+
+def _axis(trends: Sequence[Trend]) -> float:
+    """Of a chart of its own: beside what dark pixels are off by, every other trend is a line."""
+    sure = [t.mean[np.abs(t.mean) > 2 * t.error] for t in trends]
+    largest = max(float(np.abs(mean).max(initial=0.0)) for mean in sure)
+    return next((step for step in STEPS if step >= largest), STEPS[-1])

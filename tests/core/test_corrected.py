@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields, replace
 
 import numpy as np
@@ -46,6 +47,18 @@ def table_of(setting: Setting) -> SampleTable:
     return SampleTable(**own)
 
 
+def rid_of(
+    table: SampleTable, model: Model, setting: Setting, tilt: float = 0.0
+) -> tuple[SampleTable, Mapping[int, float]]:
+    """Samples of the setting's pixels rid of a model's effects, blurred highlights with the model's
+    own BRDF; each photo's light (Corrected.light)."""
+    found = drained(corrected(table, setting.pixels, model, setting, tilt))
+    if found.blur is None:
+        return found.table, found.light
+    brdf = PrincipalBRDF(model.brdfs.basis, model.brdfs.coefficients[0])
+    return found.blur.sharpened(found.table, brdf), found.light
+
+
 EXAMPLES = {
     LightIntensity: np.array([0.1, -0.1, 0.2, 0.0, -0.25, 0.05]),
     LightDirection: np.array([0.02, -0.03, 0.01, 0.04, 0.0, -0.02]),
@@ -66,7 +79,7 @@ def test_samples_rid_of_an_effect_show_the_brdf(kind):
     shown = model.predicted()
     setting = changed(setting, shown)
     model = replace(model, pixels=setting.pixels, footprint=None)
-    found, light = drained(corrected(table_of(setting), setting.pixels, model, setting))
+    found, light = rid_of(table_of(setting), model, setting)
     assert len(found) > 0.85 * len(shown)
     truth = bare.evaluate(found.angles, np.zeros(len(found), np.int16))
     np.testing.assert_allclose(found.rho, truth, rtol=2e-3, atol=1e-5)
@@ -115,7 +128,7 @@ def test_what_is_clipped_is_predicted_and_no_evidence():
     for nothing where unseen photos are judged; the other channels stay what the photo says."""
     setting, model, truth = clipped_ball(4, 0.15)
     top = setting.pixels.observed[:, 0].max()
-    found, light = drained(corrected(table_of(setting), setting.pixels, model, setting))
+    found, light = rid_of(table_of(setting), model, setting)
     for k, part in light.items():
         mine = found.photo == k
         seen = np.sum(setting.pixels.observed[rows_of(found, setting)][mine] ** 2, axis=1)
@@ -152,7 +165,7 @@ def test_what_was_clipped_is_as_high_as_a_scan_of_such_normals_would_have_it(cha
     model = replace(model, pixels=pixels, footprint=None)
     errors = []
     for known in (0.0, tilt):
-        found, _ = drained(corrected(table_of(off), pixels, model, off, known))
+        found, _ = rid_of(table_of(off), model, off, known)
         filled = found.select(~found.read)
         true = bright[rows_of(filled, off), 0]
         inner = filled.theta_h < np.median(filled.theta_h)
@@ -175,7 +188,7 @@ def test_what_is_clipped_of_a_brushed_surface_stands_unstretched():
     level = np.log(8.0) + np.log(effect.top / np.minimum([top, np.inf, np.inf], 8 * effect.top))
     model = Model(there.pixels, there.brdfs).with_effect(Anisotropy.of(there), numbers)
     model = model.with_effect(effect, level)
-    found, _ = drained(corrected(table_of(there), there.pixels, model, there))
+    found, _ = rid_of(table_of(there), model, there)
     filled = found.select(~found.read)
     clear = shown[rows_of(filled, there), 0] > 1.05 * top
     truth = there.brdfs.evaluate(filled.angles, np.zeros(len(filled), np.int16))
@@ -190,7 +203,7 @@ def test_a_photo_that_is_not_clipped_says_what_arrived_though_the_prediction_is_
     pixels = replace(setting.pixels, observed=np.minimum(dark, setting.pixels.observed))
     off = replace(setting, pixels=pixels)
     model = replace(model, pixels=pixels, footprint=None)
-    found, _ = drained(corrected(table_of(off), pixels, model, off))
+    found, _ = rid_of(table_of(off), model, off)
     beyond = truth[rows_of(found, off), 0] > setting.pixels.observed[:, 0].max()
     beyond &= found.read
     assert beyond.sum() > 30

@@ -18,6 +18,7 @@ class Anisotropy(Effect):
 
     axes: Array
     cause = "anisotropy"
+    blurs = True
     proof = "the object turned by 90° under the same light"
 
     @classmethod

@@ -48,6 +48,7 @@ class AreaLight(Effect):
     distant: NDArray[np.bool_]
     start: float = min(STARTS)
     cause = "area_light"
+    blurs = True
     proof = "a photo of the lamp from where the object stands"
     accuracy = 0.02  # a dozen points or two stand for it
 

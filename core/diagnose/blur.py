@@ -1,0 +1,92 @@
+"""What a lamp's size or a brushed surface does to highlights, taken back a pass at a time.
+
+What a wide lamp blurs nobody sees, and what is sharpened all the way is noise: a spike of a degree
+under a lamp of 24° is as good as none. So samples are multiplied by what the BRDF of the fit before
+reflects of a point over what it reflects of the lamp (Richardson 1972, Lucy 1974), beginning with
+the blurred one, and whoever does so stops early: as soon as photos that a fit has not seen, which
+are predicted blurred again, are predicted no better.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..basis import PrincipalBRDF
+from ..fit.held_out import LeftOut, compared
+from ..samples import SampleTable
+from .brdfs import BRDFs
+from .effect import Effect
+from .fixed import Fixed
+from .model import Model
+
+Array = NDArray[np.floating]
+
+FARTHEST = 3.0  # factor by which a prediction may correct
+
+
+@dataclass(frozen=True)
+class Blurred:
+    """Samples of one photo. model: of pixels of one material, with what changes surface and lamp
+    alone; rows: those of them that are samples."""
+
+    photo: int
+    model: Model
+    rows: NDArray[np.intp]
+
+    def radiance(self, brdf: PrincipalBRDF) -> tuple[Array, Array]:
+        """(of a point lamp on a surface that is not brushed, as it is), (rows, 3) each."""
+        brdfs = BRDFs.of([brdf])
+        model = replace(self.model, brdfs=brdfs)
+        now = model.situation()
+        point = brdfs.reflected(replace(now, stretch=None))
+        return point[self.rows], model.reflected(model.lamps(now))[self.rows]
+
+
+@dataclass(frozen=True)
+class Blur:
+    """Of all samples of a material, in their order."""
+
+    parts: tuple[Blurred, ...]
+
+    def sharpened(self, table: SampleTable, brdf: PrincipalBRDF) -> SampleTable:
+        """Those of the samples that a prediction may correct so far. table: as the photos show
+        them; brdf: of the fit before."""
+        both = [part.radiance(brdf) for part in self.parts]
+        point, blurred = (np.concatenate(each) for each in zip(*both, strict=True))
+        ratio = (point / np.maximum(blurred, 1e-30)).astype(np.float32)
+        rows = np.flatnonzero(((ratio < FARTHEST) & (ratio > 1 / FARTHEST)).all(axis=1))
+        ratio = ratio[rows]
+        found = table.select(rows)
+        return replace(
+            found,
+            rho=found.rho * ratio,
+            radiance=found.radiance * ratio,
+            response=found.response / ratio,
+        )
+
+    def left_out(self, table: SampleTable, photo: int, brdf: PrincipalBRDF) -> LeftOut:
+        """How well a BRDF that was found without a photo predicts it as it is, blurred."""
+        mine = [part for part in self.parts if part.photo == photo]
+        shown = np.concatenate([part.radiance(brdf)[1] for part in mine])
+        held = table.select(table.photo == photo)
+        return compared(photo, shown[held.read], held.select(held.read))
+
+
+def blurs(model: Model) -> bool:
+    """Whether highlights are wider in it than its materials make them."""
+    return any(_inner(effect).blurs for effect in model.effects)
+
+
+def blurred(photo: int, model: Model, rows: NDArray[np.intp]) -> Blurred:
+    """Of a model of pixels of one photo and material with all effects."""
+    both = zip(model.effects, model.x, strict=True)
+    effects, x = zip(*((e, x) for e, x in both if _inner(e).lights), strict=True)
+    alone = replace(model.pixels, material=np.zeros_like(model.pixels.material))
+    return Blurred(photo, Model(alone, model.brdfs, effects, x), rows)
+
+
+def _inner(effect: Effect) -> Effect:
+    return effect.inner if isinstance(effect, Fixed) else effect

@@ -1,0 +1,127 @@
+"""Highlights that a wide lamp blurs: predicted blurred, sharpened as far as unseen photos say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from patina.core.basis import PrincipalBRDF
+from patina.core.diagnose.brdfs import BRDFs
+from patina.core.diagnose.corrected import Corrected, corrected
+from patina.core.diagnose.effects.area_light import AreaLight
+from patina.core.diagnose.effects.vignetting import Vignetting
+from patina.core.diagnose.model import Model
+from patina.core.fit.held_out import HeldOut
+from patina.core.job import sharpen
+from patina.core.job.job import Step
+from patina.core.job.sharpen import fitted_sharply
+from patina.core.steps import drained
+from tests.core.test_corrected import rows_of, table_of
+from tests.make_lit_ball import GLOSSY, changed, lit_ball
+
+WIDE = np.array([np.radians(14.0)])
+
+
+@pytest.fixture(scope="module")
+def wide() -> tuple[Corrected, PrincipalBRDF, np.ndarray]:
+    """Samples of a glossy ball under a wide lamp, by a lens that is darker at its edge, its BRDF,
+    and the lamp's light that arrives (n, 3)."""
+    setting = lit_ball(7, GLOSSY)
+    model = Model(setting.pixels, setting.brdfs).with_effect(AreaLight.of(setting), WIDE)
+    shown = model.predicted()
+    model = model.with_effect(Vignetting.of(setting), np.array([-0.3, 0.1]))
+    setting = changed(setting, model.predicted())
+    model = replace(model, pixels=setting.pixels, footprint=None)
+    found = drained(corrected(table_of(setting), setting.pixels, model, setting))
+    brdf = PrincipalBRDF(setting.brdfs.basis, setting.brdfs.coefficients[0])
+    return found, brdf, shown
+
+
+def test_what_a_wide_lamp_shows_is_predicted_of_every_photo(wide):
+    """The true BRDF misses nothing of any photo under the lamp, and much as a point's."""
+    found, brdf, shown = wide
+    assert found.blur is not None
+    rows = rows_of(found.table, lit_ball(7, GLOSSY))
+    np.testing.assert_allclose(found.table.radiance, shown[rows], rtol=2e-3, atol=1e-6)
+    for photo in np.unique(found.table.photo):
+        judged = found.blur.left_out(found.table, int(photo), brdf)
+        assert judged.missed < 1e-5 * judged.size
+        held = found.table.select(found.table.photo == photo)
+        assert judged.size == pytest.approx(np.sum((held.response * held.radiance) ** 2), rel=1e-4)
+
+
+def test_sharpened_with_the_true_brdf_the_samples_are_its(wide):
+    found, brdf, _ = wide
+    sharp = found.blur.sharpened(found.table, brdf)
+    truth = brdf.evaluate(sharp.angles)
+    np.testing.assert_allclose(sharp.rho, truth, rtol=2e-3, atol=1e-5)
+    assert len(sharp) > 0.9 * len(found.table)
+
+
+def test_a_pass_with_a_wider_highlight_comes_nearer(wide):
+    """The BRDF of the pass need not be the true one."""
+    found, brdf, _ = wide
+    truth = brdf.evaluate(found.table.angles)
+    inner = found.table.theta_h < np.radians(2)
+    before = np.log(found.table.rho / truth)[inner]
+    assert before.mean() < -0.1  # the blur takes from the highlight's middle
+    coefficients = brdf.coefficients.copy()
+    coefficients[:, : brdf.basis.count] *= 0.9
+    once = found.blur.sharpened(found.table, PrincipalBRDF(brdf.basis, coefficients))
+    after = np.log(once.rho / brdf.evaluate(once.angles))[once.theta_h < np.radians(2)]
+    assert abs(after.mean()) < abs(before.mean())
+
+
+def test_nothing_is_sharpened_under_a_point():
+    setting = lit_ball(7, GLOSSY)
+    model = Model(setting.pixels, BRDFs.of([_brdf(setting)]))
+    found = drained(corrected(table_of(setting), setting.pixels, model, setting))
+    assert found.blur is None
+
+
+def _brdf(setting) -> PrincipalBRDF:
+    return PrincipalBRDF(setting.brdfs.basis, setting.brdfs.coefficients[0])
+
+
+@pytest.mark.parametrize(
+    ("errors", "taken"),
+    [
+        ([0.10, 0.10], 0),  # nothing gained: as the photos show it
+        ([0.10, 0.07, 0.069], 1),  # a second pass sharpens noise
+        ([0.10, 0.07, 0.05, 0.06], 2),
+        ([0.10, 0.08, 0.06, 0.05, 0.04], sharpen.PASSES),
+        ([None, None], 1),  # of one photo nothing is unseen
+    ],
+)
+def test_passes_end_where_unseen_photos_gain_no_more(errors, taken):
+    tables = []
+
+    class Blur:
+        def sharpened(self, table, brdf):
+            return f"{table} sharper than {brdf}"
+
+        def left_out(self, table, photo, brdf):
+            raise AssertionError("nothing is fitted here")
+
+    def again(table, judge, start, share):
+        assert (judge is None) == (not tables)  # the first as a point's, the others blurred
+        error = errors[len(tables)]
+        tables.append(table)
+        yield Step("", start + share)
+        held = None if error is None else HeldOut(error, error, {0: error, 1: 2 * error})
+        return SimpleNamespace(held_out=held, fit=SimpleNamespace(brdf=len(tables) - 1))
+
+    steps = fitted_sharply(Corrected("samples", {}, Blur()), again, 0.2, 0.5)
+    fractions = []
+    while True:
+        try:
+            fractions.append(next(steps).fraction)
+        except StopIteration as end:
+            found, sharp = end.value
+            break
+    assert found.fit.brdf == taken and sharp == (taken > 0)
+    assert tables == ["samples", *(f"samples sharper than {k}" for k in range(len(tables) - 1))]
+    assert fractions == sorted(fractions) and fractions[-1] <= 0.7 + 1e-9
