@@ -153,7 +153,7 @@ class RefitJob(Job):
             fit = self.checked.fit
             return (yield from fit.fitted_again(index, table, material, start, share, judge))
 
-        fitted, sharp = yield from fitted_sharply(found, fitted_again, start, share)
+        fitted, sharp = yield from fitted_sharply(found, fitted_again, start, share, self.exactly)
         blurred = found.blur is not None and not sharp
         warnings = (*_of_clipped(found.table), *((AS_WIDE,) if blurred else ()))
         return Again(fitted, found.light, warnings, blurred)

@@ -22,10 +22,10 @@ Again = Callable[[SampleTable, Judge | None, float, float], Fit]
 
 
 def fitted_sharply(
-    of: Corrected, again: Again, start: float, share: float
+    of: Corrected, again: Again, start: float, share: float, exactly: bool = False
 ) -> Generator[Step, None, tuple[MaterialResult, bool]]:
     """(the material, whether its highlights are sharper than the samples'); of photos none of which
-    can be held out one pass is taken."""
+    can be held out one pass is taken. exactly: one is, whatever unseen photos say of it."""
     passes = 0 if of.blur is None else PASSES
     share /= 1 + passes
     found = yield from again(of.table, None, start, share)
@@ -36,7 +36,7 @@ def fitted_sharply(
         table = of.blur.sharpened(of.table, found.fit.brdf)
         other = yield from again(table, judge, start + (1 + done) * share, share)
         gained = _gained(found.held_out, other.held_out)
-        if gained is not None and gained < GAIN:
+        if gained is not None and gained < GAIN and not (exactly and done == 0):
             break
         found, sharp = other, True
         if gained is None:

@@ -87,16 +87,17 @@ def _brdf(setting) -> PrincipalBRDF:
 
 
 @pytest.mark.parametrize(
-    ("errors", "taken"),
+    ("errors", "taken", "exactly"),
     [
-        ([0.10, 0.10], 0),  # nothing gained: as the photos show it
-        ([0.10, 0.07, 0.069], 1),  # a second pass sharpens noise
-        ([0.10, 0.07, 0.05, 0.06], 2),
-        ([0.10, 0.08, 0.06, 0.05, 0.04], sharpen.PASSES),
-        ([None, None], 1),  # of one photo nothing is unseen
+        ([0.10, 0.10], 0, False),  # nothing gained: as the photos show it
+        ([0.10, 0.10, 0.10], 1, True),  # unless somebody asked for it
+        ([0.10, 0.07, 0.069], 1, False),  # a second pass sharpens noise
+        ([0.10, 0.07, 0.05, 0.06], 2, False),
+        ([0.10, 0.08, 0.06, 0.05, 0.04], sharpen.PASSES, False),
+        ([None, None], 1, False),  # of one photo nothing is unseen
     ],
 )
-def test_passes_end_where_unseen_photos_gain_no_more(errors, taken):
+def test_passes_end_where_unseen_photos_gain_no_more(errors, taken, exactly):
     tables = []
 
     class Blur:
@@ -114,7 +115,7 @@ def test_passes_end_where_unseen_photos_gain_no_more(errors, taken):
         held = None if error is None else HeldOut(error, error, {0: error, 1: 2 * error})
         return SimpleNamespace(held_out=held, fit=SimpleNamespace(brdf=len(tables) - 1))
 
-    steps = fitted_sharply(Corrected("samples", {}, Blur()), again, 0.2, 0.5)
+    steps = fitted_sharply(Corrected("samples", {}, Blur()), again, 0.2, 0.5, exactly)
     fractions = []
     while True:
         try:
