@@ -10,6 +10,7 @@ are predicted blurred again, are predicted no better.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,8 @@ from ..basis import PrincipalBRDF
 from ..fit.held_out import LeftOut, compared
 from ..samples import SampleTable
 from .brdfs import BRDFs
-from .effect import Effect
-from .fixed import Fixed
 from .model import Model
+from .situation import Situation
 
 Array = NDArray[np.floating]
 
@@ -36,13 +36,19 @@ class Blurred:
     model: Model
     rows: NDArray[np.intp]
 
-    def radiance(self, brdf: PrincipalBRDF) -> tuple[Array, Array]:
-        """(of a point lamp on a surface that is not brushed, as it is), (rows, 3) each."""
-        brdfs = BRDFs.of([brdf])
+    @cached_property
+    def now(self) -> Situation:
+        """Of all its model's pixels; no BRDF changes it."""
+        return self.model.situation()
+
+    def shown(self, brdfs: BRDFs) -> Array:
+        """(rows, 3) radiance as it is, of the lamp's light."""
         model = replace(self.model, brdfs=brdfs)
-        now = model.situation()
-        point = brdfs.reflected(replace(now, stretch=None))
-        return point[self.rows], model.reflected(model.lamps(now))[self.rows]
+        return model.reflected(model.lamps(self.now))[self.rows]
+
+    def of_point(self, brdfs: BRDFs) -> Array:
+        """(rows, 3) radiance of a point lamp's light on a surface that is not brushed."""
+        return brdfs.reflected(replace(self.now, stretch=None))[self.rows]
 
 
 @dataclass(frozen=True)
@@ -54,8 +60,9 @@ class Blur:
     def sharpened(self, table: SampleTable, brdf: PrincipalBRDF) -> SampleTable:
         """Those of the samples that a prediction may correct so far. table: as the photos show
         them; brdf: of the fit before."""
-        both = [part.radiance(brdf) for part in self.parts]
-        point, blurred = (np.concatenate(each) for each in zip(*both, strict=True))
+        brdfs = BRDFs.without_slack(brdf)
+        point = np.concatenate([part.of_point(brdfs) for part in self.parts])
+        blurred = np.concatenate([part.shown(brdfs) for part in self.parts])
         ratio = (point / np.maximum(blurred, 1e-30)).astype(np.float32)
         rows = np.flatnonzero(((ratio < FARTHEST) & (ratio > 1 / FARTHEST)).all(axis=1))
         ratio = ratio[rows]
@@ -69,24 +76,20 @@ class Blur:
 
     def left_out(self, table: SampleTable, photo: int, brdf: PrincipalBRDF) -> LeftOut:
         """How well a BRDF that was found without a photo predicts it as it is, blurred."""
-        mine = [part for part in self.parts if part.photo == photo]
-        shown = np.concatenate([part.radiance(brdf)[1] for part in mine])
+        brdfs = BRDFs.without_slack(brdf)
+        shown = np.concatenate([part.shown(brdfs) for part in self.parts if part.photo == photo])
         held = table.select(table.photo == photo)
         return compared(photo, shown[held.read], held.select(held.read))
 
 
 def blurs(model: Model) -> bool:
     """Whether highlights are wider in it than its materials make them."""
-    return any(_inner(effect).blurs for effect in model.effects)
+    return any(effect.blurs for effect in model.effects)
 
 
 def blurred(photo: int, model: Model, rows: NDArray[np.intp]) -> Blurred:
     """Of a model of pixels of one photo and material with all effects."""
     both = zip(model.effects, model.x, strict=True)
-    effects, x = zip(*((e, x) for e, x in both if _inner(e).lights), strict=True)
+    effects, x = zip(*((e, x) for e, x in both if e.lights), strict=True)
     alone = replace(model.pixels, material=np.zeros_like(model.pixels.material))
     return Blurred(photo, Model(alone, model.brdfs, effects, x), rows)
-
-
-def _inner(effect: Effect) -> Effect:
-    return effect.inner if isinstance(effect, Fixed) else effect

@@ -37,6 +37,12 @@ class BRDFs:
             coefficients[index, :, : brdf.coefficients.shape[1]] = brdf.coefficients
         return cls(slack.with_slack(basis), coefficients, variance)
 
+    @classmethod
+    def without_slack(cls, brdf: PrincipalBRDF) -> BRDFs:
+        """One BRDF as it is, to be predicted with and not fitted."""
+        variance = np.zeros(brdf.coefficients.shape[1])
+        return cls(brdf.basis, brdf.coefficients[None], variance)
+
     def tight(self) -> BRDFs:
         """The same with nearly no slack; what it held is left out."""
         variance = self.variance.copy()

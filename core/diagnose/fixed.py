@@ -33,6 +33,14 @@ class Fixed(Effect):
         return self.inner.of_photo
 
     @property
+    def blurs(self) -> bool:  # type: ignore[override]
+        return self.inner.blurs
+
+    @property
+    def lights(self) -> bool:
+        return self.inner.lights
+
+    @property
     def numbers(self) -> Numbers:
         return Numbers.alike([], "", 1.0)
 

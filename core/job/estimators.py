@@ -61,10 +61,11 @@ def _measured(table: SampleTable, basis: Basis, capture: Capture, name: str, jud
     unseen = photos_to_hold_out(table) if capture.fit.held_out else []
     parts = []
     for done, photo in enumerate(unseen):
-        yield f"predicting unseen photos of {name}", 0.85 + 0.1 * done / len(unseen)
+        at = f"predicting unseen photos of {name}", 0.85 + 0.1 * done / len(unseen)
+        yield at
         other = fit.without.pop(photo, None)  # let go: once evaluated each is a megabyte
         if other is not None:
-            parts.append(judge(photo, other))
+            parts.append((yield from beside(partial(judge, photo, other), at)))
     yield f"how sure {name} is", 0.95
     kept = MeasuredResult.of(fit)
     return Estimate(kept, summarise(parts), kept.band.spread())

@@ -196,6 +196,10 @@ class FitJob(Job):
         self._check_light(taken)
         return taken
 
+    def given(self, index: int, table: SampleTable) -> SampleTable:
+        """What the fit of a material is given of its samples."""
+        return table
+
     def sinks(self, material: str) -> Sequence[SampleSink]:
         """Who wants all samples of a material, beside the reservoir that the paper's fit reads."""
         return ()
@@ -282,7 +286,9 @@ class FitJob(Job):
         judge: Judge | None = None,
     ) -> Generator[Step, None, Estimate]:
         """The fit itself, which takes the part ``share`` of the job from ``start`` on."""
-        steps = estimate(table, basis, self.capture, self.capture.materials[index].name, judge)
+        name = self.capture.materials[index].name
+        given = yield from beside(lambda: self.given(index, table), Step(f"fitting {name}", start))
+        steps = estimate(given, basis, self.capture, name, judge)
         while True:
             try:
                 stage, done = next(steps)

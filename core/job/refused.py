@@ -46,7 +46,7 @@ def seen_jointly(found: Found, fitted: Fitted) -> float:
     before = found.error_before.photos
     known = fitted is found.after
     after = found.error_after.photos if known else unseen_photos_error(fitted)
-    return 0.0 if before is None or after is None else _grown(before, after)
+    return 0.0 if before is None or after is None else grown(before, after)
 
 
 def worse(
@@ -61,15 +61,15 @@ def worse(
     is chance by a few percent.
     """
     judged = [
-        _by_photo(one.held_out, other.material.held_out, other.light)
+        by_photo(one.held_out, other.material.held_out, other.light)
         for one, other in zip(before, after, strict=True)
         if other.material is not None
         and one.held_out is not None
         and other.material.held_out is not None
     ]
     errors = [each for each in judged if each is not None]
-    grown = [_grown(*each) for each in errors]
-    mean = float(np.mean(grown)) if grown else -np.inf
+    each_grown = [grown(*each) for each in errors]
+    mean = float(np.mean(each_grown)) if each_grown else -np.inf
     of_cause = mean + jointly > MORE
     if not of_cause and mean < USELESS:
         return None
@@ -81,11 +81,13 @@ def worse(
     return Refusal(words, of_cause)
 
 
-def _by_photo(
-    before: HeldOut, after: HeldOut, light: Mapping[int, float]
+def by_photo(
+    before: HeldOut, after: HeldOut, light: Mapping[int, float] | None = None
 ) -> tuple[float, float] | None:
     """Geometric means of the errors of photos, over all that they show; None where no photo has
-    both."""
+    both. light: Again.light of the second, None: all that they show in both."""
+    if light is None:
+        light = dict.fromkeys(after.per_photo, 1.0)
     photos = sorted(before.per_photo.keys() & after.per_photo.keys() & light.keys())
     if not photos:
         return None
@@ -94,5 +96,6 @@ def _by_photo(
     return float(first), float(second)
 
 
-def _grown(before: float, after: float) -> float:
+def grown(before: float, after: float) -> float:
+    """ln of what an error grew by."""
     return float(np.log(max(after, 1e-9) / max(before, 1e-9)))

@@ -24,12 +24,10 @@ from scipy.spatial import cKDTree
 from ..angles import Angles
 from ..basis import Basis
 from ..capture import Capture
-from ..fit.held_out import Judge
 from ..fit.measured_result import MeasuredResult
 from ..job.beside import beside
-from ..job.estimators import Estimate, estimate
+from ..job.estimators import estimate
 from ..job.fit_job import FitJob
-from ..job.job import Step
 from ..samples import SampleTable
 from ..scan import Mesh
 from .level import MaterialLevel
@@ -98,18 +96,8 @@ class PaintlessFitJob(FitJob):
         super().__init__(capture, basis)
         self.paint = paint
 
-    def _estimate(
-        self,
-        index: int,
-        table: SampleTable,
-        basis: Basis,
-        start: float,
-        share: float,
-        judge: Judge | None = None,
-    ) -> Generator[Step, None, Estimate]:
-        step = Step(f"fitting {self.capture.materials[index].name}", start)
-        plain = yield from beside(lambda: self.paint.removed(index, table), step)
-        return (yield from super()._estimate(index, plain, basis, start, share, judge))
+    def given(self, index: int, table: SampleTable) -> SampleTable:
+        return self.paint.removed(index, table)
 
 
 def levels_without_paint(
