@@ -7,6 +7,7 @@ Bases of the artist's own MERL files, the shaders' EXRs and the straightened pho
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
@@ -24,14 +25,14 @@ from .preferences import preferences
 log = logging.getLogger(__name__)
 
 MB = 1_000_000  # bytes
-PREFIXES = (osl_atlas.COMPONENTS_PREFIX, *osl_files.OWN_PREFIXES)
 
 
 def cached_files() -> dict[Path, int]:
     """Every file that can be made again → its bytes."""
     own = own_folder()
-    found = [p for p in own.glob("*.exr") if p.name.startswith(PREFIXES)]
-    found += (own / "rectified").rglob("*")
+    found = [p for p in own.glob("*.exr") if osl_atlas.is_own_name(p.name)]
+    if not (own / "rectified").is_symlink():  # a link may lead to files that are not Patina's
+        found += (own / "rectified").rglob("*")
     found += cache_folder().glob("merl_basis_*.npz")
     return {path: path.stat().st_size for path in found if path.is_file()}
 
@@ -68,7 +69,7 @@ def _drop(most: int) -> tuple[int, int]:
     for path in sorted(files, key=_age):
         if size - gone <= most:
             break
-        if path.resolve() in kept:
+        if kept & {os.path.abspath(path), str(path.resolve())}:
             continue
         try:
             path.unlink()
@@ -86,12 +87,13 @@ def _age(path: Path) -> float:
         return 0.0
 
 
-def _in_use() -> set[Path]:
-    """What the open .blend reads: pictures, and the files of its shaders."""
+def _in_use() -> set[str]:
+    """What the open .blend reads: pictures, and the files of its shaders. The paths are not looked
+    up on disk: they may name somebody's server."""
     told = [bpy.path.abspath(i.filepath) for i in bpy.data.images if i.filepath]
     for node in osl_files.own_shaders():
         told += [socket.default_value for socket in osl_files.file_sockets(node)]
-    return {Path(one).resolve() for one in told if one}
+    return {os.path.abspath(one) for one in told if one}
 
 
 @bpy.app.handlers.persistent

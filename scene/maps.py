@@ -27,6 +27,7 @@ from .apply import measured_materials
 from .blend_file import save, write_blend
 from .materials import MEASURED, fill_principled
 from .meshes import UV_LAYER
+from .packed_exr import write_packed
 
 BODY, BODY_SCALE = "body", "body_scale"  # inputs of the OSL shader: D (1/sr) and its factor
 NORMAL = "Normal"  # input of the OSL shader and of the Principled
@@ -186,7 +187,7 @@ def _own_shader_files(path: Path, final: Path) -> None:
 
     def moved(file: Path) -> bool:
         image = bpy.data.images.get(file.name)
-        return osl_files.write_packed(image, path.parent / file.name)
+        return write_packed(image, path.parent / file.name)
 
     for material in measured_materials():
         osl_files.lead_to(material, final.parent, moved)

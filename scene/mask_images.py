@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.capture import Capture
-from ..core.capture.model import SHADOW_MASK
+from ..core.capture.model import LEFT_OUT, SHADOW_MASK
 from ..core.errors import PatinaError
 from ..core.photo.image import write_png
 from .folders import blend_folder
@@ -39,7 +39,9 @@ def mask_images(capture: str) -> dict[tuple[int, str], bpy.types.Image]:
     return {
         (int(image[PLACE]), str(image.get(KIND, SHADOW_MASK))): image
         for image in bpy.data.images
-        if image.get(CAPTURE) == capture and PLACE in image
+        if image.get(CAPTURE) == capture
+        and isinstance(image.get(PLACE), int)
+        and image.get(KIND, SHADOW_MASK) in LEFT_OUT  # it becomes part of file names
     }
 
 

@@ -7,6 +7,7 @@ also where the artist had turned an input by hand.
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Container, Iterator
 from pathlib import Path
 from typing import Any
@@ -16,10 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.appearance import osl_source
+from ..core.appearance.osl_atlas import is_own_name
 from ..core.basis import PrincipalBRDF
 from . import osl_files
 from .lobe_group import MADE_AS
 from .lobe_group import NAME as LOBE_STACK
+
+log = logging.getLogger(__name__)
 
 KEPT = "patina_as_measured"  # on the material: JSON
 BODY, BODY_SCALE = "body", "body_scale"  # inputs of the OSL shader, linked where there are maps
@@ -102,7 +106,28 @@ def put_back(material: bpy.types.Material) -> None:
     """As it was before any trait was moved; the nodes that are gone stay gone."""
     if KEPT not in material:
         return
-    told = json.loads(material[KEPT])
+    try:  # the .blend may come from anybody
+        _put_all(material, json.loads(material[KEPT]))
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        log.warning(
+            "%s: the property %s is damaged (%s), its values are put back in part; fit the "
+            "material again if it looks wrong",
+            material.name, KEPT, error,
+        )  # fmt: skip
+    name = material.get(osl_files.MEASURED_SAMPLING)
+    if is_own_name(name):
+        material[osl_files.PROPERTIES[osl_source.SAMPLING]] = name
+        for node in osl_files.script_nodes(material):
+            for socket in osl_files.file_sockets(node):
+                if socket.identifier == osl_source.SAMPLING:
+                    osl_files.read_again(socket, name)
+    material.pop(osl_files.MEASURED_SAMPLING, None)
+    del material[KEPT]
+
+
+def _put_all(material: bpy.types.Material, told: dict[str, Any]) -> None:
+    """Raises ValueError, TypeError, KeyError or AttributeError where ``told`` is not what ``keep``
+    writes."""
     color, material.metallic, material.roughness = told["solid"]
     material.diffuse_color = color
     for node, inputs in (
@@ -112,15 +137,6 @@ def put_back(material: bpy.types.Material) -> None:
     ):
         if node is not None and inputs is not None:
             _put_inputs(node, inputs)
-    name = material.get(osl_files.MEASURED_SAMPLING)
-    if name:
-        material[osl_files.PROPERTIES[osl_source.SAMPLING]] = name
-        for node in osl_files.script_nodes(material):
-            for socket in osl_files.file_sockets(node):
-                if socket.identifier == osl_source.SAMPLING:
-                    osl_files.read_again(socket, name)
-        del material[osl_files.MEASURED_SAMPLING]
-    del material[KEPT]
 
 
 def _nodes(material: bpy.types.Material, kind: str) -> Iterator[bpy.types.Node]:
@@ -146,5 +162,11 @@ def _put_inputs(node: bpy.types.Node, told: dict[str, Any]) -> None:
     node.label = told["label"]
     for socket in node.inputs:
         value = told["values"].get(socket.identifier)
+        if socket.identifier in osl_files.PROPERTIES and not is_own_name(_file_name(value)):
+            continue  # a path of a shader's file that Patina did not write
         if value is not None and _plain(socket.default_value) != value:
             socket.default_value = value
+
+
+def _file_name(path: object) -> str:
+    return str(path).replace("\\", "/").rpartition("/")[2]

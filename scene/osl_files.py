@@ -3,12 +3,14 @@
 OSL reads pictures by their path, so the files must exist on disk: beside a saved .blend, else in
 the extension's own folder. Packed copies travel inside the .blend (Image data-blocks that a fake
 user keeps) and are written out again on load where the path no longer leads to them.
+
+A .blend may come from anybody: its names and packed bytes are checked before anything is written.
 """
 
 from __future__ import annotations
 
 import logging
-import os
+import re
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +27,7 @@ from ..core.basis import PrincipalBRDF
 from ..core.steps import drained
 from .folders import blend_folder
 from .handlers import attach, detach
+from .packed_exr import is_regular_file, write_packed
 
 log = logging.getLogger(__name__)
 
@@ -94,7 +97,7 @@ def ensuring_files(
 
 def _ensure(name: str, write: Callable[[Path], object]) -> Path:
     path = blend_folder() / name
-    if not path.is_file() and not write_packed(bpy.data.images.get(name), path):
+    if not is_regular_file(path) and not write_packed(bpy.data.images.get(name), path):
         write(path)
     pack(path)
     return path
@@ -107,7 +110,8 @@ def file_sockets(node: bpy.types.Node) -> list[bpy.types.NodeSocket]:
 
 def drop_unused() -> None:
     """Forget the packed files of materials that are gone; files on disk stay."""
-    needed = {m.get(key) for m in bpy.data.materials for key in _kept_names()}
+    named = [m.get(key) for m in bpy.data.materials for key in _kept_names()]
+    needed = {name for name in named if osl_atlas.is_own_name(name)}
     for image in [i for i in bpy.data.images if i.name.startswith(OWN_PREFIXES)]:
         if image.name not in needed and image.users <= int(image.use_fake_user):
             bpy.data.images.remove(image)
@@ -152,18 +156,37 @@ def restore() -> list[str]:
     return missing
 
 
-def read_again(socket: bpy.types.NodeSocket, name: str | None) -> bool:
+def read_again(socket: bpy.types.NodeSocket, name: object) -> bool:
     """Lead a socket whose file is gone to the packed one of that name; True where it names a file
-    that is there, now or again."""
-    if os.path.isfile(socket.default_value):
+    that is there, now or again. Names that are not Patina's own are refused."""
+    if is_trusted_path(socket.default_value):
         return True
     if not name:
         return False
+    if not osl_atlas.is_own_name(name):
+        _warn_of_name(name)
+        return False
     path = blend_folder() / name
-    if path.is_file() or write_packed(bpy.data.images.get(name), path):
+    if is_regular_file(path) or write_packed(bpy.data.images.get(name), path):
         socket.default_value = path.as_posix()
         return True
     return False
+
+
+def is_trusted_path(path: str) -> bool:
+    """Whether a path from a .blend leads to one of Patina's EXRs. A network path is not even looked
+    at: on Windows that would send the user's credentials to the server it names."""
+    if path.startswith(("//", "\\\\")) or not osl_atlas.is_own_name(re.split(r"[\\/]", path)[-1]):
+        return False
+    return is_regular_file(Path(path))
+
+
+def _warn_of_name(name: object) -> None:
+    log.warning(
+        "the .blend names %.200r as a file of a Patina shader, which Patina never does: nothing is "
+        "written; if you trust the .blend, fit the material again",
+        name,
+    )
 
 
 def script_nodes(material: bpy.types.Material) -> list[bpy.types.Node]:
@@ -200,21 +223,6 @@ def lead_to(
     return old
 
 
-def write_packed(image: bpy.types.Image | None, path: Path) -> bool:
-    """Write a picture's packed bytes to a file, whole or not at all; False where it has none."""
-    if image is None or image.packed_file is None:
-        return False
-    partial = path.with_name(path.name + ".part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_bytes(image.packed_file.data)
-        os.replace(partial, path)
-    except OSError as error:
-        log.warning("%s: cannot be written (%s)", path, error.strerror)
-        return False
-    return True
-
-
 @persistent
 def _after_load(*_: object) -> None:
     restore()
@@ -226,7 +234,11 @@ def _after_save(*_: object) -> None:
     for material in bpy.data.materials:
         for key in _kept_names():
             name = material.get(key)
-            if name and not (blend_folder() / name).is_file():
+            if not name:
+                continue
+            if not osl_atlas.is_own_name(name):
+                _warn_of_name(name)
+            elif not is_regular_file(blend_folder() / name):
                 write_packed(bpy.data.images.get(name), blend_folder() / name)
 
 

@@ -15,6 +15,7 @@ ln(ρ·cosMap + ε), so the sum over a hundred components may be done at the nod
 from __future__ import annotations
 
 import hashlib
+import re
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,17 @@ TRAITS = 8
 BORDER = 1
 COMPONENTS_PREFIX, REMAINDER_PREFIX = "patina_components_", "patina_brdf_"
 SAMPLING_PREFIX = "patina_sampling_"
+NAME_PATTERN = re.compile(r"patina_(components|brdf|sampling)_[0-9a-f]{12}\.exr")
+"""Every name that components_name, remainder_name and sampling_name make."""
+EXR_MAGIC = b"\x76\x2f\x31\x01"  # the first bytes of every OpenEXR file
+MAX_FILE_BYTES = 1 << 27  # several times the largest picture of a basis on MERL's full angle grid
+
+
+def is_own_name(name: object) -> bool:
+    """Whether this is a file name that this module makes. Names that come from a .blend must pass
+    before they are joined to a folder: the pattern has no separator, drive or "..".
+    """
+    return isinstance(name, str) and NAME_PATTERN.fullmatch(name) is not None
 
 
 def traits(count: int) -> int:

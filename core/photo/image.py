@@ -201,6 +201,10 @@ def _write(
     channels: Sequence[str] = (),
     description: str = "",
 ) -> None:
+    if path.is_symlink():  # may lie beside a downloaded .blend, and lead anywhere
+        raise PatinaError(
+            f"{path}: is a symbolic link, and images are not written through links; remove it"
+        )
     data = np.ascontiguousarray(np.atleast_3d(pixels))
     height, width, count = data.shape
     spec = oiio.ImageSpec(width, height, count, kind)

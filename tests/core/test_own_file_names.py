@@ -1,0 +1,72 @@
+"""Which file names of a .blend are Patina's own: those it makes, and no other."""
+
+from __future__ import annotations
+
+import os
+from pathlib import PurePosixPath, PureWindowsPath
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from patina.core.appearance import osl_atlas
+from patina.core.basis import Basis, PrincipalBRDF
+from patina.core.errors import PatinaError
+from patina.core.photo import write_exr, write_png
+
+GOOD = "patina_components_0123456789ab.exr"
+
+
+def test_the_names_that_are_made_are_accepted(tmp_path):
+    basis = Basis.default()
+    brdf = PrincipalBRDF(basis, np.zeros((3, 5)))
+    made = (
+        osl_atlas.components_name(basis),
+        osl_atlas.remainder_name(brdf),
+        osl_atlas.sampling_name(brdf),
+    )
+    assert all(osl_atlas.is_own_name(name) for name in made), made
+    path = osl_atlas.write_picture(tmp_path / made[1], np.ones((2, 2, 3), np.float32))
+    assert path.read_bytes().startswith(osl_atlas.EXR_MAGIC)
+
+
+@given(st.sampled_from(["components", "brdf", "sampling"]), st.integers(0, 16**12 - 1))
+def test_every_digest_is_accepted(kind, number):
+    assert osl_atlas.is_own_name(f"patina_{kind}_{number:012x}.exr")
+
+
+@given(
+    st.text() | st.builds(lambda a, b: a + GOOD + b, st.text(), st.text())
+    | st.builds(lambda i, c: GOOD[:i] + c + GOOD[i:], st.integers(0, len(GOOD)), st.text())
+)  # fmt: skip
+def test_what_is_accepted_is_a_bare_name_everywhere(name):
+    if osl_atlas.is_own_name(name):
+        assert PurePosixPath(name).name == PureWindowsPath(name).name == name
+        assert name.isascii() and name.endswith(".exr") and len(name) < 40
+        assert not PureWindowsPath(name).drive
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../../evil.pth", "/tmp/" + GOOD, "../" + GOOD, "..\\" + GOOD, "C:" + GOOD, GOOD + "\n",
+        GOOD + "/", GOOD + ":stream", GOOD.upper(), GOOD[:-4] + ".pth", GOOD.replace("0", "g"),
+        GOOD.replace("0", "\u0660"), "", ".", "..", None, 7, [GOOD], GOOD.encode(),
+    ],
+)  # fmt: skip
+def test_others_are_refused(name):
+    assert not osl_atlas.is_own_name(name)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need a right of their own on Windows")
+def test_images_are_not_written_through_links(tmp_path):
+    victim = tmp_path / "victim"
+    victim.write_bytes(b"before")
+    (tmp_path / "a.part.exr").symlink_to(victim)
+    (tmp_path / "a.png").symlink_to(victim)
+    with pytest.raises(PatinaError, match="symbolic link"):
+        write_exr(tmp_path / "a.exr", np.ones((2, 2, 3), np.float32))
+    with pytest.raises(PatinaError, match="symbolic link"):
+        write_png(tmp_path / "a.png", np.ones((2, 2), np.uint8))
+    assert victim.read_bytes() == b"before"
