@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..core.basis import Basis, storage
-from ..core.job.job import Step
+from ..core.basis import storage
+from ..core.basis.merl_folder import cached_basis
+from ..core.concurrency.job import Step
 from .progress import Progress
 from .staging import staged_folder
 
@@ -20,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     progress = Progress()
-    basis = Basis.from_merl(arguments.merl, lambda stage, done: progress(Step(stage, done)))
+    basis = cached_basis(arguments.merl, lambda stage, done: progress(Step(stage, done)))
     explained = basis.explained.cumsum()
     print(f"basis {basis.version}: {basis.count} components of {basis.columns} columns")
     for k in (1, 2, 3, 5, 10, 20):

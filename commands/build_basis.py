@@ -6,10 +6,10 @@ import argparse
 from pathlib import Path
 
 from ..core.basis import storage
-from ..core.basis.basis import DEFAULT_FILE
 from ..core.basis.build_default import build, write_checksums
+from ..core.basis.default_basis import DEFAULT_FILE
 from ..core.basis.merl_folder import CHECKSUMS_FILE
-from ..core.job.job import Step
+from ..core.concurrency.job import Step
 from .progress import Progress
 
 HELP = "make the embedded basis anew from neural encodings (for developers)"

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from ..core.capture import read_capture
 from ..core.diagnose.effects import EFFECTS
-from ..core.diagnose.found import Found
-from ..core.job import FitJob, finished
-from ..core.job.check_job import CheckJob
+from ..core.diagnose.selection.diagnosis import Diagnosis
+from ..core.jobs import FitJob, finished
+from ..core.jobs.check_job import CheckJob
 from ..core.report import diagnosis, diagnosis_json
 from . import capture_arguments
 from .fit import tell, write_results
@@ -53,7 +53,7 @@ def diagnose_to_folder(
     found, before = finished(checked.found), finished(checked.result)
     with staged_folder(out) as folder:
         report = folder / "report"
-        diagnosis.write_pages(report, found, finished(checked.setting), before, after)
+        diagnosis.write_pages(report, found, finished(checked.context), before, after)
         diagnosis_json.write(folder / "diagnosis.json", found, before, after)
         write_results(folder, out, after, job.stages, progress, MATERIALS)
     _tell_causes(found)
@@ -61,11 +61,11 @@ def diagnose_to_folder(
     print(f"      {out / 'diagnosis.json'}")
 
 
-def _tell_causes(found: Found) -> None:
-    for trial in found.noted:
+def _tell_causes(found: Diagnosis) -> None:
+    for trial in found.reported:
         print(f"{trial.effect.cause}: {found.sentence(trial)}")
     if found.unexplained:
-        print(f"unknown: {found.left.sentence()}")
+        print(f"unknown: {found.residual.sentence()}")
     if not found.causes:
         print("none: nothing that can be named is wrong beyond noise and the scan's own errors")
     before, after = found.error_before, found.error_after

@@ -15,17 +15,17 @@ from typing import Any
 
 import bpy
 
+from ..core.concurrency.job import Job, Step
 from ..core.errors import InputError, PatinaError
 from ..core.export import Loss
-from ..core.job import CaptureResult
-from ..core.job.job import Job, Step
+from ..core.jobs import CaptureResult
 from ..core.report import write_report
 from ..core.report.result_json import write_json
 from ..core.result import read_result
-from ..scene.background import in_background
-from ..scene.export_choice import FORMATS, RECORD, REPORT, missing
-from ..scene.last_fit import kept_fit
-from ..scene.properties import DIAGNOSIS, capture_path, stored_result
+from ..scene.export.export_choice import FORMATS, RECORD, REPORT, missing
+from ..scene.session.background_blender import in_background
+from ..scene.session.last_fit import kept_fit
+from ..scene.session.scene_properties import DIAGNOSIS, capture_path, stored_result
 from . import material
 from .staging import check_out, staged_folder
 

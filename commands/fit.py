@@ -10,9 +10,9 @@ from pathlib import Path
 
 from ..core.brdf import merl_file
 from ..core.capture import read_capture
+from ..core.concurrency.job import Step, peak_memory
 from ..core.fit.measured_result import MeasuredResult
-from ..core.job import CaptureResult, FitJob, Stage, finished
-from ..core.job.job import Step, peak_memory
+from ..core.jobs import CaptureResult, FitJob, Stage, finished
 from ..core.report import result_json, write_report
 from ..core.report.figures import reach
 from . import capture_arguments
@@ -63,7 +63,7 @@ def write_results(
         for _ in write_report(folder / report, result):
             pass
     with timed(stages, "scene.blend", progress, 0.97):
-        from ..scene.blend_file import write_blend  # needs bpy
+        from ..scene.export.blend_file import write_blend  # needs bpy
 
         notes = write_blend(folder / "scene.blend", out / "scene.blend", result, stages)
     result_json.write(folder / "result.json", result, stages, notes)

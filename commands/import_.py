@@ -11,9 +11,9 @@ from pathlib import Path
 
 from ..core.capture import read_capture
 from ..core.errors import InputError
-from ..core.job import inputs
-from ..core.job.lights import find_lights
-from ..core.job.photos import LitPhotos
+from ..core.inputs import capture_data
+from ..core.inputs.lights import find_lights
+from ..core.inputs.photos import LitPhotos
 from ..core.scan.formats import read_reconstruction
 from .staging import staged_folder
 
@@ -45,16 +45,21 @@ def run(arguments: argparse.Namespace) -> None:
         if getattr(arguments, key) is not None:
             raise InputError(f"a capture file says its {key} itself", key=f"--{key}")
     capture = read_capture(arguments.capture)
-    scan = inputs.open_scan(capture)
-    inputs.check_photos(capture, scan)
+    scan = capture_data.open_scan(capture)
+    capture_data.check_photos(capture, scan)
     photos = LitPhotos.open(capture)
     lights = find_lights(capture, scan, photos)
-    from ..scene.blend_file import write_import  # needs bpy
+    from ..scene.export.blend_file import write_import  # needs bpy
 
     with staged_folder(out.parent) as folder:
         _building()
         write_import(folder / out.name, out, capture, scan, lights)
-    for note in (*scan.notes, *photos.notes, *lights.notes, *inputs.size_notes(capture, scan)):
+    for note in (
+        *scan.notes,
+        *photos.notes,
+        *lights.notes,
+        *capture_data.size_notes(capture, scan),
+    ):
         print(f"  note: {note}")
     print(f"wrote {out}: {len(scan.cameras)} cameras, {len(scan.mesh.faces):,} faces")
 
@@ -63,7 +68,7 @@ def _import_model(model: Path, out: Path, images: Path | None, chunk: str | None
     if images is not None and not images.is_dir():
         raise InputError("no such folder", file=images, key="--images")
     found = read_reconstruction(model, images, chunk)
-    from ..scene.blend_file import write_reconstruction  # needs bpy
+    from ..scene.export.blend_file import write_reconstruction  # needs bpy
 
     with staged_folder(out.parent) as folder:
         _building()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..core.brdf import merl_file
 from ..core.capture import read_capture
-from ..core.job import finished
+from ..core.jobs import finished
 from ..core.maps import MapsJob, MapsSettings
 from ..core.maps.maps_job import REFITS, MapsResult
 from ..core.maps.texels import check_size
@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> None:
     check_size(arguments.size)
     out = check_out(arguments.out)
     capture, fitted = read_capture(arguments.capture), read_result(arguments.result)
-    from ..scene.unwrap import unwrapped  # needs bpy
+    from ..scene.scan.unwrap import unwrapped  # needs bpy
 
     settings = MapsSettings(arguments.size, 0 if arguments.keep_fit else REFITS, arguments.normal)
     job = MapsJob(capture, fitted, settings, unwrapped)
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> None:
         with timed(stages, "maps", progress, 0.92):
             files = write_maps(folder, result, arguments.format)
         with timed(stages, "scene.blend", progress, 0.96):
-            from ..scene.maps import write_mapped_blend
+            from ..scene.export.maps_blend import write_mapped_blend
 
             scene = folder / "scene.blend"
             notes = write_mapped_blend(scene, out / scene.name, result, files, fitted.scene, stages)

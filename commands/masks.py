@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..core.capture import read_capture
 from ..core.errors import InputError
-from ..core.job import finished
+from ..core.jobs import finished
 from ..core.masks.proposal import MOST_MATERIALS
 from ..core.masks.write_masks import MasksJob, Wanted, check_final
 from .progress import Progress

@@ -7,12 +7,12 @@ from collections.abc import Callable, Generator, Sequence
 from functools import partial
 from pathlib import Path
 
+from ..core.concurrency.background import in_background
+from ..core.concurrency.job import Step
 from ..core.errors import InputError
 from ..core.export import Loss, renderer_formats, table_formats, write_losses
 from ..core.export.file_names import check_distinct
 from ..core.export.subject import Subject
-from ..core.job.beside import beside
-from ..core.job.job import Step
 from ..core.result import FittedMaterial, FittedResult, read_result
 from .progress import Progress
 from .staging import check_out, staged_folder
@@ -79,7 +79,7 @@ def export(
             step = Step(f"writing {name}", done / len(formats))
             yield step
             if name in PLAIN:
-                losses += yield from beside(partial(PLAIN[name], folder, subjects), step)
+                losses += yield from in_background(partial(PLAIN[name], folder, subjects), step)
             else:
                 losses += _write_by_blender(name, folder, out, result, subjects)
         lines = write_losses(folder, losses, ", ".join(s.name for s in subjects))
@@ -89,7 +89,7 @@ def export(
 def _write_by_blender(
     name: str, folder: Path, out: Path, result: FittedResult, subjects: Sequence[Subject]
 ) -> list[Loss]:
-    from ..scene import export_formats  # needs bpy
+    from ..scene.export import export_formats  # needs bpy
 
     write = {
         "blend": export_formats.to_blend,

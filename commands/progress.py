@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 
-from ..core.job.job import Step
+from ..core.concurrency.job import Step
 
 
 class Progress:

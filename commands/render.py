@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ..core.concurrency.job import Step
 from ..core.errors import InputError
 from ..core.export.subject import Subject
-from ..core.job.job import Step
 from ..core.report.relit import Picture, write_page
 from ..core.result import read_result
 from .progress import Progress
@@ -64,7 +64,7 @@ def render_to_folder(
     denoise: bool = True,
 ) -> list[Picture]:
     """Render a result under worlds into ``out``, with a page that shows all; returns them."""
-    from ..scene.relight import Quality, relight, worlds_named  # needs bpy
+    from ..scene.export.relight import Quality, relight, worlds_named  # needs bpy
 
     result = read_result(result_file)
     worlds = worlds_named(told)

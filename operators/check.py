@@ -6,16 +6,16 @@ from collections.abc import Iterator
 
 import bpy
 
-from ..core.diagnose.chosen import can_be_applied
-from ..core.job import CaptureResult
-from ..core.job.check_job import CheckJob
-from ..core.job.refit_job import RefitJob
+from ..core.diagnose.selection.effect_subset import correctable_effects
+from ..core.jobs import CaptureResult
+from ..core.jobs.check_job import CheckJob
+from ..core.jobs.refit_job import RefitJob
 from ..core.report.diagnosis_json import describe
-from ..scene.checked import keep, kept
-from ..scene.evidence import paint_evidence, show_evidence
-from ..scene.prepared import PreparedJob
-from ..scene.properties import DIAGNOSIS, capture_path, store_result
-from ..scene.running import tell
+from ..scene.material.prepared_materials import PreparedJob
+from ..scene.session.last_diagnosis import keep, kept
+from ..scene.session.running_job import tell
+from ..scene.session.scene_properties import DIAGNOSIS, capture_path, store_result
+from ..scene.views.evidence import paint_evidence, show_evidence
 from .fit import can_fit, fit_job, show_result
 from .stepped import Stepped
 
@@ -40,7 +40,7 @@ explain, name the cause, and fit again with it in the model"""
 
     def _finish(self, context: bpy.types.Context) -> Iterator[None]:
         checked, after = self._job.job.checked, self._job.result
-        found, setting, before = checked.found, checked.setting, checked.result
+        found, setting, before = checked.found, checked.context, checked.result
         scene = bpy.data.scenes.get(self._scene)
         if found is None or setting is None or before is None or after is None or scene is None:
             self.report({"WARNING"}, "The scene is gone; nothing was kept")
@@ -48,7 +48,7 @@ explain, name the cause, and fit again with it in the model"""
         keep(checked)
         scene.patina.causes.clear()
         applied = {effect.cause for effect in after.effects}
-        for trial in can_be_applied(found):
+        for trial in correctable_effects(found):
             cause = scene.patina.causes.add()
             cause.name, cause.use = trial.effect.cause, trial.effect.cause in applied
         yield from _show(self, scene, after)
@@ -57,7 +57,7 @@ explain, name the cause, and fit again with it in the model"""
         mesh, vertices = scene.patina.mesh, setting.rays.mesh.vertices
         if mesh is not None and not paint_evidence(mesh, vertices, setting.pixels, found):
             self.report({"WARNING"}, f"{mesh.name} no longer has the scan's vertices: not coloured")
-        for trial in found.noted:
+        for trial in found.reported:
             self.report({"WARNING"}, f"{trial.effect.cause}: {found.sentence(trial)}")
         if not found.causes:
             self.report({"INFO"}, "Nothing that can be named is wrong")

@@ -13,8 +13,8 @@ import bpy
 from ..core.capture import read_capture
 from ..core.capture.new_capture import CAMERAS, PHOTOS
 from ..core.errors import PatinaError
-from ..scene.properties import capture_path
-from ..scene.running import running
+from ..scene.session.running_job import running
+from ..scene.session.scene_properties import capture_path
 from .report_errors import hand_on, refuse
 
 NOTHING, SOLVE, LIT = "NOTHING", "SOLVE", "LIT"

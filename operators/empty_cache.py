@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.cache import MB, cached_files, empty_cache
+from ..scene.material.file_cache import MB, cached_files, empty_cache
 
 
 class PATINA_OT_empty_cache(bpy.types.Operator):

@@ -8,10 +8,10 @@ import bpy
 
 from ..commands.export_open import ExportJob
 from ..core.errors import InputError
-from ..scene.export_choice import FORMATS
-from ..scene.folders import cache_folder
-from ..scene.properties import capture_path, stored_result
-from ..scene.running import tell
+from ..scene.export.export_choice import FORMATS
+from ..scene.session.folders import cache_folder
+from ..scene.session.running_job import tell
+from ..scene.session.scene_properties import capture_path, stored_result
 from .report_errors import hand_on
 from .stepped import Stepped
 

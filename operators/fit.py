@@ -9,18 +9,18 @@ import bpy
 
 from ..core.capture import read_capture
 from ..core.errors import InputError
-from ..core.job import CaptureResult, FitJob
+from ..core.jobs import CaptureResult, FitJob
 from ..core.samples import Margins
-from ..scene.apply import applying
-from ..scene.cache import own_basis, trim_cache
-from ..scene.face_slots import with_painted_slots
-from ..scene.last_fit import keep_fit
-from ..scene.lights import with_dragged_lamps
-from ..scene.mask_images import with_mask_images
-from ..scene.painted import take_all
-from ..scene.preferences import preferences
-from ..scene.prepared import PreparedJob
-from ..scene.running import tell
+from ..scene.material.file_cache import own_basis, trim_cache
+from ..scene.material.prepared_materials import PreparedJob
+from ..scene.paint.apply_paint import take_all
+from ..scene.paint.mask_images import with_mask_images
+from ..scene.photos.lamps import with_dragged_lamps
+from ..scene.scan.apply_result import applying
+from ..scene.scan.face_slots import with_painted_slots
+from ..scene.session.last_fit import keep_fit
+from ..scene.session.preferences import preferences
+from ..scene.session.running_job import tell
 from .stepped import Stepped
 
 

@@ -8,11 +8,11 @@ import bpy
 
 from ..core.capture import read_capture
 from ..core.errors import PatinaError
-from ..core.job import inputs
-from ..core.job.lights import find_lights
-from ..core.job.photos import LitPhotos
-from ..scene.folders import rectified_folder
-from ..scene.scan_collection import already_there, create_scan_collection
+from ..core.inputs import capture_data
+from ..core.inputs.lights import find_lights
+from ..core.inputs.photos import LitPhotos
+from ..scene.scan.scan_collection import already_there, create_scan_collection
+from ..scene.session.folders import rectified_folder
 from .report_errors import refuse
 
 DEMO = Path(__file__).parents[1] / "assets" / "demo" / "demo.capture.toml"
@@ -60,8 +60,8 @@ def bring_in(operator: bpy.types.Operator, context: bpy.types.Context, path: Pat
                 "import it anew"
             )
         capture = read_capture(path)
-        scan = inputs.open_scan(capture)
-        inputs.check_photos(capture, scan)
+        scan = capture_data.open_scan(capture)
+        capture_data.check_photos(capture, scan)
         photos = LitPhotos.open(capture)
         lights = find_lights(capture, scan, photos)
         made = create_scan_collection(context.scene, capture, scan, lights, rectified_folder(path))
@@ -76,7 +76,12 @@ def bring_in(operator: bpy.types.Operator, context: bpy.types.Context, path: Pat
     for area in context.screen.areas if context.screen else ():
         if area.type == "VIEW_3D":
             area.spaces.active.region_3d.view_perspective = "CAMERA"
-    for note in (*scan.notes, *photos.notes, *lights.notes, *inputs.size_notes(capture, scan)):
+    for note in (
+        *scan.notes,
+        *photos.notes,
+        *lights.notes,
+        *capture_data.size_notes(capture, scan),
+    ):
         operator.report({"INFO"}, note)
     operator.report(
         {"INFO"},

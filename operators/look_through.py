@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.photo_list import lit_photos, looked_at
+from ..scene.photos.photo_list import lit_photos, looked_at
 
 
 class PATINA_OT_next_photo(bpy.types.Operator):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.apply import measured_of
-from ..scene.assets import mark
-from ..scene.properties import capture_path, stored_result
+from ..scene.material.assets import mark
+from ..scene.material.measured_materials import measured_of
+from ..scene.session.scene_properties import capture_path, stored_result
 
 
 class PATINA_OT_mark_assets(bpy.types.Operator):

@@ -9,21 +9,21 @@ import bpy
 
 from ..commands.staging import check_out, staged_folder
 from ..core.capture import Capture, read_capture
+from ..core.concurrency.job import Job, Step
 from ..core.errors import InputError, PatinaError
-from ..core.job.job import Job, Step
 from ..core.masks.proposal import MOST_MATERIALS
 from ..core.masks.proposal_job import ProposalJob
 from ..core.masks.write_masks import MasksJob, Wanted, Written, material_names
-from ..scene.face_slots import show_proposal
-from ..scene.lights import with_dragged_lamps
-from ..scene.mask_images import (
+from ..scene.paint.apply_paint import take_all
+from ..scene.paint.mask_images import (
     masks_folder,
     shadow_images,
     show_shadow_masks,
     with_mask_images,
 )
-from ..scene.painted import take_all
-from ..scene.running import tell
+from ..scene.photos.lamps import with_dragged_lamps
+from ..scene.scan.face_slots import show_proposal
+from ..scene.session.running_job import tell
 from .stepped import Stepped
 
 

@@ -17,8 +17,8 @@ from ..core.capture.new_capture import (
 )
 from ..core.errors import InputError, PatinaError
 from ..core.scan.formats import read_reconstruction
-from ..scene.folders import rectified_folder
-from ..scene.scan_collection import create_reconstruction
+from ..scene.scan.scan_collection import create_reconstruction
+from ..scene.session.folders import rectified_folder
 from .import_capture import bring_in
 from .report_errors import refuse
 

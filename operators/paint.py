@@ -8,16 +8,16 @@ import bpy
 
 from ..commands.staging import check_out
 from ..core.errors import PatinaError
-from ..scene.brushes import ready_to_paint
-from ..scene.canvas import canvas_of, canvases, draw
-from ..scene.face_slots import leave_edit_mode, new_slot
-from ..scene.image_editor import show_canvas
-from ..scene.mask_files import write_masks
-from ..scene.mesh_paint import show_on_mesh, shown_on_mesh, slots_of_face_sets
-from ..scene.painted import take_all
-from ..scene.paints import paints, take_up, wear
-from ..scene.photo_list import looked_at
-from ..scene.properties import capture_path
+from ..scene.paint.apply_paint import take_all
+from ..scene.paint.brushes import ready_to_paint
+from ..scene.paint.canvas import canvas_of, canvases, draw
+from ..scene.paint.mask_files import write_masks
+from ..scene.paint.mesh_paint import show_on_mesh, shown_on_mesh, slots_of_face_sets
+from ..scene.paint.paint_kinds import paints, take_up, wear
+from ..scene.photos.photo_list import looked_at
+from ..scene.scan.face_slots import leave_edit_mode, new_slot
+from ..scene.session.image_editor import show_canvas
+from ..scene.session.scene_properties import capture_path
 from .report_errors import refuse
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.moved import measured_brdf, state
-from ..scene.traits import reset, shown_material
+from ..scene.material.trait_offsets import measured_brdf, state
+from ..scene.material.trait_properties import reset, shown_material
 
 
 class PATINA_OT_reset_traits(bpy.types.Operator):

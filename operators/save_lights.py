@@ -9,8 +9,8 @@ import bpy
 from ..core.capture import read_capture
 from ..core.capture.write_lights import write_lights
 from ..core.errors import InputError, PatinaError
-from ..scene.moved_lamps import accept, with_dragged_lamps
-from ..scene.properties import capture_path
+from ..scene.photos.dragged_lamps import accept, with_dragged_lamps
+from ..scene.session.scene_properties import capture_path
 from .report_errors import refuse
 
 

@@ -12,8 +12,8 @@ from ..core.scan.readers.colmap import read_colmap
 from ..core.solve import SolveJob
 from ..core.solve.solution import MODEL
 from ..core.solve.solve import LENSES
-from ..scene.folders import rectified_folder
-from ..scene.scan_collection import create_reconstruction
+from ..scene.scan.scan_collection import create_reconstruction
+from ..scene.session.folders import rectified_folder
 from .report_errors import hand_on
 from .stepped import Stepped
 

@@ -12,10 +12,10 @@ from typing import Any
 
 import bpy
 
+from ..core.concurrency.background import BackgroundJob
 from ..core.errors import PatinaError
-from ..core.job import Job
-from ..core.job.beside import Alongside
-from ..scene.running import Running, running, tell
+from ..core.jobs import Job
+from ..scene.session.running_job import Running, running, tell
 from .report_errors import refuse
 
 TAKING = "putting it into the file"
@@ -35,7 +35,7 @@ class Stepped:
     _timer: Any = None
     _since = _told = 0.0
     _job: Job | None = None
-    _alongside: Alongside | None = None
+    _alongside: BackgroundJob | None = None
     _taking: Iterator[None] | None = None
     _scene: str = ""  # by name: a reference does not survive undo
 
@@ -114,7 +114,7 @@ class Stepped:
         """False when the job is done."""
         if not self.ALONGSIDE:
             return self._job.step()
-        self._alongside = self._alongside or Alongside(self._job)
+        self._alongside = self._alongside or BackgroundJob(self._job)
         return self._alongside.step()
 
     def cancel(self, context: bpy.types.Context) -> None:

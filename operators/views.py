@@ -5,12 +5,12 @@ from __future__ import annotations
 import bpy
 
 from ..core.errors import PatinaError
-from ..scene.apply import measured_of
-from ..scene.image_editor import show_image
-from ..scene.photo_list import looked_at as photo_of
-from ..scene.photo_looked import look_job, show_photo_view
-from ..scene.properties import capture_path
-from ..scene.views import looked_at, show_chart
+from ..scene.material.measured_materials import measured_of
+from ..scene.photos.photo_list import looked_at as photo_of
+from ..scene.session.image_editor import show_image
+from ..scene.session.scene_properties import capture_path
+from ..scene.views.photo_comparison import look_job, show_photo_view
+from ..scene.views.view_properties import looked_at, show_chart
 from .fit import fit_job
 from .report_errors import refuse
 from .stepped import Stepped

@@ -6,8 +6,8 @@ from typing import Any
 
 import bpy
 
-from ..scene.evidence import MISSED
-from ..scene.lengths import with_lengths
+from ..scene.session.lengths import with_lengths
+from ..scene.views.evidence import MISSED
 from .wrapped import IN_BOX, wrapped
 
 MOST = 6

@@ -9,7 +9,7 @@ import bpy
 from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 
-from ..scene.export_choice import FORMATS, missing
+from ..scene.export.export_choice import FORMATS, missing
 
 PRESETS = "patina/export"  # below the user's presets
 

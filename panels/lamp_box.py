@@ -7,10 +7,11 @@ from typing import Any
 
 import bpy
 
-from ..scene.lamp_stand import DISTANT, KIND, MOUNTED, NEAR
-from ..scene.lengths import length
-from ..scene.moved_lamps import by_hand, lamp_of
-from ..scene.properties import CAPTURE, stored_result
+from ..scene.photos.dragged_lamps import by_hand, lamp_of
+from ..scene.photos.lamp_placement import DISTANT, MOUNTED, NEAR
+from ..scene.property_keys import CAPTURE, LAMP_KIND, LIGHT_NAME
+from ..scene.session.lengths import length
+from ..scene.session.scene_properties import stored_result
 
 ICONS = {DISTANT: "LIGHT_SUN", NEAR: "LIGHT_POINT", MOUNTED: "LIGHT_SPOT"}
 KINDS = {DISTANT: "Distant", NEAR: "Lamp", MOUNTED: "Flash"}
@@ -18,13 +19,13 @@ KINDS = {DISTANT: "Distant", NEAR: "Lamp", MOUNTED: "Flash"}
 
 def draw_lamp(layout: bpy.types.UILayout, scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     """A line for the lamp, and more where it was changed by hand or refined by the last fit."""
-    capture, name = camera.get(CAPTURE, ""), camera.get("patina_light", "")
+    capture, name = camera.get(CAPTURE, ""), camera.get(LIGHT_NAME, "")
     lamp = lamp_of(scene, capture, name)
     column = layout.column(align=True)
     if lamp is None:
         column.label(text=f"{name}: its lamp is gone", icon="LIGHT")
         return
-    kind = lamp.get(KIND)
+    kind = lamp.get(LAMP_KIND)
     column.label(text=f"{KINDS.get(kind, 'Light')}: {name}", icon=ICONS.get(kind, "LIGHT"))
     hand = by_hand(scene, lamp)
     if hand:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.mask_images import mask_images, shadow_images
-from ..scene.paints import Paint, paints
-from ..scene.photo_list import looked_at
-from ..scene.properties import capture_path
-from ..scene.swatches import swatch
+from ..scene.paint.mask_images import mask_images, shadow_images
+from ..scene.paint.paint_kinds import Paint, paints
+from ..scene.paint.swatches import swatch
+from ..scene.photos.photo_list import looked_at
+from ..scene.session.scene_properties import capture_path
 
 OUT_SAID = {
     "shadow": "Shadow",

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.mask_images import shadow_images
-from ..scene.photo_list import PatinaPhoto, PatinaPhotos, has_camera, looked_at
-from ..scene.properties import capture_path
+from ..scene.paint.mask_images import shadow_images
+from ..scene.photos.photo_list import (
+    PatinaPhoto,
+    PatinaPhotos,
+    has_camera,
+    looked_at,
+)
+from ..scene.session.scene_properties import capture_path
 
 ROWS = 5
 

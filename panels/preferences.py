@@ -6,9 +6,9 @@ from pathlib import Path
 
 import bpy
 
-from ..scene.cache import MB, cached_files
-from ..scene.folders import cache_folder, own_folder
-from ..scene.preferences import NO_UNIT, PACKAGE, Preferences
+from ..scene.material.file_cache import MB, cached_files
+from ..scene.session.folders import cache_folder, own_folder
+from ..scene.session.preferences import NO_UNIT, PACKAGE, Preferences
 
 USUAL = Preferences()
 MARGIN = {"min": 0, "max": 100, "soft_max": 20, "subtype": "PIXEL"}
@@ -16,7 +16,7 @@ SAID = "Used where a capture file does not say it itself"
 
 
 class PatinaPreferences(bpy.types.AddonPreferences):
-    """Read by scene/preferences.py, whose names these are."""
+    """Read by scene/session/preferences.py, whose names these are."""
 
     bl_idname = PACKAGE
 

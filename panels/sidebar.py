@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.apply import measured_materials, measured_of
-from ..scene.fallback import osl_hindrance
-from ..scene.materials import REASON_PROPERTY
-from ..scene.photo_list import looked_at
-from ..scene.properties import DIAGNOSIS, capture_path, stored_result
+from ..scene.material.fallback import osl_hindrance
+from ..scene.material.measured_materials import measured_materials, measured_of
+from ..scene.photos.photo_list import looked_at
+from ..scene.property_keys import NO_OSL_REASON
+from ..scene.session.scene_properties import DIAGNOSIS, capture_path, stored_result
 from .check_box import draw_check
 from .lamp_box import draw_lamp
 from .mask_box import draw_masks
@@ -85,12 +85,12 @@ class PATINA_PT_material(StagePanel, bpy.types.Panel):
 
     def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         found = measured_materials()
-        reasons = {m[REASON_PROPERTY] for m in found if REASON_PROPERTY in m}
+        reasons = {m[NO_OSL_REASON] for m in found if NO_OSL_REASON in m}
         hindrance = osl_hindrance(context.scene) if found else None
         for material in found:
             row = layout.row()
             row.label(text=material.name, icon_value=icon_of(material))
-            portable = REASON_PROPERTY in material or hindrance is not None
+            portable = NO_OSL_REASON in material or hindrance is not None
             row.label(text=standing_word(material, portable))
         for reason in sorted({*reasons} if reasons else {hindrance} - {None}):
             wrapped(layout, f"Not the measurement itself: {reason}", "INFO")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.running import running
-from ..scene.stages import next_stage, stages
+from ..scene.session.running_job import running
+from ..scene.views.workflow_stages import next_stage, stages
 from .wrapped import wrapped
 
 DONE, NOW, LATER = "CHECKMARK", "PLAY", "RADIOBUT_OFF"

@@ -6,10 +6,17 @@ import math
 
 import bpy
 
-from ..scene.follow_traits import behind
-from ..scene.materials import BASIS
-from ..scene.moved import measured_brdf, movable, sliders, standing, state, words_of
-from ..scene.traits import shown_material
+from ..scene.material.trait_offsets import (
+    measured_brdf,
+    movable,
+    sliders,
+    standing,
+    state,
+    words_of,
+)
+from ..scene.material.trait_properties import shown_material
+from ..scene.material.trait_update import behind
+from ..scene.property_keys import BASIS_VERSION
 from .measured_box import SPHERE, icon_of
 from .wrapped import wrapped
 
@@ -41,7 +48,7 @@ class PATINA_PT_traits(bpy.types.Panel):
         layout.row().prop(traits, "channels", expand=True)
         column, shifts = layout.column(align=True), getattr(traits, traits.channels)
         for number, (name, word) in enumerate(
-            zip(sliders(material), words_of(material[BASIS]), strict=False), 1
+            zip(sliders(material), words_of(material[BASIS_VERSION]), strict=False), 1
         ):
             column.prop(shifts, name, text=f"{number} {word.capitalize()}", slider=True)
         for line, icon in notes(material):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..operators.views import ITEMS, PHOTO_ITEMS
-from ..scene.views import FILE, MATERIAL, looked_at
+from ..scene.views.view_properties import FILE, MATERIAL, looked_at
 
 ICONS = {
     "sphere": "MATERIAL", "polar": "LIGHT_SPOT", "highlight": "FCURVE", "slice": "IMAGE_DATA",

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from patina.core.basis import Basis, PrincipalBRDF
-from patina.core.diagnose.brdfs import BRDFs
-from patina.core.diagnose.effect import Setting
-from patina.core.diagnose.pixels import Pixels
-from patina.core.diagnose.situation import Situation
+from patina.core.basis import PrincipalBRDF, default_basis
+from patina.core.diagnose.forward.diagnosis_context import DiagnosisContext
+from patina.core.diagnose.forward.material_brdfs import MaterialBRDFs
+from patina.core.diagnose.forward.pixels import Pixels
+from patina.core.diagnose.forward.shading_state import ShadingState
 from patina.core.geometry import RayScene
 from patina.core.scan import Mesh
 
@@ -21,11 +21,11 @@ NOISE = 0.01
 SHARP, GLOSSY = 10, 21  # training materials: half as bright at well under 1°, and at 2.2°
 
 
-def lit_ball(seed: int = 0, material: int = SHARP) -> Setting:
+def lit_ball(seed: int = 0, material: int = SHARP) -> DiagnosisContext:
     """Pixels of a ball in six photos under three lights, of a material of the basis, with noise;
     radiance is summed by hand here: ρ E cos θi."""
     rng = np.random.default_rng(seed)
-    basis = Basis.default()
+    basis = default_basis()
     brdf = PrincipalBRDF(basis, basis.training[3 * material : 3 * material + 3])
     parts = []
     for photo in range(PHOTOS):
@@ -58,7 +58,7 @@ def lit_ball(seed: int = 0, material: int = SHARP) -> Setting:
             )
         )  # fmt: skip
     pixels = Pixels.join(parts)
-    now = Situation.of(pixels)
+    now = ShadingState.of(pixels)
     rho = brdf.evaluate(now.angles)
     radiance = rho * np.pi * np.sum(pixels.normal * pixels.light, axis=1, keepdims=True)
     noisy = radiance * (1 + NOISE * rng.standard_normal(radiance.shape))
@@ -67,18 +67,18 @@ def lit_ball(seed: int = 0, material: int = SHARP) -> Setting:
         veil=np.broadcast_to(radiance.mean(axis=0), (len(radiance), 2, 3)),
     )  # fmt: skip
     triangle = Mesh(np.eye(3) * 1e-3, np.array([[0, 1, 2]], np.int32))
-    return Setting(
-        pixels, BRDFs.of([brdf]), RayScene.build(triangle), np.arange(PHOTOS) // 2,
+    return DiagnosisContext(
+        pixels, MaterialBRDFs.of([brdf]), RayScene.build(triangle), np.arange(PHOTOS) // 2,
         ("a", "b", "c"), np.ones(3, bool), np.zeros(3), SIZE, np.pi, np.ones(1, np.float32),
     )  # fmt: skip
 
 
-def shadowed(setting: Setting, photo: int, reach: float, lost: float) -> Setting:
+def shadowed(context: DiagnosisContext, photo: int, reach: float, lost: float) -> DiagnosisContext:
     """A part of the light is lost in a round spot of one photo."""
-    pixels = setting.pixels
+    pixels = context.pixels
     spot = (pixels.photo == photo) & (np.hypot(pixels.x - 0.1, pixels.y) < reach)
-    return changed(setting, np.where(spot[:, None], 1 - lost, 1) * pixels.observed)
+    return changed(context, np.where(spot[:, None], 1 - lost, 1) * pixels.observed)
 
 
-def changed(setting: Setting, observed: np.ndarray) -> Setting:
-    return replace(setting, pixels=replace(setting.pixels, observed=observed.astype(np.float32)))
+def changed(context: DiagnosisContext, observed: np.ndarray) -> DiagnosisContext:
+    return replace(context, pixels=replace(context.pixels, observed=observed.astype(np.float32)))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from patina.core.basis import Basis
+from patina.core.basis import default_basis
 
 BRONZE, FABRIC, ACRYLIC = 0, 4, 10  # places in the embedded basis' training set
 PRINCIPLED = {
@@ -28,7 +28,7 @@ PRINCIPLED = {
 
 def coefficients(place: int) -> np.ndarray:
     """(3, k) of a material that the basis was trained with."""
-    training = Basis.default().training
+    training = default_basis().training
     assert training is not None
     return training[3 * place : 3 * place + 3]
 
@@ -53,7 +53,7 @@ def description(*materials: dict[str, Any]) -> dict[str, Any]:
     return {
         "format": 2,
         "program": {"name": "patina", "version": "0.1.0"},
-        "basis": {"version": Basis.default().version, "components": 100, "columns": 300},
+        "basis": {"version": default_basis().version, "components": 100, "columns": 300},
         "capture": "/somewhere/x.capture.toml",
         "materials": list(materials),
     }

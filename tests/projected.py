@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from patina.core.angles import Angles, merl_grid
-from patina.core.basis import Basis, PrincipalBRDF
+from patina.core.basis import PrincipalBRDF, default_basis
 
 
 def projected(evaluate: Callable[[Angles], np.ndarray], count: int) -> PrincipalBRDF:
@@ -16,5 +16,5 @@ def projected(evaluate: Callable[[Angles], np.ndarray], count: int) -> Principal
     seen = np.flatnonzero(merl_grid.visible(centres))
     chosen = np.random.default_rng(0).choice(seen, 20000, replace=False)
     angles = Angles(*(a.ravel()[chosen] for a in centres))
-    basis = Basis.default()
+    basis = default_basis()
     return PrincipalBRDF(basis, basis.project(evaluate(angles), angles, count, eta=1.0))

@@ -5,27 +5,27 @@ from __future__ import annotations
 from pathlib import Path
 
 from patina.core.capture import read_capture
+from patina.core.concurrency.steps import drained
 from patina.core.geometry import RayScene, SurfaceView, view_surface
-from patina.core.job import inputs
-from patina.core.job.lights import find_lights
-from patina.core.job.photos import LitPhotos
-from patina.core.job.sampling import take_samples
+from patina.core.inputs import capture_data
+from patina.core.inputs.lights import find_lights
+from patina.core.inputs.photos import LitPhotos
+from patina.core.jobs.sampling import take_samples
 from patina.core.samples import Margins, SampleTable, sample_photo
 from patina.core.samples.take import light_surface, trusted_pixels
-from patina.core.steps import drained
 
 
 def sampled(path: Path) -> tuple[SampleTable, list[SurfaceView]]:
     """(all samples, one view a photo)."""
     capture = read_capture(path)
-    scan = inputs.open_scan(capture)
+    scan = capture_data.open_scan(capture)
     rays = RayScene.build(scan.mesh)
     photos = LitPhotos.open(capture)
     lights = find_lights(capture, scan, photos)
     tables, views = [], []
     for place in range(len(capture.photos)):
         light = lights.of(capture, place)
-        camera = inputs.camera_of(capture, scan, place)
+        camera = capture_data.camera_of(capture, scan, place)
         view = view_surface(rays, camera)
         lighting = light_surface(rays, view, light, camera)
         keep = trusted_pixels(view, lighting, Margins())
@@ -38,7 +38,7 @@ def sampled(path: Path) -> tuple[SampleTable, list[SurfaceView]]:
 def sampled_materials(path: Path) -> dict[str, SampleTable]:
     """All samples of every material, by its name."""
     capture = read_capture(path)
-    scan = inputs.open_scan(capture)
+    scan = capture_data.open_scan(capture)
     rays = RayScene.build(scan.mesh)
     photos = LitPhotos.open(capture)
     lights = find_lights(capture, scan, photos)

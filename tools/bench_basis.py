@@ -20,13 +20,13 @@ NIELSEN_5 = (
 def run(data: Path) -> None:
     """Print the tables of docs/measurements.md, section "The basis"."""
     from patina.core.angles import Angles, cosines, merl_grid
-    from patina.core.basis import Basis, PrincipalBRDF
+    from patina.core.basis import PrincipalBRDF, default_basis
     from patina.core.basis.build_default import NeuralObservations
     from patina.core.basis.training import exact_rows, principal
     from patina.core.brdf import TabulatedBRDF, metrics, nbrdf
 
     print("## basis\n")
-    basis = Basis.default()
+    basis = default_basis()
     observations = NeuralObservations(nbrdf.load(data / "brdf" / "nbrdf_merl.npz")[1])
     since = time.perf_counter()
     directions, explained = principal(observations, basis.count)

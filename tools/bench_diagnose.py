@@ -37,8 +37,8 @@ def run(data: Path) -> None:
 def _row(label: str, path: Path) -> list[str]:
     """Prints it; returns what was said of causes and materials."""
     from patina.core.capture import read_capture
-    from patina.core.job import FitJob
-    from patina.core.job.check_job import CheckJob
+    from patina.core.jobs import FitJob
+    from patina.core.jobs.check_job import CheckJob
 
     since = time.perf_counter()
     job = CheckJob(FitJob(read_capture(path)))
@@ -57,9 +57,9 @@ def _row(label: str, path: Path) -> list[str]:
         f"{whole:.0f}, {search:.0f} |",
         flush=True,
     )
-    said = [found.sentence(trial) for trial in found.noted]
+    said = [found.sentence(trial) for trial in found.reported]
     if found.unexplained:
-        said.append(found.left.sentence())
+        said.append(found.residual.sentence())
     for before, material in zip(job.checked.result.materials, after.materials, strict=True):
         if before.held_out is not None and material.held_out is not None:
             said.append(

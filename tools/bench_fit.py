@@ -15,10 +15,10 @@ def run(data: Path) -> None:
     """Print the table of docs/measurements.md, section "The paper's fit"."""
     from patina.commands.compare import read_truth
     from patina.core.angles import Angles, merl_grid
-    from patina.core.basis import Basis, PrincipalBRDF
+    from patina.core.basis import PrincipalBRDF, default_basis
     from patina.core.brdf import metrics
     from patina.core.capture import read_capture
-    from patina.core.job import FitJob
+    from patina.core.jobs import FitJob
 
     print(f"## fit (in-basis; median and range over {SEEDS} seeds)\n")
     print(
@@ -27,7 +27,7 @@ def run(data: Path) -> None:
         "held-out, typical pixel | held-out, relative RMS | s | MB |"
     )
     print("|---|---|---|---|---|---|---|---|---|---|")
-    basis = Basis.default()
+    basis = default_basis()
     for name in ("bunny_bronze", "bunny_red", "bunny_fabric"):
         folder = data / "scans" / name
         truth = read_truth(folder / "truth.json")

@@ -53,10 +53,10 @@ def brdf_of(data: Path, name: str):  # type: ignore[no-untyped-def]
 
 
 def _measured(sphere, brdf, fit) -> None:  # type: ignore[no-untyped-def]
-    from patina.scene import materials, osl_files
+    from patina.scene.material import material_nodes, osl_files
 
     files = osl_files.ensure_files(brdf)
-    sphere.data.materials.append(materials.create_material("measured", brdf, fit, files))
+    sphere.data.materials.append(material_nodes.create_material("measured", brdf, fit, files))
 
 
 def _own(sphere, kind: str, roughness: float) -> None:  # type: ignore[no-untyped-def]
@@ -77,7 +77,7 @@ def _noise(world: str, wear) -> float:  # type: ignore[no-untyped-def]
     """RMS over pixels of the standard deviation between seeds, of the mean radiance."""
     import bpy
 
-    from patina.scene import relight
+    from patina.scene.export import relight
     from tests.wheel import cycles_sphere
 
     sphere = cycles_sphere.new_scene(size=SIZE, samples=SAMPLES, osl=True)

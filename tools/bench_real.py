@@ -65,28 +65,28 @@ def _table(cases: list[tuple[str, Path]]) -> None:
 
 
 def _samples(path: Path) -> _Case:
-    from patina.core.basis import Basis
+    from patina.core.basis import default_basis
     from patina.core.capture import read_capture
+    from patina.core.concurrency.steps import drained
     from patina.core.geometry import RayScene, view_surface
-    from patina.core.job import inputs
-    from patina.core.job.lights import find_lights, refined
-    from patina.core.job.photos import LitPhotos
+    from patina.core.inputs import capture_data
+    from patina.core.inputs.lights import find_lights, refined
+    from patina.core.inputs.photos import LitPhotos
     from patina.core.photo.transfer import Transfer
     from patina.core.samples import SampleTable, sample_photo
     from patina.core.samples.level import at_typical_level
     from patina.core.samples.take import light_surface, trusted_pixels
-    from patina.core.steps import drained
 
-    capture, basis = read_capture(path), Basis.default()
-    scan = inputs.open_scan(capture)
-    inputs.check_photos(capture, scan)
+    capture, basis = read_capture(path), default_basis()
+    scan = capture_data.open_scan(capture)
+    capture_data.check_photos(capture, scan)
     rays, photos = RayScene.build(scan.mesh), LitPhotos.open(capture)
     lights = find_lights(capture, scan, photos)
     if any(light.refine for light in capture.lights):
         lights = drained(refined(lights, capture, scan, photos, rays, basis))
     tables = []
     for place in range(len(capture.photos)):
-        camera = inputs.camera_of(capture, scan, place)
+        camera = capture_data.camera_of(capture, scan, place)
         view = view_surface(rays, camera)
         lighting = light_surface(rays, view, lights.of(capture, place), camera)
         lit = photos.read(place)
@@ -126,18 +126,18 @@ def _encode(radiance: np.ndarray, curve: tuple[np.ndarray, np.ndarray]) -> np.nd
 
 
 def _paper(table: object, held: object) -> np.ndarray:
-    from patina.core.basis import Basis
+    from patina.core.basis import default_basis
     from patina.core.fit import fit_paper
 
-    return fit_paper(table, Basis.default()).brdf.evaluate(held.angles)  # type: ignore[attr-defined,arg-type,no-any-return]
+    return fit_paper(table, default_basis()).brdf.evaluate(held.angles)  # type: ignore[attr-defined,arg-type,no-any-return]
 
 
 def _all_samples(table: object, held: object) -> np.ndarray:
     """Nielsen's ridge on every sample: no choice of pixels at all."""
-    from patina.core.basis import Basis
+    from patina.core.basis import default_basis
     from patina.core.fit import ridge
 
-    basis = Basis.default()
+    basis = default_basis()
     _, q = basis.rows(table.angles, 20)  # type: ignore[attr-defined]
     mapped = basis.mapped(table.rho, table.angles)  # type: ignore[attr-defined]
     return basis.evaluate(ridge.solve(q, mapped), held.angles)  # type: ignore[attr-defined]

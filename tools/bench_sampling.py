@@ -13,9 +13,9 @@ def run(data: Path) -> None:
     from patina.core.brdf import nbrdf
     from patina.core.capture import read_capture
     from patina.core.geometry import RayScene, view_surface
-    from patina.core.job.inputs import camera_of, open_scan
-    from patina.core.job.lights import find_lights
-    from patina.core.job.photos import LitPhotos
+    from patina.core.inputs.capture_data import camera_of, open_scan
+    from patina.core.inputs.lights import find_lights
+    from patina.core.inputs.photos import LitPhotos
     from patina.core.samples import Margins, SampleTable, sample_photo
     from patina.core.samples.take import light_surface, trusted_pixels
     from patina.core.scan.mesh import read_mesh

@@ -122,7 +122,7 @@ def _remove(folder: Path) -> None:
 
 
 def _peak() -> float:
-    from patina.core.job.job import peak_memory
+    from patina.core.concurrency.job import peak_memory
 
     return peak_memory() or float("nan")
 
@@ -138,14 +138,14 @@ def _make(
 
 def _opened(folder: str):  # type: ignore[no-untyped-def]
     """(capture, scan, seconds to read the scan)."""
-    from patina.core.basis import Basis
+    from patina.core.basis import default_basis
     from patina.core.capture import read_capture
-    from patina.core.job import inputs
+    from patina.core.inputs import capture_data
 
-    Basis.default()
+    default_basis()
     since = time.perf_counter()
     capture = read_capture(Path(folder) / "ball.capture.toml")
-    scan = inputs.open_scan(capture)
+    scan = capture_data.open_scan(capture)
     return capture, scan, time.perf_counter() - since
 
 
@@ -154,8 +154,8 @@ def _job(folder: str, threads: str, method: str) -> dict[str, Any]:
     from dataclasses import replace
 
     from patina.core.capture import read_capture
-    from patina.core.job import FitJob, finished
-    from patina.core.job.job import Step
+    from patina.core.concurrency.job import Step
+    from patina.core.jobs import FitJob, finished
     from patina.core.report import write_report
 
     capture = read_capture(Path(folder) / "ball.capture.toml")
@@ -193,12 +193,12 @@ def _job(folder: str, threads: str, method: str) -> dict[str, Any]:
 def _plain(folder: str) -> dict[str, Any]:
     """Every pixel of a photo at once in float64, all samples of all photos kept, a condition number
     from a decomposition for every candidate."""
-    from patina.core.basis import Basis
+    from patina.core.basis import default_basis
     from patina.core.fit import fit_paper, selection
     from patina.core.geometry import RayScene
-    from patina.core.job import inputs
-    from patina.core.job.lights import find_lights
-    from patina.core.job.photos import LitPhotos
+    from patina.core.inputs import capture_data
+    from patina.core.inputs.lights import find_lights
+    from patina.core.inputs.photos import LitPhotos
     from patina.core.samples import SampleTable
 
     from .plain_sampling import sample_plainly
@@ -212,12 +212,12 @@ def _plain(folder: str) -> dict[str, Any]:
     lights = find_lights(capture, scan, photos)
     tables = []
     for place in range(len(capture.photos)):
-        camera = inputs.camera_of(capture, scan, place)
+        camera = capture_data.camera_of(capture, scan, place)
         light = lights.of(capture, place)
         radiance = photos.read(place).radiance
         tables.append(sample_plainly(rays, camera, light, radiance, capture.fit.margins))
     selection.choose = choose_plainly
-    fit_paper(SampleTable.join(tables), Basis.default(), capture.fit.paper)
+    fit_paper(SampleTable.join(tables), default_basis(), capture.fit.paper)
     seconds = reading + time.perf_counter() - since
     return {"seconds": seconds, "processor": time.process_time() - worked, "peak_mb": _peak()}
 
@@ -227,14 +227,14 @@ def _candidates(count: int, components: int):  # type: ignore[no-untyped-def]
     import numpy as np
 
     from patina.core.angles import Angles
-    from patina.core.basis import Basis
+    from patina.core.basis import default_basis
 
     u = np.random.default_rng(0).random((3, count), np.float32)
     angles = Angles(np.radians(60) * u[0] ** 1.5, np.radians(75) * u[1], np.pi * u[2])
     rows = np.empty((count, components), np.float32)
     for begin in range(0, count, 1 << 17):
         part = slice(begin, begin + (1 << 17))
-        rows[part] = Basis.default().rows(Angles(*(a[part] for a in angles)), components)[1]
+        rows[part] = default_basis().rows(Angles(*(a[part] for a in angles)), components)[1]
     return angles, rows
 
 

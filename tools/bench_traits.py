@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from .common import ROOT
 
 if TYPE_CHECKING:
-    from patina.core.basis import Basis
+    from patina.core.basis import Basis, default_basis
 
 DOCUMENT = ROOT / "docs" / "traits.md"
 
@@ -21,11 +21,11 @@ def run(data: Path) -> None:
 
     from patina.core.appearance.osl_atlas import TRAITS
     from patina.core.appearance.traits import Looked, Movable, MovableAlbedo
-    from patina.core.basis import Basis, PrincipalBRDF
+    from patina.core.basis import PrincipalBRDF
     from patina.core.views import display
     from patina.core.views.sphere import LitSphere
 
-    basis = Basis.default()
+    basis = default_basis()
     text = DOCUMENT.read_text(encoding="utf-8")
     made = re.sub(
         r"(<!-- begin traits -->\n).*?(\n<!-- end traits -->)",

@@ -25,7 +25,8 @@ def run(data: Path) -> None:
     import bpy
 
     from patina.core.appearance.principled_fit import fit_principled
-    from patina.scene import lamps, materials, osl_files, relight, worlds
+    from patina.scene.export import relight
+    from patina.scene.material import lamp_inputs, material_nodes, osl_files, world_inputs
     from tests.wheel import cycles_sphere
 
     from .bench_noise import brdf_of
@@ -38,7 +39,9 @@ def run(data: Path) -> None:
     relight.light_by(scene, relight.shipped_worlds()["forest"])
     lamp = cycles_sphere.sun(np.array([0.5, 0.3, 0.8]))
     files = osl_files.ensure_files(brdf)
-    material = materials.create_material("measured", brdf, fit_principled(brdf.evaluate), files)
+    material = material_nodes.create_material(
+        "measured", brdf, fit_principled(brdf.evaluate), files
+    )
     sphere.data.materials.append(material)
     (node,) = osl_files.script_nodes(material)
     inputs = {socket.identifier: socket for socket in node.inputs}
@@ -67,8 +70,8 @@ def run(data: Path) -> None:
     print(f"## edits ({WIDTH} x {HEIGHT} pixels, {faces} faces, medians of {REPEATS})\n")
     print("| edit | handlers | to the first, coarse picture | to a sample in every pixel |")
     print("|---|---|---|---|")
-    lamps.register()
-    worlds.register()
+    lamp_inputs.register()
+    world_inputs.register()
     try:
         with tempfile.TemporaryDirectory() as folder:
             scene.render.filepath = str(Path(folder) / "frame.png")
@@ -81,8 +84,8 @@ def run(data: Path) -> None:
                 (told, first), (_, full) = np.median(drawn, axis=1)
                 print(f"| {name} | {told:.3f} s | {told + first:.2f} s | {told + full:.2f} s |")
     finally:
-        lamps.unregister()
-        worlds.unregister()
+        lamp_inputs.unregister()
+        world_inputs.unregister()
 
 
 def _seconds(edit: Callable[[int], None], step: int) -> tuple[float, float]:

@@ -32,7 +32,7 @@ def main() -> int:
     from patina.commands.demo import CAPTURE
     from patina.commands.fit import fit_to_folder
     from patina.core.geometry import view_surface
-    from patina.core.job import inputs
+    from patina.core.inputs import capture_data
     from patina.core.views import display
 
     from .hunt.picture import make as diagnosis_picture
@@ -40,7 +40,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "demo"
         result = fit_to_folder(CAPTURE, out)
-        camera = inputs.camera_of(result.capture, result.scan, PHOTO)
+        camera = capture_data.camera_of(result.capture, result.scan, PHOTO)
         box = display.crop_box(view_surface(result.rays, camera).seen, margin=12)
         panels = [
             read(out / "report" / f"photo_{PHOTO:02d}_{kind}.png")

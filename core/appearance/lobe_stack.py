@@ -5,7 +5,7 @@ as MaterialX's `generalized_schlick_bsdf` (single scattering); the base is Orenâ
 it. A lobe darkens all below it by 1 âˆ’ the largest channel of its directional albedo towards the
 viewer, as Cycles does, so the stack is not quite reciprocal and never gains energy. The albedo is
 MaterialX's rational fit (`mx_ggx_dir_albedo_analytic`): a formula that Blender's nodes can
-repeat, so that numpy, scene/lobe_group.py and MaterialX compute one model.
+repeat, so that numpy, scene/material/lobe_group.py and MaterialX compute one model.
 
 Measured surfaces change their colour towards the silhouette in ways that no Fresnel term follows.
 So the diffuse colour and a lobe's f0 may have three values: facing the viewer, midway and at the

@@ -1,7 +1,9 @@
 """Principal components of measured reflectance: the embedded default, or one from a MERL folder."""
 
 from . import storage
-from .basis import Basis, PrincipalBRDF
+from .basis import Basis
+from .default_basis import default_basis
 from .grid import AngleGrid
+from .principal_brdf import PrincipalBRDF
 
-__all__ = ["AngleGrid", "Basis", "PrincipalBRDF", "storage"]
+__all__ = ["AngleGrid", "Basis", "PrincipalBRDF", "default_basis", "storage"]

@@ -1,28 +1,21 @@
-"""Principal components of measured reflectance, and BRDFs spanned by them."""
+"""Principal components of measured reflectance (Ono et al. 2019, equations (1) and (2))."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from pathlib import Path
-from typing import TYPE_CHECKING
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import Angles
-from ..brdf import TabulatedBRDF
 from . import mapping
 from .grid import AngleGrid
 
-if TYPE_CHECKING:
-    from .log_table import LogTable
-
 CHUNK = 1 << 17
 Progress = Callable[[str, float], None]
-DEFAULT_FILE = Path(__file__).parents[2] / "assets" / "basis" / "nbrdf_basis.npz"
 
 
 @dataclass(frozen=True)
@@ -47,21 +40,6 @@ class Basis:
     columns: int
     provenance: str
     training: NDArray[np.float64] | None = None
-
-    @staticmethod
-    def default() -> Basis:
-        """The embedded basis: no network, no file of the user's."""
-        return _load_default()
-
-    @staticmethod
-    def from_merl(folder: Path, progress: Progress = lambda stage, fraction: None) -> Basis:
-        """The basis of the 100 genuine MERL files in a folder, cached for the user.
-
-        Sizes and SHA-256 sums are checked. Raises InputError naming the first file that is wrong.
-        """
-        from .merl_folder import cached_basis
-
-        return cached_basis(folder, progress)
 
     @property
     def count(self) -> int:
@@ -136,36 +114,3 @@ class Basis:
             gram += q64.T @ q64
             right += q64.T @ (target - centre[:, None])
         return np.linalg.solve(gram + eta * np.eye(k), right).T
-
-
-@dataclass(frozen=True)
-class PrincipalBRDF:
-    """An isotropic BRDF as coefficients (3, k) in a basis; unitless coefficients, ρ in 1/sr."""
-
-    basis: Basis
-    coefficients: NDArray[np.float64]
-
-    @cached_property
-    def log_table(self) -> LogTable:
-        """The same BRDF with its components summed at the nodes: evaluating costs no more for a
-        hundred components than for one."""
-        from .log_table import LogTable  # log_table needs Basis: imported late
-
-        return LogTable.of(self.basis, self.coefficients)
-
-    def evaluate(self, angles: Angles) -> NDArray[np.float32]:
-        """ρ (..., 3) in 1/sr at half/difference angles (radians) of any shape."""
-        each = np.broadcast_arrays(*angles)
-        found = self.log_table.evaluate(Angles(*(np.ravel(a) for a in each)))
-        return found.reshape(*each[0].shape, found.shape[1])
-
-    def table(self) -> TabulatedBRDF:
-        """The BRDF at the MERL cells' centres."""
-        return TabulatedBRDF.from_function(self.evaluate)
-
-
-@lru_cache(maxsize=1)
-def _load_default() -> Basis:
-    from .storage import load  # storage needs Basis: imported late
-
-    return load(DEFAULT_FILE)

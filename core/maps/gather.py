@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ..job.job import Step
+from ..concurrency.job import Step
 from ..scan import Mesh
 from .level import MaterialLevel
 from .look import PhotoLook

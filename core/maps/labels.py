@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ..capture import Capture
 from ..geometry import PixelRays, RayScene, bands, view_window
-from ..job import inputs
-from ..job.photos import LitPhoto
+from ..inputs import capture_data
+from ..inputs.photos import LitPhoto
 from ..light import Light
 from ..samples.take import halo, inner_pixels, light_surface, trusted_pixels
 from ..scan import Camera, Scan
@@ -38,7 +38,7 @@ def label_pixels(
     light: Light,
 ) -> PixelLabels:
     """Look at one photo in bands, as sampling for a fit does. Raises InputError for its masks."""
-    masks = inputs.photo_masks(capture, place)
+    masks = capture_data.photo_masks(capture, place)
     margins = capture.fit.margins
     lines = PixelRays.of(camera)
     shown = np.zeros(camera.height * camera.width, np.uint8)
@@ -51,7 +51,7 @@ def label_pixels(
         if not wanted.any():
             continue
         lighting = light_surface(rays, view, light, camera)
-        where, in_shadow = inputs.material_pixels(capture, scan, view, place, masks)
+        where, in_shadow = capture_data.material_pixels(capture, scan, view, place, masks)
         good = trusted_pixels(view, lighting, margins) & ~in_shadow & wanted
         good &= usable.take(view.pixel)
         for index, material in enumerate(capture.materials):

@@ -12,7 +12,7 @@ from ..angles.vectors import dot, tangents
 from ..capture import Capture
 from ..geometry import RayScene
 from ..geometry.view import cast_shadow
-from ..job.photos import LitPhoto
+from ..inputs.photos import LitPhoto
 from ..light import DistantLight, Incidence, Light, MountedLight, NearLight
 from ..scan import Camera, Scan
 from .labels import PixelLabels, label_pixels

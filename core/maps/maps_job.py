@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..capture import Capture
+from ..concurrency.background import in_background
+from ..concurrency.job import Job, Step
 from ..geometry import RayScene
-from ..job import CaptureResult, inputs
-from ..job.beside import beside
-from ..job.job import Job, Step
-from ..job.lights import Lights, find_lights, refined
-from ..job.photos import LitPhotos
-from ..job.sampling import take_samples
+from ..inputs import capture_data
+from ..inputs.lights import Lights, find_lights, refined
+from ..inputs.photos import LitPhotos
+from ..jobs import CaptureResult
+from ..jobs.sampling import take_samples
 from ..result import FittedResult
 from ..samples import SampleTable
 from ..scan import Mesh, Scan
@@ -94,9 +95,9 @@ class MapsJob(Job):
         check_size(self.settings.size)
         own = from_result(capture, self.fitted)
         yield Step("reading the scan", 0.0)
-        scan = inputs.open_scan(capture)
-        inputs.check_face_attributes(capture, scan)
-        inputs.check_photos(capture, scan)
+        scan = capture_data.open_scan(capture)
+        capture_data.check_face_attributes(capture, scan)
+        capture_data.check_photos(capture, scan)
         unwrapped = scan.mesh.uv is None and self.unwrap is not None
         if unwrapped and self.unwrap is not None:
             yield Step("unwrapping the mesh", 0.01)
@@ -139,7 +140,7 @@ class MapsJob(Job):
             turned = TurnedNormals.of(plain, paint.levels)
             return None if turned is None else tangent_normals(paint.mesh, paint.texels, turned)
 
-        return (yield from beside(work, step))
+        return (yield from in_background(work, step))
 
     def _without_paint(
         self, see: _Seeing, texels: Texels, levels: tuple[MaterialLevel, ...]
@@ -242,7 +243,7 @@ class _Seeing:
         """One photo after the other, with what is to be told before it."""
         capture, count = self.capture, len(self.capture.photos)
         for place in range(count):
-            camera = inputs.camera_of(capture, self.scan, place)
+            camera = capture_data.camera_of(capture, self.scan, place)
             photo, light = self.photos.read(place), self.lights.of(capture, place)
             look = PhotoLook.of(capture, self.scan, self.rays, camera, place, photo, light, levels)
             yield Step("texels in the photos", begin + share * place / count), look

@@ -9,7 +9,7 @@ from ..basis import PrincipalBRDF
 from ..capture import Capture
 from ..errors import InputError
 from ..fit.measured_result import MeasuredResult
-from ..job import CaptureResult
+from ..jobs import CaptureResult
 from ..result import FittedResult
 from .labels import MOST_MATERIALS
 

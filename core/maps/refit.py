@@ -24,10 +24,10 @@ from scipy.spatial import cKDTree
 from ..angles import Angles
 from ..basis import Basis
 from ..capture import Capture
+from ..concurrency.background import in_background
 from ..fit.measured_result import MeasuredResult
-from ..job.beside import beside
-from ..job.estimators import estimate
-from ..job.fit_job import FitJob
+from ..jobs.estimators import estimate
+from ..jobs.fit_job import FitJob
 from ..samples import SampleTable
 from ..scan import Mesh
 from .level import MaterialLevel
@@ -110,7 +110,7 @@ def levels_without_paint(
     for index, table in enumerate(tables):
         level = paint.levels[index]
         done = index / len(tables)
-        plain = yield from beside(partial(paint.removed, index, scaled(table, level)), done)
+        plain = yield from in_background(partial(paint.removed, index, scaled(table, level)), done)
         steps = estimate(plain, basis, quick, level.name)
         while True:
             try:

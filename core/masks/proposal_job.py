@@ -7,19 +7,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..basis import Basis
+from ..basis import Basis, default_basis
 from ..capture import Capture
+from ..concurrency.job import Job, Step
+from ..concurrency.steps import drained
 from ..errors import FitError
 from ..geometry import RayScene, view_surface
-from ..job import inputs
-from ..job.job import Job, Step
-from ..job.lights import Lights, find_lights, refined
-from ..job.photos import LitPhotos
+from ..inputs import capture_data
+from ..inputs.lights import Lights, find_lights, refined
+from ..inputs.photos import LitPhotos
 from ..samples import sample_photo
 from ..samples.level import at_typical_level
 from ..samples.take import light_surface, trusted_pixels
 from ..scan import Scan
-from ..steps import drained
 from .proposal import Proposal, propose_materials
 from .proposal_cells import Cells
 
@@ -62,9 +62,9 @@ class ProposalJob(Job):
         """Scan, one photo after the other, the division."""
         capture = self.capture
         yield Step("reading the scan", 0.0)
-        basis = self.basis or Basis.default()
-        scan = inputs.open_scan(capture)
-        inputs.check_photos(capture, scan)
+        basis = self.basis or default_basis()
+        scan = capture_data.open_scan(capture)
+        capture_data.check_photos(capture, scan)
         rays = RayScene.build(scan.mesh)
         photos = LitPhotos.open(capture)
         lights = standing_lights(capture, scan, photos, rays, basis)
@@ -72,12 +72,12 @@ class ProposalJob(Job):
         factor: float | None = None if not lights.known else 1.0
         for place in range(len(capture.photos)):
             yield Step("looking at the photos", 0.05 + 0.7 * place / len(capture.photos))
-            camera = inputs.camera_of(capture, scan, place)
+            camera = capture_data.camera_of(capture, scan, place)
             view = view_surface(rays, camera)
             if not len(view.pixel):
                 continue
             lighting = light_surface(rays, view, lights.of(capture, place), camera)
-            _, in_shadow = inputs.material_pixels(capture, scan, view, place)
+            _, in_shadow = capture_data.material_pixels(capture, scan, view, place)
             keep = trusted_pixels(view, lighting, capture.fit.margins) & ~in_shadow
             lit = photos.read(place)
             keep &= lit.usable.ravel()[view.pixel]

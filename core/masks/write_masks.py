@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..basis import Basis
+from ..basis import default_basis
 from ..capture import Capture
 from ..capture.model import SHADOW_MASK
+from ..concurrency.job import Job, Step, finished
 from ..errors import InputError
 from ..geometry import RayScene, SurfaceView, edges, view_surface
-from ..job import inputs
-from ..job.job import Job, Step, finished
-from ..job.photos import LitPhotos
+from ..inputs import capture_data
+from ..inputs.photos import LitPhotos
 from ..photo import read_mask, write_png
 from .capture_text import capture_with_masks
 from .proposal import Proposal
@@ -76,17 +76,17 @@ class MasksJob(Job):
             done.names = material_names(done.proposal.count)
         else:
             yield Step("reading the scan", 0.0)
-            scan = inputs.open_scan(capture)
-            inputs.check_photos(capture, scan)
+            scan = capture_data.open_scan(capture)
+            capture_data.check_photos(capture, scan)
             rays = RayScene.build(scan.mesh)
             photos = LitPhotos.open(capture)
-            lights = standing_lights(capture, scan, photos, rays, Basis.default())
+            lights = standing_lights(capture, scan, photos, rays, default_basis())
         (self.folder / FOLDER).mkdir(parents=True, exist_ok=True)
         stems = _stems(capture)
         for place in range(len(capture.photos)):
             part = place / len(capture.photos)
             yield Step("painting masks", share + (1.0 - share) * part)
-            camera = inputs.camera_of(capture, scan, place)
+            camera = capture_data.camera_of(capture, scan, place)
             view = view_surface(rays, camera)
             if wanted.shadows:
                 light = lights.of(capture, place)

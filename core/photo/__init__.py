@@ -6,7 +6,6 @@ from .exif import Exif, read_exif
 from .image import image_size, read_encoded, read_mask, write_exr, write_png
 from .noise import Noise, estimate_noise
 from .photo import Photo, PhotoInfo, read_photo, read_radiance
-from .rectify import rectify
 from .transfer import Transfer
 
 __all__ = [
@@ -26,7 +25,6 @@ __all__ = [
     "read_mask",
     "read_photo",
     "read_radiance",
-    "rectify",
     "write_exr",
     "write_png",
 ]

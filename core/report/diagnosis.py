@@ -9,10 +9,10 @@ from urllib.parse import quote
 
 import numpy as np
 
-from ..diagnose.coordinates import Trend, coordinates, trend
-from ..diagnose.effect import Setting
-from ..diagnose.found import Found, Trial
-from ..job import CaptureResult
+from ..diagnose.forward.diagnosis_context import DiagnosisContext
+from ..diagnose.selection.diagnosis import Diagnosis, Trial
+from ..diagnose.selection.residual_trends import Trend, coordinates, trend
+from ..jobs import CaptureResult
 from ..photo import write_png
 from ..views.sphere import write_sphere
 from .page import page
@@ -24,20 +24,24 @@ STEPS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # of a chart's vertical axis
 
 
 def write_pages(
-    folder: Path, found: Found, setting: Setting, before: CaptureResult, after: CaptureResult
+    folder: Path,
+    found: Diagnosis,
+    context: DiagnosisContext,
+    before: CaptureResult,
+    after: CaptureResult,
 ) -> Path:
     """index.html and pictures; before, after: the fits without and with what was named."""
     folder.mkdir(parents=True, exist_ok=True)
-    body = section(found, setting) + _evidence(folder, found, setting)
+    body = section(found, context) + _evidence(folder, found, context)
     body += _materials(folder, before, after)
-    html = page(before.capture.file.name, body + _pictures(folder, found, setting))
+    html = page(before.capture.file.name, body + _pictures(folder, found, context))
     (folder / "index.html").write_text(html, "utf-8")
     return folder / "index.html"
 
 
-def _pictures(folder: Path, found: Found, setting: Setting) -> str:
+def _pictures(folder: Path, found: Diagnosis, context: DiagnosisContext) -> str:
     """HTML: what each photo shows more than the prediction, before and after."""
-    pixels, rows = setting.pixels, []
+    pixels, rows = context.pixels, []
     fits = {"before": found.before, "after": found.after}
     if not found.named:
         fits = {"before": found.before}
@@ -58,9 +62,9 @@ def _pictures(folder: Path, found: Found, setting: Setting) -> str:
     )
 
 
-def section(found: Found, setting: Setting) -> str:
+def section(found: Diagnosis, context: DiagnosisContext) -> str:
     """HTML: the ranking, then the residual along what betrays causes."""
-    left = f"<p>{escape(found.left.sentence())}</p>" if found.unexplained else ""
+    left = f"<p>{escape(found.residual.sentence())}</p>" if found.unexplained else ""
     rows = "".join(_row(t, found) for t in found.ranked)
     named = ", ".join(found.causes) or "nothing that can be named"
     return (
@@ -68,13 +72,13 @@ def section(found: Found, setting: Setting) -> str:
         "<p class='sub'>A gain is what the model with a cause predicts better of parts of the "
         "photos that it was not fitted to, in standard errors.</p>"
         f"{_errors(found)}<table><tr><th>cause</th><th>gain</th><th></th><th>what it would mean"
-        f"</th></tr>{rows}</table><div class='charts'>{_charts(found, setting)}</div>"
+        f"</th></tr>{rows}</table><div class='charts'>{_charts(found, context)}</div>"
         "<p class='sub'>What the photos show more than the prediction, relative; red before, blue "
         "after; bars: two standard errors.</p>"
     )
 
 
-def _errors(found: Found) -> str:
+def _errors(found: Diagnosis) -> str:
     """HTML: how well what was left out is predicted."""
     before, after = found.error_before, found.error_after
     rows = [
@@ -102,9 +106,9 @@ def evidence_file(cause: str) -> str:
     return f"evidence_{cause}.png"
 
 
-def _evidence(folder: Path, found: Found, setting: Setting) -> str:
+def _evidence(folder: Path, found: Diagnosis, context: DiagnosisContext) -> str:
     """HTML: what each cause that is named changes, in the photo that it changes most."""
-    cells, pixels = "", setting.pixels
+    cells, pixels = "", context.pixels
     for trial in found.named:
         changed = trial.changed() / found.before.deviation
         photo = photo_most_changed(pixels, changed)
@@ -154,11 +158,11 @@ def _materials(folder: Path, before: CaptureResult, after: CaptureResult) -> str
     )
 
 
-def _row(trial: Trial, found: Found) -> str:
+def _row(trial: Trial, found: Diagnosis) -> str:
     named = trial in found.named
     sure = trial.gain / max(trial.error, 1e-9)
     width = int(np.clip(12 * sure, 0, 160))
-    said = found.sentence(trial) if trial in found.noted else ""
+    said = found.sentence(trial) if trial in found.reported else ""
     style = "background:#2f6fb0" if named else "background:#bbb"
     return (
         f"<tr><th>{escape(trial.effect.cause)}</th><td>{sure:.1f}</td><td><div style='height:10px;"
@@ -166,14 +170,14 @@ def _row(trial: Trial, found: Found) -> str:
     )
 
 
-def _charts(found: Found, setting: Setting) -> str:
+def _charts(found: Diagnosis, context: DiagnosisContext) -> str:
     drawn = []
-    block = setting.pixels.block
-    for coordinate in coordinates(setting):
+    block = context.pixels.block
+    for coordinate in coordinates(context):
         trends = []
         for fitted in (found.before, found.after):
-            missed = setting.pixels.observed - fitted.shown
-            trends.append(trend(coordinate, missed, fitted.shown, fitted.deviation, block))
+            missed = context.pixels.observed - fitted.predicted
+            trends.append(trend(coordinate, missed, fitted.predicted, fitted.deviation, block))
         before = trends[0]
         if len(before.at):
             drawn.append((_sure_size(before), coordinate, trends))

@@ -5,16 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ..diagnose.found import Found, Trial
-from ..diagnose.unseen_error import UnseenError
-from ..job import CaptureResult
+from ..diagnose.selection.diagnosis import Diagnosis, Trial
+from ..diagnose.selection.held_out_error import HeldOutErrors
+from ..jobs import CaptureResult
 from .diagnosis import evidence_file
 from .result_json import parameters, program_version, write_json
 
 FORMAT = 2
 
 
-def describe(found: Found, before: CaptureResult, after: CaptureResult) -> dict[str, Any]:
+def describe(found: Diagnosis, before: CaptureResult, after: CaptureResult) -> dict[str, Any]:
     """The content of diagnosis.json; before, after: the fits without and with what was named.
     Gains are nats; angles are radians; held_out of materials is RMS, typical the median pixel."""
     tried = {t.effect.cause for trials in found.rounds for t in trials}
@@ -28,10 +28,10 @@ def describe(found: Found, before: CaptureResult, after: CaptureResult) -> dict[
         "causes": [_cause(t, found) for t in found.ranked],
         "unexplained": found.unexplained,
         "left": {
-            "gain": found.left.gain,
-            "standard_error": found.left.error,
-            "rms": found.left.change,
-            "sentence": found.left.sentence(),
+            "gain": found.residual.gain,
+            "standard_error": found.residual.error,
+            "rms": found.residual.change,
+            "sentence": found.residual.sentence(),
         },
         "applied": [effect.cause for effect in after.effects],
         "materials": [
@@ -50,12 +50,12 @@ def describe(found: Found, before: CaptureResult, after: CaptureResult) -> dict[
     }
 
 
-def write(path: Path, found: Found, before: CaptureResult, after: CaptureResult) -> None:
+def write(path: Path, found: Diagnosis, before: CaptureResult, after: CaptureResult) -> None:
     """Write the file; it appears whole or not at all."""
     write_json(path, describe(found, before, after))
 
 
-def _errors(error: UnseenError) -> dict[str, float | None]:
+def _errors(error: HeldOutErrors) -> dict[str, float | None]:
     """RMS errors relative to the photos' light."""
     return {
         "held_out": error.parts,
@@ -65,20 +65,22 @@ def _errors(error: UnseenError) -> dict[str, float | None]:
     }
 
 
-def _cause(trial: Trial, found: Found) -> dict[str, Any]:
-    numbers = trial.effect.numbers
+def _cause(trial: Trial, found: Diagnosis) -> dict[str, Any]:
+    numbers = trial.effect.parameters
     accepted = trial in found.accepted
     drawn = trial in found.named and len(numbers) > 0
     return {
         "cause": trial.effect.cause,
         "accepted": accepted,
-        "doubted": found.doubted.get(trial.effect.cause),
+        "doubted": found.contradicted.get(trial.effect.cause),
         "sentence": found.sentence(trial),
         "ties": [effect.cause for effect in trial.ties],
         "held_out_gain": trial.gain,
         "standard_error": trial.error,
-        "p_value": trial.chance,
+        "p_value": trial.p_value,
         "rms_change": trial.change,
         "evidence": f"report/{evidence_file(trial.effect.cause)}" if drawn else None,
-        "parameters": parameters(numbers.names, numbers.units, trial.told, trial.deviation),
+        "parameters": parameters(
+            numbers.names, numbers.units, trial.identified, trial.standard_errors
+        ),
     }

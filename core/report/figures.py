@@ -10,7 +10,7 @@ from ..fit import PaperFit
 from ..fit.held_out import HeldOut
 from ..fit.measured_result import NINETY, MeasuredResult
 from ..fit.spread import Spread
-from ..job import MaterialResult
+from ..jobs import MaterialResult
 
 GAIN_WORTH_TELLING = 0.02
 PERCENT = 0.5  # half widths beyond are told as factors

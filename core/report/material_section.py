@@ -10,7 +10,7 @@ from urllib.parse import quote
 import numpy as np
 
 from ..fit.measured_result import MeasuredResult
-from ..job import MaterialResult
+from ..jobs import MaterialResult
 from ..photo import write_png
 from ..views.charts import View, chart, most_measured
 from ..views.polar import NEAR_PLANE, polar

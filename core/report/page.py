@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
+from ..concurrency.steps import drained
 from ..fit import PaperFit
-from ..job import CaptureResult
+from ..jobs import CaptureResult
 from ..photo import write_png
 from ..samples import Criterion
-from ..steps import drained
 from ..views import photo_pictures, photo_view
 from ..views.criteria import LOOKS, Look
 from .material_section import material_section

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..diagnose.pixels import Pixels
+from ..diagnose.forward.pixels import Pixels
 from ..views import display
 
 LONGEST = 260

@@ -15,8 +15,9 @@ from ..appearance.lobe_stack import LobeStack
 from ..fit import PaperFit
 from ..fit.measured_result import MeasuredResult
 from ..fit.spread import Spread
-from ..job import CaptureResult, MaterialResult, Stage, inputs
-from ..job.applied import Applied
+from ..inputs import capture_data
+from ..jobs import CaptureResult, MaterialResult, Stage
+from ..jobs.applied_effects import AppliedEffect
 from ..light import Light
 from .figures import half_width, told_gains
 
@@ -96,7 +97,7 @@ def _light(result: CaptureResult, light: Light) -> dict[str, Any]:
     }
 
 
-def _effect(effect: Applied) -> dict[str, Any]:
+def _effect(effect: AppliedEffect) -> dict[str, Any]:
     """What a diagnosis named and the materials take into account."""
     return {
         "cause": effect.cause,
@@ -202,7 +203,7 @@ def _interval(spread: Spread) -> dict[str, Any]:
 def _paper(result: CaptureResult, fit: PaperFit, names: Sequence[str]) -> dict[str, Any]:
     chosen = fit.chosen
     width = {
-        photo: inputs.camera_of(result.capture, result.scan, photo).width
+        photo: capture_data.camera_of(result.capture, result.scan, photo).width
         for photo in np.unique(chosen.photo).tolist()
     }
     return {

@@ -6,7 +6,7 @@ from html import escape
 
 import numpy as np
 
-from ..diagnose.coordinates import Trend
+from ..diagnose.selection.residual_trends import Trend
 
 WIDTH, HEIGHT = 280, 150
 LEFT, RIGHT, TOP, BOTTOM = 40, 8, 20, 24

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..basis import Basis, storage
+from ..basis import Basis, default_basis, storage
 from ..basis.merl_folder import user_cache
 from ..errors import InputError
 from ..scan.parsing.json_record import shown
@@ -19,7 +19,7 @@ def basis_of_version(version: str, file: Path, cache: Path | None = None) -> Bas
     file: the result that asks, for the message. Raises InputError where this computer has no such
     basis, with what to do about it.
     """
-    default = Basis.default()
+    default = default_basis()
     if default.version == version:
         return default
     folder = user_cache() if cache is None else cache

@@ -110,7 +110,7 @@ class Camera:
         """The distortion-free camera with square pixels nearest to this one: same size, same pose.
 
         Blender's cameras are such pinholes; the photo behind them is resampled with
-        :func:`patina.core.photo.rectify`.
+        :func:`patina.core.geometry.rectify.rectify`.
         """
         lens = self.lens
         cx, cy = lens.principal_point_x, lens.principal_point_y

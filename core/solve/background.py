@@ -8,8 +8,8 @@ from typing import Generic, TypeVar
 
 import pycolmap
 
+from ..concurrency.job import Step
 from ..errors import PatinaError
-from ..job.job import Step
 
 Result = TypeVar("Result")
 PAUSE = 0.1  # seconds a step waits for news

@@ -8,9 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ..concurrency.job import Job, Step
 from ..errors import InputError, PatinaError
 from ..geometry import RayScene
-from ..job.job import Job, Step
 from ..photo import image_size
 from ..scan import Camera, Mesh
 from ..scan.readers.patina_cameras import write_patina_cameras

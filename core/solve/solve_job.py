@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from ..concurrency.job import Job, Step
 from ..errors import InputError
-from ..job.job import Job, Step
 from .background import Background
 from .photo_set import find_photos
 from .solution import Solution

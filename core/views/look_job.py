@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..capture import Capture
+from ..concurrency.job import Job, Step
+from ..concurrency.steps import relayed
 from ..geometry import RayScene
-from ..job import CaptureResult, inputs
-from ..job.job import Job, Step
-from ..job.lights import find_lights, refined
-from ..job.photos import LitPhotos
+from ..inputs import capture_data
+from ..inputs.lights import find_lights, refined
+from ..inputs.photos import LitPhotos
+from ..jobs import CaptureResult
 from ..scan import Scan
-from ..steps import relayed
 from .photo_view import Fitted, PhotoView, look_at_photo
 
 
@@ -49,10 +50,10 @@ class LookJob(Job):
             scan, rays, photos, lights = known.scan, known.rays, known.photos, known.lights
         else:
             yield Step("reading the scan", 0.0)
-            scan = inputs.open_scan(capture)
+            scan = capture_data.open_scan(capture)
             if self.prepare is not None:
                 scan = self.prepare(scan)
-            inputs.check_face_attributes(capture, scan)
+            capture_data.check_face_attributes(capture, scan)
             yield Step("reading the scan", 0.2)
             rays, photos = RayScene.build(scan.mesh), LitPhotos.open(capture)
             lights, start = find_lights(capture, scan, photos), 0.3
@@ -63,7 +64,7 @@ class LookJob(Job):
                     lambda done: Step("refining the lights", 0.3 + 0.4 * done),
                 )
                 start = 0.7
-        used = self._used(inputs.camera_of(capture, scan, self.place).width)
+        used = self._used(capture_data.camera_of(capture, scan, self.place).width)
         self.view = yield from relayed(
             look_at_photo(capture, scan, rays, photos, lights, self.fitted, self.place, used),
             lambda done: Step("looking at the photo", start + (1 - start) * done),

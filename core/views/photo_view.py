@@ -16,9 +16,9 @@ from ..fit.held_out import DARK
 from ..fit.measured_result import MeasuredResult
 from ..fit.reliability import calm
 from ..geometry import PixelRays, RayScene, SurfaceView, Window, bands, view_window
-from ..job import inputs
-from ..job.lights import Lights
-from ..job.photos import LitPhoto, LitPhotos
+from ..inputs import capture_data
+from ..inputs.lights import Lights
+from ..inputs.photos import LitPhoto, LitPhotos
 from ..predict.compose import predict_photo
 from ..samples import Criterion
 from ..samples.take import deciding_criteria, halo, light_surface
@@ -137,8 +137,8 @@ def look_at_photo(
     brdfs: of some or all of the capture's materials, of whatever fit. used: (k,) flat indices in
     the photo of pixels that a fit rests on (see chosen_pixels).
     """
-    camera = inputs.camera_of(capture, scan, place)
-    masks = inputs.photo_masks(capture, place)
+    camera = capture_data.camera_of(capture, scan, place)
+    masks = capture_data.photo_masks(capture, place)
     light = lights.of(capture, place)
     yield 0.0
     photo = photos.read(place)
@@ -151,7 +151,7 @@ def look_at_photo(
         yield (1 + done) / (2 + len(windows))
         view = view_window(rays, lines, window)
         lighting = light_surface(rays, view, light, camera)
-        where, _ = inputs.material_pixels(capture, scan, view, place, masks)
+        where, _ = capture_data.material_pixels(capture, scan, view, place, masks)
         criteria = deciding_criteria(
             view,
             lighting,

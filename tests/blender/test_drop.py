@@ -101,7 +101,7 @@ def test_cameras_and_photos_become_a_capture() -> None:
     assert capture.scan.mesh.name == "mesh.ply" and capture.scan.cameras.name == "sparse"
     scene = bpy.context.scene
     assert len(scene.patina_photos.photos) == 2 and scene.patina.mesh is not None
-    assert extension("scene.properties").capture_path(scene) == str(path.resolve())
+    assert extension("scene.session.scene_properties").capture_path(scene) == str(path.resolve())
     assert bpy.ops.patina.fit.poll()
 
 
@@ -173,7 +173,7 @@ def test_photos_of_an_open_capture_become_another_one() -> None:
     (lit / "other.exr").write_bytes((lit / "view_02.exr").read_bytes())
     told["files"] = files("other.exr")
     assert "other.exr" in refused(bpy.ops.patina.drop_photos, **told)
-    state = extension("scene.running")
+    state = extension("scene.session.running_job")
     state.tell(state.Running(bpy.context.scene.name, "fit", "sampling", 0.5))
     try:
         assert not bpy.ops.patina.drop_photos.poll()

@@ -16,7 +16,7 @@ def measured():
     """A capture in the scene, and what a fit would have left there: seconds instead of a minute."""
     path = made().make_capture(folder() / "ball", photos=2)
     assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
-    basis = extension("core.basis").Basis.default()
+    basis = extension("core.basis").default_basis()
     entry = {
         "name": "surface",
         "estimator": "measured",
@@ -28,7 +28,7 @@ def measured():
         },
     }  # fmt: skip
     told = {"format": 2, "basis": {"version": basis.version}, "materials": [entry]}
-    properties = extension("scene.properties")
+    properties = extension("scene.session.scene_properties")
     properties.store_result(str(path.resolve()), {**told, "capture": str(path.resolve())})
     material = bpy.data.materials.new("surface")
     material["patina_measured"], material["patina_capture"] = "surface", str(path.resolve())
@@ -127,14 +127,14 @@ def test_without_its_mesh_the_material_goes_out_on_a_sphere() -> None:
 
 def test_the_report_lives_as_long_as_the_fit() -> None:
     path, out = fitted(), folder()
-    choice, scene = extension("scene.export_choice"), bpy.context.scene
+    choice, scene = extension("scene.export.export_choice"), bpy.context.scene
     assert choice.missing(scene, "report") is None
     told = {"directory": str(out), "folder": "a", "formats": {"report", "record"}}
     assert bpy.ops.patina.export(**told) == {"FINISHED"}
     page = (out / "a" / "report" / "index.html").read_text("utf-8")
     assert "surface" in page and path.name in page
     record = json.loads((out / "a" / "result.json").read_text())
-    assert record == extension("scene.properties").stored_result(str(path.resolve()))
+    assert record == extension("scene.session.scene_properties").stored_result(str(path.resolve()))
 
     text = bpy.data.texts["Patina result"]
     said, kept = json.loads(text.as_string()), text.as_string()
@@ -180,7 +180,7 @@ def test_the_choice_of_the_panel_is_taken_where_none_is_told() -> None:
 
 
 def test_a_second_blender_that_fails_is_one_line() -> None:
-    background = extension("scene.background")
+    background = extension("scene.session.background_blender")
     errors = extension("core.errors")
     for words, said in (
         (["material", "/nowhere", "--to", "gltf", "--out", "/tmp/x"], "expected a result"),

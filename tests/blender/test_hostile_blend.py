@@ -40,7 +40,7 @@ def material(name: str, **names: object) -> bpy.types.Material:
     made["patina_components"] = names.get("components", VALID)
     made.use_nodes = True
     node = made.node_tree.nodes.new("ShaderNodeScript")
-    extension("scene.materials").ensure_sockets(node, 1)
+    extension("scene.material.material_nodes").ensure_sockets(node, 1)
     for socket in node.inputs:
         if socket.identifier in ("components", "remainder", "sampling"):
             socket.default_value = "/nowhere/at/all.exr"
@@ -102,10 +102,10 @@ class Unwatched:
     """Without the extension's handlers, as on the machine of whoever made the .blend."""
 
     def __enter__(self) -> None:
-        extension("scene.osl_files").unregister()
+        extension("scene.material.osl_files").unregister()
 
     def __exit__(self, *_: object) -> None:
-        extension("scene.osl_files").register()
+        extension("scene.material.osl_files").register()
 
 
 def opened(blend: Path) -> None:
@@ -114,7 +114,7 @@ def opened(blend: Path) -> None:
 
 def test_a_hostile_blend_writes_nothing_outside() -> None:
     place, blend, data = hostile()
-    own = extension("scene.folders").own_folder()
+    own = extension("scene.session.folders").own_folder()
     before, own_before = files(place), set(own.rglob("*"))
     opened(blend)
     bpy.ops.wm.save_mainfile()
@@ -131,7 +131,7 @@ def test_the_valid_file_is_restored_on_load() -> None:
     _, blend, data = hostile()
     opened(blend)
     material = bpy.data.materials["good"]
-    osl_files = extension("scene.osl_files")
+    osl_files = extension("scene.material.osl_files")
     (node,) = osl_files.script_nodes(material)
     sockets = {s.identifier: s for s in node.inputs}
     assert Path(sockets["components"].default_value) == blend.parent / VALID
@@ -159,7 +159,7 @@ def test_refusals_say_what_was_found_and_what_to_do() -> None:
 def test_a_damaged_property_does_not_stop_the_handlers() -> None:
     _, blend, _ = hostile()
     opened(blend)
-    parts = extension("scene.measured_parts")
+    parts = extension("scene.material.measured_nodes")
     material = bpy.data.materials["broken json"]
     for told in ("{", "5", "[]", '{"solid": 5}', '{"solid": [1, "x", {}]}', "[" * 5000):
         material["patina_as_measured"] = told
@@ -172,7 +172,7 @@ def test_a_damaged_property_does_not_stop_the_handlers() -> None:
 def test_values_put_back_lead_to_no_other_file() -> None:
     _, blend, _ = hostile()
     opened(blend)
-    parts, files = extension("scene.measured_parts"), extension("scene.osl_files")
+    parts, files = extension("scene.material.measured_nodes"), extension("scene.material.osl_files")
     material = bpy.data.materials["good"]
     shader = {"label": "as measured", "values": {"sampling": "/etc/passwd"}}
     kept = {"solid": [[1, 0, 0, 1], 0, 1], "principled": None, "lobes": None, "shaders": [shader]}
@@ -185,7 +185,7 @@ def test_values_put_back_lead_to_no_other_file() -> None:
 
 
 def test_a_mask_of_no_known_kind_becomes_no_file_name() -> None:
-    masks = extension("scene.mask_images")
+    masks = extension("scene.paint.mask_images")
     for kind in ("shadow", "x/../../../evil", "..\\evil", 5):
         image = bpy.data.images.new(f"mask {kind}", 2, 2)
         image["patina_capture"], image["patina_shadow_of"], image["patina_mask"] = "a.toml", 0, kind
@@ -193,7 +193,7 @@ def test_a_mask_of_no_known_kind_becomes_no_file_name() -> None:
 
 
 def test_a_network_path_is_not_looked_at() -> None:
-    trusted = extension("scene.osl_files").is_trusted_path
+    trusted = extension("scene.material.osl_files").is_trusted_path
     place = folder()
     (place / VALID).write_bytes(exr(place))
     assert trusted(str(place / VALID)) and not trusted("/" + str(place / VALID))

@@ -85,7 +85,9 @@ def test_a_dragged_lamp_is_what_the_fit_uses() -> None:
     bpy.ops.ed.undo()
     assert not np.allclose(lamp("lamp").location, PLACE)
     capture = extension("core.capture").read_capture(path)
-    now, names = extension("scene.moved_lamps").with_dragged_lamps(capture, bpy.context.scene)
+    now, names = extension("scene.photos.dragged_lamps").with_dragged_lamps(
+        capture, bpy.context.scene
+    )
     assert names == [] and now.lights[0] is capture.lights[0]
 
 
@@ -111,7 +113,7 @@ def test_lights_are_saved_and_come_back() -> None:
         raise AssertionError("a file was replaced unasked")
     bpy.ops.patina.save_lights(filepath=str(path), check_existing=False)  # into its own file
     assert "# by eye" in path.read_text()
-    reader, moved = extension("core.capture").read_capture, extension("scene.moved_lamps")
+    reader, moved = extension("core.capture").read_capture, extension("scene.photos.dragged_lamps")
     assert moved.with_dragged_lamps(reader(path), bpy.context.scene)[1] == []
     for _ in range(3):
         bpy.ops.patina.next_photo()
@@ -173,7 +175,9 @@ def test_the_panel_says_what_was_done_by_hand() -> None:
                                       "1/beam²": {"value": 0.0, "standard_error": 0.1}}},
         {"name": "lamp", "refined": {}},
     ]  # fmt: skip
-    extension("scene.properties").store_result(scene.camera["patina_capture"], {"lights": lights})
+    extension("scene.session.scene_properties").store_result(
+        scene.camera["patina_capture"], {"lights": lights}
+    )
     assert drawn() == ["Flash: flash", "Refined: right 0.432 scan units"]
     bpy.data.objects.remove(lamp("flash"))
     assert drawn() == ["flash: its lamp is gone"]

@@ -51,7 +51,7 @@ def imported(extra: str = ""):
 
 
 def test_without_an_entry_all_is_as_usual() -> None:
-    read = extension("scene.preferences")
+    read = extension("scene.session.preferences")
     with preferred():
         assert read.preferences() == read.Preferences()
         assert read.preferences().margins == extension("core.samples").Margins()
@@ -86,7 +86,7 @@ def test_wider_margins_leave_fewer_samples() -> None:
 
 
 def test_lengths_are_told_in_the_preferred_unit() -> None:
-    lengths, stages = extension("scene.lengths"), extension("scene.stages")
+    lengths, stages = extension("scene.session.lengths"), extension("scene.views.workflow_stages")
     imported()
     said = "2 % of it spreads over 0.02 scan units, so that 1.5e+02 scan units away"
     assert lengths.with_lengths(said) == said
@@ -102,16 +102,16 @@ def test_lengths_are_told_in_the_preferred_unit() -> None:
 
 
 def test_the_cache_folder_takes_what_has_no_place() -> None:
-    folders, place = extension("scene.folders"), folder()
+    folders, place = extension("scene.session.folders"), folder()
     usual = folders.own_folder(), folders.cache_folder()
     with preferred(cache_folder=str(place)):
         assert folders.cache_folder() == place
         assert folders.own_folder() == folders.blend_folder() == place / "files"
         assert place in folders.rectified_folder(place / "x.capture.toml").parents
-        if extension("scene.materials").osl_missing() is None:
+        if extension("scene.material.material_nodes").osl_missing() is None:
             basis = extension("core.basis")
-            brdf = basis.PrincipalBRDF(basis.Basis.default(), np.full((3, 4), 0.01))
-            extension("scene.osl_files").ensure_files(brdf)
+            brdf = basis.PrincipalBRDF(basis.default_basis(), np.full((3, 4), 0.01))
+            extension("scene.material.osl_files").ensure_files(brdf)
             assert len(list((place / "files").glob("patina_*.exr"))) == 3
     assert (folders.own_folder(), folders.cache_folder()) == usual
 
@@ -135,7 +135,7 @@ def fill(place: Path) -> list[Path]:
 
 
 def test_the_cache_is_emptied_but_for_what_is_shown() -> None:
-    place, cache = folder(), extension("scene.cache")
+    place, cache = folder(), extension("scene.material.file_cache")
     with preferred(cache_folder=str(place)):
         assert not bpy.ops.patina.empty_cache.poll()
         files = fill(place)
@@ -166,7 +166,7 @@ def test_materials_are_fitted_in_a_basis_of_ones_own_files() -> None:
     """Three made-up 'genuine' files stand for the hundred; the export finds the basis again."""
     basis, brdf = extension("core.basis"), extension("core.brdf")
     merl, place, cache = extension("core.basis.merl_folder"), folder(), folder()
-    default = basis.Basis.default()
+    default = basis.default_basis()
     for k, name in enumerate("abcdefgh"):
         own = basis.PrincipalBRDF(default, default.training[15 * k : 15 * k + 3])
         table = brdf.TabulatedBRDF.from_function(own.evaluate)
@@ -177,7 +177,7 @@ def test_materials_are_fitted_in_a_basis_of_ones_own_files() -> None:
     try:
         with preferred(merl_folder=str(place), cache_folder=str(cache)):
             assert bpy.ops.patina.fit() == {"FINISHED"}
-            scene, properties = bpy.context.scene, extension("scene.properties")
+            scene, properties = bpy.context.scene, extension("scene.session.scene_properties")
             told = properties.stored_result(properties.capture_path(scene))["basis"]
             assert told["columns"] == 3 * len(sums) and told["version"] != default.version
             assert [p.name for p in cache.glob("merl_basis_*.npz")]

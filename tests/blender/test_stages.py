@@ -22,7 +22,7 @@ def two_from_one_place():
 
 
 def test_stages_follow_the_work() -> None:
-    stages, scene = extension("scene.stages"), bpy.context.scene
+    stages, scene = extension("scene.views.workflow_stages"), bpy.context.scene
     found = stages.stages(scene)
     assert list(found) == ["scan", "photos", "masks", "fit", "check", "material"]
     assert stages.next_stage(found) == "scan" and found["scan"].press == "patina.import_capture"
@@ -49,7 +49,7 @@ def test_each_photo_is_looked_at_by_its_line() -> None:
     path = two_from_one_place()
     assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
     scene = bpy.context.scene
-    state, listed = scene.patina_photos, extension("scene.photo_list")
+    state, listed = scene.patina_photos, extension("scene.photos.photo_list")
     assert [p.name for p in state.photos] == [*(f"lit_{k + 1}.exr" for k in range(4)), "again.exr"]
     first, last = state.photos[0], state.photos[4]
     assert first.camera == last.camera == scene.camera
@@ -123,7 +123,7 @@ def test_the_list_survives_and_old_files_get_one() -> None:
 def test_a_deleted_camera_is_passed_over() -> None:
     path = made().make_capture(folder() / "ball", photos=3)
     bpy.ops.patina.import_capture(filepath=str(path))
-    scene, listed = bpy.context.scene, extension("scene.photo_list")
+    scene, listed = bpy.context.scene, extension("scene.photos.photo_list")
     bpy.data.objects.remove(scene.patina_photos.photos[1].camera)
     assert [p.name for p in listed.lit_photos(scene)] == ["lit_1.exr", "lit_3.exr"]
     bpy.ops.patina.next_photo()
@@ -133,7 +133,7 @@ def test_a_deleted_camera_is_passed_over() -> None:
 
 
 def test_time_left_is_told_in_round_numbers() -> None:
-    state = extension("scene.running")
+    state = extension("scene.session.running_job")
     for seconds, said in (
         (None, "x"),
         (3, "x, 5 s left"),

@@ -34,9 +34,9 @@ def ticked(operator) -> list[float]:
 
 def test_a_fit_by_the_timer_is_the_fit_of_a_script() -> None:
     assert bpy.ops.patina.import_demo() == {"FINISHED"}
-    running = extension("scene.running").running
+    running = extension("scene.session.running_job").running
     ticks = ticked(of("fit", "PATINA_OT_fit"))
-    measured = extension("scene.apply").measured_materials
+    measured = extension("scene.scan.apply_result").measured_materials
     stepped = {m.name: list(m["patina_coefficients"]) for m in measured()}
     assert running(bpy.context.scene) is None and stepped
     # one step in a hundred may meet a busy machine
@@ -47,7 +47,7 @@ def test_a_fit_by_the_timer_is_the_fit_of_a_script() -> None:
 
 def test_esc_leaves_the_file_as_it_was() -> None:
     assert bpy.ops.patina.import_demo() == {"FINISHED"}
-    before, running = counts(), extension("scene.running").running
+    before, running = counts(), extension("scene.session.running_job").running
     for module, name in (
         ("fit", "PATINA_OT_fit"),
         ("masks", "PATINA_OT_propose_materials"),

@@ -26,8 +26,8 @@ def measured() -> bpy.types.Material:
     bpy.ops.wm.open_mainfile(filepath=_fitted[0])
     bpy.ops.wm.save_as_mainfile(filepath=str(folder() / "own.blend"))
     material = bpy.data.materials["surface"]
-    moved = extension("scene.moved")
-    extension("scene.preview").show_sphere(material, moved.measured_brdf(material))
+    moved = extension("scene.material.trait_offsets")
+    extension("scene.material.preview").show_sphere(material, moved.measured_brdf(material))
     return material
 
 
@@ -35,7 +35,7 @@ class Plainer:
     """Fits of portable models that take no time: what follows when, not how well, is tested."""
 
     def __enter__(self):
-        self.module = extension("scene.follow_traits")
+        self.module = extension("scene.material.trait_update")
         self.fits = self.module.fit_principled, self.module.fit_lobe_stack
         principled, lobes = self.fits
         self.module.fit_principled = lambda evaluate: principled(evaluate, False, (10, 4, 3))
@@ -53,14 +53,16 @@ def preview(material: bpy.types.Material) -> np.ndarray:
 
 def look(material: bpy.types.Material) -> dict:
     """All that a slider may change, as exact values."""
-    parts = extension("scene.measured_parts")
+    parts = extension("scene.material.measured_nodes")
     told = {
         "coefficients": list(material["patina_coefficients"]),
         "solid": (*material.diffuse_color, material.metallic, material.roughness),
-        "files": [material.get(k) for k in extension("scene.osl_files").PROPERTIES.values()],
+        "files": [
+            material.get(k) for k in extension("scene.material.osl_files").PROPERTIES.values()
+        ],
     }
     nodes = {"principled": parts.principled_node(material), "lobes": parts.lobe_node(material)}
-    for i, node in enumerate(extension("scene.osl_files").script_nodes(material)):
+    for i, node in enumerate(extension("scene.material.osl_files").script_nodes(material)):
         nodes[f"shader {i}"] = node
     for name, node in nodes.items():
         inputs = {s.identifier: s.default_value for s in node.inputs if hasattr(s, "default_value")}
@@ -72,7 +74,7 @@ def look(material: bpy.types.Material) -> dict:
 
 def coefficients(material: bpy.types.Material) -> np.ndarray | None:
     """(3, 8) of the OSL shader; None where there is none."""
-    found = extension("scene.osl_files").script_nodes(material)
+    found = extension("scene.material.osl_files").script_nodes(material)
     if not found:
         return None
     sockets = {s.identifier: s for s in found[0].inputs}
@@ -94,7 +96,7 @@ def test_the_sphere_and_the_shader_follow_at_once() -> None:
     if as_fitted is not None:
         np.testing.assert_allclose(coefficients(material), expected, rtol=1e-6)
         assert not np.allclose(as_fitted, expected, atol=step / 4)
-    moved = extension("scene.moved")
+    moved = extension("scene.material.trait_offsets")
     np.testing.assert_allclose(moved.moved_brdf(material).coefficients[:, :8], expected)
     small = preview(material)
     assert small.shape[0] == moved.QUICK
@@ -138,13 +140,13 @@ def test_reset_brings_back_what_was_measured_to_the_bit() -> None:
         follow.settle()
         assert len({image.name for image in bpy.data.images} - images) <= 1
     assert bpy.ops.patina.reset_traits() == {"FINISHED"}
-    assert not extension("scene.moved").shifts(material).any()
+    assert not extension("scene.material.trait_offsets").shifts(material).any()
     assert look(material) == before
     np.testing.assert_array_equal(preview(material), sphere)
     assert not {"patina_traits_shown", "patina_as_measured", "patina_measured_sampling"} & {
         *material.keys()
     }
-    assert not extension("scene.follow_traits").behind(material)
+    assert not extension("scene.material.trait_update").behind(material)
 
 
 def test_a_slider_back_at_0_is_as_measured_too() -> None:
@@ -206,7 +208,7 @@ def test_sliders_and_look_are_saved_and_a_new_fit_has_none() -> None:
     material.patina_traits.every.trait_1 = 0.75
     assert bpy.ops.patina.fit() == {"FINISHED"}
     material = bpy.data.materials["surface"]
-    assert not extension("scene.moved").state(material)
+    assert not extension("scene.material.trait_offsets").state(material)
     assert look(material)["coefficients"] == before["coefficients"]
 
 
@@ -238,16 +240,16 @@ def test_the_timer_follows_and_goes() -> None:
 
 def test_the_panel_says_what_cannot_be() -> None:
     material = measured()
-    box, moved = extension("panels.traits_box"), extension("scene.moved")
+    box, moved = extension("panels.traits_box"), extension("scene.material.trait_offsets")
     words = moved.words_of(material["patina_basis"])
     assert len(words) == 8 and all(words)
     assert not box.notes(material)
     material.patina_traits.every.trait_2 = -4.0
     said = " ".join(line for line, _ in box.notes(material))
     assert "times the light" in said and "Component 2" in said and "EEVEE" in said
-    assert extension("scene.traits").shown_material(bpy.context) == material
+    assert extension("scene.material.trait_properties").shown_material(bpy.context) == material
     del material["patina_basis"], material["patina_coefficients"]
-    assert extension("scene.traits").shown_material(bpy.context) is None
+    assert extension("scene.material.trait_properties").shown_material(bpy.context) is None
 
 
 class Layout:
@@ -299,5 +301,5 @@ def test_a_material_whose_basis_is_not_here_stays_as_it_is() -> None:
     material["patina_basis"] = "0123456789ab"
     material.patina_traits.every.trait_1 = 1.0
     assert look(material) == before and not bpy.ops.patina.reset_traits.poll()
-    extension("scene.follow_traits").settle()
+    extension("scene.material.trait_update").settle()
     assert look(material) == before

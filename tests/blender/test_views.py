@@ -29,7 +29,7 @@ def fitted() -> bpy.types.Material:
 
 def in_memory() -> bool:
     """Whether the fit itself is still there."""
-    return extension("scene.last_fit")._last.thing is not None
+    return extension("scene.session.last_fit")._last.thing is not None
 
 
 def pixels(image: bpy.types.Image) -> np.ndarray:
@@ -40,19 +40,21 @@ def pixels(image: bpy.types.Image) -> np.ndarray:
 
 def view(kind: str) -> bpy.types.Image:
     assert bpy.ops.patina.show_chart(kind=kind) == {"FINISHED"}
-    return extension("scene.view_image").view_image(kind)
+    return extension("scene.views.view_image").view_image(kind)
 
 
 def test_the_material_keeps_what_it_was_measured_by() -> None:
     """Its samples and its interval are those of the fit."""
     assert not bpy.ops.patina.show_chart.poll(), "there is nothing to show yet"
     material = fitted()
-    subject = extension("scene.charted").subject_of(material)
+    subject = extension("scene.material.material_evidence").subject_of(material)
     assert 100 < len(subject.points) <= 6000 and subject.interval is not None
     if not in_memory():  # another test was first
         bpy.ops.patina.fit()
-        subject = extension("scene.charted").subject_of(bpy.data.materials["surface"])
-    job = extension("scene.last_fit")._last.thing
+        subject = extension("scene.material.material_evidence").subject_of(
+            bpy.data.materials["surface"]
+        )
+    job = extension("scene.session.last_fit")._last.thing
     kept_points, points = job.materials[0].points, subject.points
     assert np.array_equal(points.rho, kept_points.rho)
     low, high = subject.interval(points.angles)
@@ -71,13 +73,13 @@ def test_every_chart_is_shown_and_survives_a_reload() -> None:
     views = bpy.context.scene.patina_views
     assert views.shown == "interval"
     best = extension("core.views.charts").most_measured(
-        extension("scene.charted").subject_of(bpy.data.materials["surface"])
+        extension("scene.material.material_evidence").subject_of(bpy.data.materials["surface"])
     )
     assert abs(np.degrees(views.theta_d) - best) < 0.01, "the highlight where most samples are"
     path = str(folder() / "views.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
-    find = extension("scene.view_image").view_image
+    find = extension("scene.views.view_image").view_image
     assert np.array_equal(pixels(find("slice")), pictures["slice"]), "the image was not packed"
     assert np.array_equal(pixels(view("highlight")), pictures["highlight"])
 
@@ -97,7 +99,7 @@ def test_a_chart_follows_its_settings() -> None:
 
 def test_fits_are_compared() -> None:
     material = fitted()
-    charted, views = extension("scene.charted"), bpy.context.scene.patina_views
+    charted, views = extension("scene.material.material_evidence"), bpy.context.scene.patina_views
     views.against = "EARLIER"
     assert not charted.has_earlier(material)
     try:
@@ -133,12 +135,12 @@ def test_fits_are_compared() -> None:
 
 def test_a_photo_is_looked_at_after_the_fit_and_after_a_reload() -> None:
     fitted()
-    scene, listed = bpy.context.scene, extension("scene.photo_list")
+    scene, listed = bpy.context.scene, extension("scene.photos.photo_list")
     scene.camera = None
     assert not bpy.ops.patina.look_at_photo.poll(), "no photo is looked through"
     scene.patina_photos.active = 1
     assert listed.looked_at(scene) is not None
-    find = extension("scene.view_image").view_image
+    find = extension("scene.views.view_image").view_image
     for kind in ("comparison", "samples"):
         assert bpy.ops.patina.look_at_photo(kind=kind) == {"FINISHED"}
     comparison, samples = pixels(find("comparison")), pixels(find("samples"))

@@ -57,7 +57,7 @@ def lenses():
 
 def test_cameras_stand_at_their_pixel() -> None:
     """Blender's projection against pycolmap's, over the whole frame: < 0.01 px."""
-    core, scene_cameras = extension("core.scan"), extension("scene.cameras")
+    core, scene_cameras = extension("core.scan"), extension("scene.photos.cameras")
     rng = np.random.default_rng(0)
     scene = bpy.context.scene
     worst = 0.0
@@ -87,7 +87,7 @@ def test_cameras_stand_at_their_pixel() -> None:
 
 def test_rectified_photos_show_what_the_pinhole_sees() -> None:
     """A photo of a distorted lens, resampled: a dot lands where the pinhole projects its point."""
-    core, photo = extension("core.scan"), extension("core.photo")
+    core, rectified = extension("core.scan"), extension("core.geometry.rectify")
     rotation, translation = next(iter(made().poses(1)))
     camera = core.Camera(
         "x",
@@ -101,7 +101,7 @@ def test_rectified_photos_show_what_the_pinhole_sees() -> None:
     for x, y in ((40.0, 30.0), (200.0, 150.0), (350.0, 250.0)):
         rows, columns = np.indices((300, 400)) + 0.5
         dot = np.exp(-((columns - x) ** 2 + (rows - y) ** 2) / 18.0)[..., None] * np.ones(3)
-        out = photo.rectify(dot.astype(np.float32), camera, target)[..., 0]
+        out = rectified.rectify(dot.astype(np.float32), camera, target)[..., 0]
         found = np.array([(out * columns).sum(), (out * rows).sum()]) / out.sum()
         point = camera.pose.centre + camera.rays(np.array([[x, y]])) * 4.0
         assert np.abs(found - target.project(point)[0]).max() < 0.05
@@ -151,7 +151,7 @@ def test_the_fit_operator_gives_the_numbers_of_the_api() -> None:
     bpy.ops.patina.import_capture(filepath=str(path))
     assert bpy.ops.patina.fit() == {"FINISHED"}
     said = json.loads(bpy.data.texts["Patina result"].as_string())
-    job = extension("core.job").FitJob(extension("core.capture").read_capture(path))
+    job = extension("core.jobs").FitJob(extension("core.capture").read_capture(path))
     job.drain()
     expected = job.result.materials[0].fit.brdf.coefficients
     assert np.array_equal(np.array(said["materials"][0]["coefficients"]), expected)
@@ -165,7 +165,7 @@ def test_the_fit_operator_gives_the_numbers_of_the_api() -> None:
     assert portable.is_active_output
     assert portable.inputs["Surface"].links[0].from_node.bl_idname == "ShaderNodeBsdfPrincipled"
     measured = [n for n in tree.nodes if n.bl_idname == "ShaderNodeScript"]
-    if extension("scene.materials").osl_missing() is None:
+    if extension("scene.material.material_nodes").osl_missing() is None:
         assert measured and measured[0].outputs[0].links[0].to_node.target == "CYCLES"
         names = [s.name for s in measured[0].inputs]
         assert "Coefficient 1" in names and "Coefficient 6" in names
@@ -183,7 +183,9 @@ def test_the_demo_by_operator_is_the_demo_by_api() -> None:
     assert bpy.ops.patina.fit() == {"FINISHED"}
     said = json.loads(bpy.data.texts["Patina result"].as_string())
     demo = extension("operators.import_capture").DEMO
-    job = extension("core.job").FitJob(extension("core.capture").read_capture(demo), portable=False)
+    job = extension("core.jobs").FitJob(
+        extension("core.capture").read_capture(demo), portable=False
+    )
     job.drain()
     assert [m["name"] for m in said["materials"]] == ["glaze", "clay"]
     for told, fitted in zip(said["materials"], job.result.materials, strict=True):
@@ -198,14 +200,14 @@ def test_a_check_names_a_drift_fits_with_it_and_can_do_without() -> None:
     path.write_text(told.replace('file = "lit_2.exr"', 'file = "lit_2.exr"\nexposure = 1.5'))
     bpy.ops.patina.import_capture(filepath=str(path))
     assert not bpy.ops.patina.refit.poll()  # nothing was checked yet
-    choose = extension("core.diagnose.choose").choose_pixels
+    choose = extension("core.diagnose.pixels.pixel_selection").choose_pixels
     usual, choose.__defaults__ = choose.__defaults__, (3000,)  # some Blenders' numpy is slow
     try:
         assert bpy.ops.patina.check() == {"FINISHED"}
     finally:
         choose.__defaults__ = usual
-    stored = extension("scene.properties").stored_result
-    kind, mine = extension("scene.properties").DIAGNOSIS, str(path.resolve())
+    stored = extension("scene.session.scene_properties").stored_result
+    kind, mine = extension("scene.session.scene_properties").DIAGNOSIS, str(path.resolve())
     said, fit = stored(mine, kind), stored(mine)
     assert said["named"][0] == "light_intensity"
     assert said["applied"] == [e["cause"] for e in fit["effects"]]
@@ -247,19 +249,19 @@ def test_results_survive_saving_and_loading() -> None:
     scene = bpy.context.scene
     assert scene.patina.capture == str(path)
     assert scene.patina.mesh.data.materials[0]["patina_measured"] == "surface"
-    said = extension("scene.properties").stored_result(str(path.resolve()))
+    said = extension("scene.session.scene_properties").stored_result(str(path.resolve()))
     assert said["materials"][0]["name"] == "surface"
 
 
 def test_georeferenced_scans_keep_their_precision() -> None:
     """The same ball 500 km from the origin: Blender's float32 would be off by centimetres."""
-    core, frame = extension("core.scan"), extension("scene.frame")
+    core, frame = extension("core.scan"), extension("scene.scan.origin")
     vertices, faces = made().sphere_mesh(4)
     far = np.array([500_000.0, 4_000_000.0, 120.0])
     mesh = core.Mesh(vertices + far, faces.astype(np.int32))
     origin = frame.frame_origin(mesh.vertices)
     assert np.abs(origin - far).max() < 2
-    target = extension("scene.meshes").create_mesh_object(
+    target = extension("scene.scan.meshes").create_mesh_object(
         "far", mesh, origin, bpy.context.scene.collection
     )
     found = np.empty(3 * len(vertices), np.float32)
@@ -290,7 +292,7 @@ def test_two_captures_keep_their_materials_apart() -> None:
         for m in (first, second)
     ]  # fmt: skip
     assert colour[0][0] > colour[0][1] and colour[1][1] > colour[1][0]
-    stored = extension("scene.properties").stored_result
+    stored = extension("scene.session.scene_properties").stored_result
     assert stored(str(red.resolve())) and stored(str(green.resolve()))
 
 
@@ -345,14 +347,16 @@ def test_fit_without_its_mesh_says_so() -> None:
     path = made().make_capture(folder() / "ball", photos=2, extra="[fit]\nheld_out = false")
     bpy.ops.patina.import_capture(filepath=str(path))
     bpy.data.objects.remove(bpy.context.scene.patina.mesh)
-    job = extension("core.job").FitJob(extension("core.capture").read_capture(path))
+    job = extension("core.jobs").FitJob(extension("core.capture").read_capture(path))
     job.drain()
-    notes = extension("scene.apply").apply_result(bpy.context.scene, job.result, job.stages)
+    notes = extension("scene.scan.apply_result").apply_result(
+        bpy.context.scene, job.result, job.stages
+    )
     assert any("not in this scene" in note for note in notes)
 
 
 def test_a_running_fit_is_not_saved() -> None:
-    state, path = extension("scene.running"), folder() / "running.blend"
+    state, path = extension("scene.session.running_job"), folder() / "running.blend"
     state.tell(state.Running(bpy.context.scene.name, "fit", "sampling the photos", 0.5))
     assert state.running(bpy.context.scene) is not None
     bpy.ops.wm.save_as_mainfile(filepath=str(path))

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patina.core.angles import Angles, half_difference, merl_grid
-from patina.core.basis import Basis, PrincipalBRDF, mapping, storage
+from patina.core.basis import Basis, PrincipalBRDF, default_basis, mapping, storage
 from patina.core.basis.components import gram_matrix, principal_directions
 from patina.core.basis.merl_folder import cached_basis, checksums
 from patina.core.brdf import TabulatedBRDF, merl_file, nbrdf
@@ -42,7 +42,7 @@ coefficients = st.lists(st.floats(-0.2, 0.2), min_size=15, max_size=15).map(
 
 @pytest.fixture(scope="module")
 def basis() -> Basis:
-    return Basis.default()
+    return default_basis()
 
 
 def test_default_is_small_and_rich(basis: Basis, root: Path) -> None:
@@ -98,7 +98,7 @@ def test_reciprocal_and_never_negative(c: np.ndarray, seed: int) -> None:
     pair /= np.linalg.norm(pair, axis=-1, keepdims=True)
     pair[..., 2] = np.abs(pair[..., 2])
     normal = np.broadcast_to(np.array([0.0, 0, 1]), pair[0].shape)
-    brdf = PrincipalBRDF(Basis.default(), c)
+    brdf = PrincipalBRDF(default_basis(), c)
     there = brdf.evaluate(half_difference(normal, pair[0], pair[1]))
     back = brdf.evaluate(half_difference(normal, pair[1], pair[0]))
     assert (there >= 0).all() and np.isfinite(there).all()
@@ -108,7 +108,7 @@ def test_reciprocal_and_never_negative(c: np.ndarray, seed: int) -> None:
 @settings(max_examples=20, deadline=None)
 @given(c=coefficients)
 def test_projecting_a_member_finds_its_coefficients(c: np.ndarray) -> None:
-    basis = Basis.default()
+    basis = default_basis()
     nodes = basis.grid.nodes()
     seen = merl_grid.visible(nodes)
     angles = Angles(*(a[seen][::11] for a in nodes))
@@ -212,7 +212,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("merl")
     rng = np.random.default_rng(5)
     for name in "abc":
-        brdf = PrincipalBRDF(Basis.default(), rng.normal(0, 0.05, (3, 6)))
+        brdf = PrincipalBRDF(default_basis(), rng.normal(0, 0.05, (3, 6)))
         merl_file.write(folder / f"{name}.binary", TabulatedBRDF.from_function(brdf.evaluate))
     return folder
 

@@ -8,10 +8,10 @@ from collections.abc import Generator, Iterator
 
 import pytest
 
+from patina.core.concurrency.background import BackgroundJob, in_background, steps_in_background
+from patina.core.concurrency.job import Job, Step
+from patina.core.concurrency.steps import drained
 from patina.core.errors import FitError
-from patina.core.job.beside import Alongside, beside, stepped_beside
-from patina.core.job.job import Job, Step
-from patina.core.steps import drained
 
 
 def slow_steps(seconds: float, seen: list[str]) -> Generator[float, None, str]:
@@ -26,7 +26,7 @@ def slow_steps(seconds: float, seen: list[str]) -> Generator[float, None, str]:
 def test_the_result_and_every_value_arrive_in_order() -> None:
     seen: list[str] = []
     values = []
-    steps = stepped_beside(slow_steps(0.3, seen))
+    steps = steps_in_background(slow_steps(0.3, seen))
     while True:
         try:
             values.append(next(steps))
@@ -40,7 +40,7 @@ def test_the_result_and_every_value_arrive_in_order() -> None:
 
 def test_who_leaves_need_not_wait_and_the_rest_is_not_done() -> None:
     seen: list[str] = []
-    steps = stepped_beside(slow_steps(0.5, seen))
+    steps = steps_in_background(slow_steps(0.5, seen))
     next(steps)
     next(steps)  # the half second has begun
     since = time.perf_counter()
@@ -57,13 +57,13 @@ def test_errors_pass_through() -> None:
         raise FitError("too few samples")
 
     with pytest.raises(FitError, match="too few"):
-        drained(stepped_beside(fails()))
+        drained(steps_in_background(fails()))
     with pytest.raises(TimeoutError):  # the work's own, not the waiting's
 
         def late() -> None:
             raise TimeoutError
 
-        drained(beside(late, 0.0))
+        drained(in_background(late, 0.0))
 
 
 class Slow(Job):
@@ -86,7 +86,7 @@ class Slow(Job):
 
 def test_who_steps_a_job_alongside_never_waits() -> None:
     job, longest, steps = Slow(), 0.0, 0
-    alongside = Alongside(job)
+    alongside = BackgroundJob(job)
     while True:
         since = time.perf_counter()
         going = alongside.step()
@@ -102,7 +102,7 @@ def test_who_steps_a_job_alongside_never_waits() -> None:
 
 def test_a_job_alongside_that_is_dropped_ends_after_its_piece() -> None:
     job = Slow()
-    alongside = Alongside(job)
+    alongside = BackgroundJob(job)
     while job.now.stage != "first":
         time.sleep(0.01)
     since = time.perf_counter()
@@ -119,7 +119,7 @@ def test_errors_of_a_job_alongside_pass_through() -> None:
             yield Step("first", 0.0)
             raise FitError("too few samples")
 
-    alongside = Alongside(Fails())
+    alongside = BackgroundJob(Fails())
     with pytest.raises(FitError, match="too few"):
         while alongside.step():
             time.sleep(0.01)

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from patina.core.basis import PrincipalBRDF
-from patina.core.diagnose.brdfs import BRDFs
-from patina.core.diagnose.corrected import Corrected, corrected
+from patina.core.concurrency.job import Step
+from patina.core.concurrency.steps import drained
+from patina.core.diagnose.correction.sample_correction import CorrectedSamples, correct_samples
 from patina.core.diagnose.effects.area_light import AreaLight
 from patina.core.diagnose.effects.vignetting import Vignetting
-from patina.core.diagnose.model import Model
+from patina.core.diagnose.forward.material_brdfs import MaterialBRDFs
+from patina.core.diagnose.solver.model import Model
 from patina.core.fit.held_out import HeldOut
-from patina.core.job import sharpen
-from patina.core.job.job import Step
-from patina.core.job.sharpen import fitted_sharply
-from patina.core.steps import drained
+from patina.core.jobs import highlight_deconvolution_passes
+from patina.core.jobs.highlight_deconvolution_passes import fitted_sharply
 from tests.core.test_corrected import rows_of, table_of
 from tests.make_lit_ball import GLOSSY, changed, lit_ball
 
@@ -26,17 +26,17 @@ WIDE = np.array([np.radians(14.0)])
 
 
 @pytest.fixture(scope="module")
-def wide() -> tuple[Corrected, PrincipalBRDF, np.ndarray]:
+def wide() -> tuple[CorrectedSamples, PrincipalBRDF, np.ndarray]:
     """Samples of a glossy ball under a wide lamp, by a lens that is darker at its edge, its BRDF,
     and the lamp's light that arrives (n, 3)."""
-    setting = lit_ball(7, GLOSSY)
-    model = Model(setting.pixels, setting.brdfs).with_effect(AreaLight.of(setting), WIDE)
+    context = lit_ball(7, GLOSSY)
+    model = Model(context.pixels, context.brdfs).with_effect(AreaLight.of(context), WIDE)
     shown = model.predicted()
-    model = model.with_effect(Vignetting.of(setting), np.array([-0.3, 0.1]))
-    setting = changed(setting, model.predicted())
-    model = replace(model, pixels=setting.pixels, footprint=None)
-    found = drained(corrected(table_of(setting), setting.pixels, model, setting))
-    brdf = PrincipalBRDF(setting.brdfs.basis, setting.brdfs.coefficients[0])
+    model = model.with_effect(Vignetting.of(context), np.array([-0.3, 0.1]))
+    context = changed(context, model.predicted())
+    model = replace(model, pixels=context.pixels, footprint=None)
+    found = drained(correct_samples(table_of(context), context.pixels, model, context))
+    brdf = PrincipalBRDF(context.brdfs.basis, context.brdfs.coefficients[0])
     return found, brdf, shown
 
 
@@ -76,14 +76,14 @@ def test_a_pass_with_a_wider_highlight_comes_nearer(wide):
 
 
 def test_nothing_is_sharpened_under_a_point():
-    setting = lit_ball(7, GLOSSY)
-    model = Model(setting.pixels, BRDFs.of([_brdf(setting)]))
-    found = drained(corrected(table_of(setting), setting.pixels, model, setting))
+    context = lit_ball(7, GLOSSY)
+    model = Model(context.pixels, MaterialBRDFs.of([_brdf(context)]))
+    found = drained(correct_samples(table_of(context), context.pixels, model, context))
     assert found.blur is None
 
 
-def _brdf(setting) -> PrincipalBRDF:
-    return PrincipalBRDF(setting.brdfs.basis, setting.brdfs.coefficients[0])
+def _brdf(context) -> PrincipalBRDF:
+    return PrincipalBRDF(context.brdfs.basis, context.brdfs.coefficients[0])
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def _brdf(setting) -> PrincipalBRDF:
         ([0.10, 0.10, 0.10], 1, True),  # unless somebody asked for it
         ([0.10, 0.07, 0.069], 1, False),  # a second pass sharpens noise
         ([0.10, 0.07, 0.05, 0.06], 2, False),
-        ([0.10, 0.08, 0.06, 0.05, 0.04], sharpen.PASSES, False),
+        ([0.10, 0.08, 0.06, 0.05, 0.04], highlight_deconvolution_passes.PASSES, False),
         ([None, None], 1, False),  # of one photo nothing is unseen
     ],
 )
@@ -115,7 +115,7 @@ def test_passes_end_where_unseen_photos_gain_no_more(errors, taken, exactly):
         held = None if error is None else HeldOut(error, error, {0: error, 1: 2 * error})
         return SimpleNamespace(held_out=held, fit=SimpleNamespace(brdf=len(tables) - 1))
 
-    steps = fitted_sharply(Corrected("samples", {}, Blur()), again, 0.2, 0.5, exactly)
+    steps = fitted_sharply(CorrectedSamples("samples", {}, Blur()), again, 0.2, 0.5, exactly)
     fractions = []
     while True:
         try:

@@ -10,7 +10,8 @@ import pytest
 
 from patina.core.capture import read_capture
 from patina.core.errors import InputError, PatinaError
-from patina.core.job import FitJob, inputs
+from patina.core.inputs import capture_data
+from patina.core.jobs import FitJob
 from patina.core.samples import Margins
 from tests import make_capture as made
 
@@ -218,7 +219,7 @@ def test_settings_of_the_other_method_are_told(tmp_path: Path) -> None:
     )
     capture = read_capture(path)
     assert capture.fit.unused == ("samples", "eta")
-    (said,) = inputs.unused_settings(capture)
+    (said,) = capture_data.unused_settings(capture)
     assert "samples, eta" in said and 'method = "paper"' in said
 
 

@@ -10,9 +10,10 @@ import pytest
 
 from patina.core.capture import read_capture
 from patina.core.errors import InputError, PatinaError
-from patina.core.job import FitJob, inputs
-from patina.core.job.lights import find_lights
-from patina.core.job.photos import LitPhotos
+from patina.core.inputs import capture_data
+from patina.core.inputs.lights import find_lights
+from patina.core.inputs.photos import LitPhotos
+from patina.core.jobs import FitJob
 from patina.core.light import DistantLight
 from patina.core.photo.photo import read_photo
 from tests import make_capture as made
@@ -89,7 +90,7 @@ def test_mistakes_are_named(ball: Path, mistake: str) -> None:
 
 def lights_of(path: Path):
     capture = read_capture(path)
-    scan = inputs.open_scan(capture)
+    scan = capture_data.open_scan(capture)
     return find_lights(capture, scan, LitPhotos.open(capture))
 
 
@@ -164,7 +165,7 @@ def test_a_chart_gives_the_irradiance(ball: Path) -> None:
     path.write_text(f'[tone]\nchart = {{{chart}, light = "lamp", normal = [0, 0, 1]}}\n' + text)
     capture = read_capture(path)
     photos = LitPhotos.open(capture)
-    light = find_lights(capture, inputs.open_scan(capture), photos).by_name["lamp"]
+    light = find_lights(capture, capture_data.open_scan(capture), photos).by_name["lamp"]
     assert light.irradiance == pytest.approx(np.full(3, np.pi / 0.8))
     # a Lambertian of reflectance 0.3 under the lamp: decoded, ρ = L / (E n·l) is 0.3 / π
     encoded = np.full((1, 1, 3), 0.3 * strength * 0.8 / np.pi)
@@ -257,7 +258,7 @@ def test_a_colour_that_no_face_wears(ball: Path) -> None:
     (ball.parent / "mesh.ply").write_text("\n".join(lines) + "\n")
     ball.write_text(ball.read_text() + '[[material]]\nname = "a"\nvertex_colour = [255, 0, 0]\n')
     with pytest.raises(InputError, match=r"material 1\.vertex_colour.*no face"):
-        inputs.open_scan(read_capture(ball))
+        capture_data.open_scan(read_capture(ball))
 
 
 def test_near_and_distant_lights_need_strengths(ball: Path) -> None:
@@ -310,7 +311,7 @@ def test_materials_painted_on_the_vertices(ball: Path) -> None:
 def test_photos_that_were_localised_later(ball: Path) -> None:
     """A camera of an extra file takes a photo like one of the scan's."""
     capture = read_capture(ball)
-    camera = inputs.open_scan(capture).cameras[0]
+    camera = capture_data.open_scan(capture).cameras[0]
     entry = {
         "label": "later", "width": camera.width, "height": camera.height, "model": camera.model,
         "parameters": list(camera.parameters), "rotation": camera.pose.rotation.tolist(),
@@ -321,13 +322,13 @@ def test_photos_that_were_localised_later(ball: Path) -> None:
     text = ball.read_text().replace('camera = "view_01.jpg"', 'camera = "later"')
     ball.write_text(text.replace("[scan]", '[scan]\nextra = "later.cameras.json"'))
     later = read_capture(ball)
-    scan = inputs.open_scan(later)
-    pose = inputs.camera_of(later, scan, 0).pose
+    scan = capture_data.open_scan(later)
+    pose = capture_data.camera_of(later, scan, 0).pose
     assert np.allclose(pose.translation, camera.pose.translation)
     entry["label"] = "view_02.jpg"
     (ball.parent / "later.cameras.json").write_text(json.dumps(extra))
     with pytest.raises(PatinaError, match=r"scan\.extra.*already"):
-        inputs.open_scan(later)
+        capture_data.open_scan(later)
 
 
 def write_jpeg(path: Path, pixels: np.ndarray, exposure: float) -> None:

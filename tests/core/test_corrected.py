@@ -10,9 +10,9 @@ import pytest
 
 from patina.core.angles import half_difference
 from patina.core.basis import PrincipalBRDF
-from patina.core.diagnose.brdfs import BRDFs
-from patina.core.diagnose.corrected import corrected, elsewhere
-from patina.core.diagnose.effect import Setting
+from patina.core.concurrency.steps import drained
+from patina.core.diagnose.correction.sample_correction import correct_samples, model_at_pixels
+from patina.core.diagnose.correction.sample_pixels import nearest
 from patina.core.diagnose.effects import EFFECTS
 from patina.core.diagnose.effects.anisotropy import Anisotropy
 from patina.core.diagnose.effects.area_light import AreaLight
@@ -23,17 +23,17 @@ from patina.core.diagnose.effects.light_direction import LightDirection
 from patina.core.diagnose.effects.light_intensity import LightIntensity
 from patina.core.diagnose.effects.near_light import NearLight
 from patina.core.diagnose.effects.vignetting import Vignetting
-from patina.core.diagnose.model import Model
-from patina.core.diagnose.of_samples import nearest
+from patina.core.diagnose.forward.diagnosis_context import DiagnosisContext
+from patina.core.diagnose.forward.material_brdfs import MaterialBRDFs
+from patina.core.diagnose.solver.model import Model
 from patina.core.fit.held_out import predicted as unseen_photo
 from patina.core.samples import SampleTable
-from patina.core.steps import drained
 from tests.make_lit_ball import EACH, GLOSSY, SHARP, changed, lit_ball, shadowed
 
 
-def table_of(setting: Setting) -> SampleTable:
-    """The samples that a fit would take at the setting's pixels."""
-    pixels = setting.pixels
+def table_of(context: DiagnosisContext) -> SampleTable:
+    """The samples that a fit would take at the pixels of the context."""
+    pixels = context.pixels
     angles = half_difference(pixels.normal, pixels.light, pixels.view)
     cos_i = np.sum(pixels.normal * pixels.light, axis=1)
     own = {f.name: getattr(pixels, f.name, None) for f in fields(SampleTable)}
@@ -48,11 +48,11 @@ def table_of(setting: Setting) -> SampleTable:
 
 
 def rid_of(
-    table: SampleTable, model: Model, setting: Setting, tilt: float = 0.0
+    table: SampleTable, model: Model, context: DiagnosisContext, tilt: float = 0.0
 ) -> tuple[SampleTable, Mapping[int, float]]:
-    """Samples of the setting's pixels rid of a model's effects, blurred highlights with the model's
-    own BRDF; each photo's light (Corrected.light)."""
-    found = drained(corrected(table, setting.pixels, model, setting, tilt))
+    """Samples of the context's pixels without a model's effects, highlights deconvolved with the
+    model's own BRDF; each photo's light (CorrectedSamples.light)."""
+    found = drained(correct_samples(table, context.pixels, model, context, tilt))
     if found.blur is None:
         return found.table, found.light
     brdf = PrincipalBRDF(model.brdfs.basis, model.brdfs.coefficients[0])
@@ -73,18 +73,18 @@ EXAMPLES = {
 def test_samples_rid_of_an_effect_show_the_brdf(kind):
     """Photos made with an effect, corrected with the same numbers: ρ is the BRDF's, at the
     directions that the effect says."""
-    setting = lit_ball(3)
-    bare = BRDFs.of([_brdf_of(setting)])
-    model = Model(setting.pixels, bare).with_effect(kind.of(setting), EXAMPLES[kind])
+    context = lit_ball(3)
+    bare = MaterialBRDFs.of([_brdf_of(context)])
+    model = Model(context.pixels, bare).with_effect(kind.of(context), EXAMPLES[kind])
     shown = model.predicted()
-    setting = changed(setting, shown)
-    model = replace(model, pixels=setting.pixels, footprint=None)
-    found, light = rid_of(table_of(setting), model, setting)
+    context = changed(context, shown)
+    model = replace(model, pixels=context.pixels, footprint=None)
+    found, light = rid_of(table_of(context), model, context)
     assert len(found) > 0.85 * len(shown)
     truth = bare.evaluate(found.angles, np.zeros(len(found), np.int16))
     np.testing.assert_allclose(found.rho, truth, rtol=2e-3, atol=1e-5)
     assert np.all(found.cos_i > 0)
-    key = setting.pixels.photo.astype(int) * EACH + setting.pixels.pixel
+    key = context.pixels.photo.astype(int) * EACH + context.pixels.pixel
     rows = np.searchsorted(key, found.photo.astype(int) * EACH + found.pixel)
     brighter = replace(model.pixels, irradiance=np.float32(1.01) * model.pixels.irradiance)
     more = replace(model, pixels=brighter, footprint=None).predicted() - shown
@@ -96,57 +96,57 @@ def test_samples_rid_of_an_effect_show_the_brdf(kind):
         assert part == pytest.approx(ours / np.sqrt(np.mean(shown[rows][mine] ** 2)), rel=1e-3)
 
 
-def _brdf_of(setting: Setting):
-    brdfs = setting.brdfs
+def _brdf_of(context: DiagnosisContext):
+    brdfs = context.brdfs
     return PrincipalBRDF(brdfs.basis, brdfs.coefficients[0])
 
 
 def clipped_ball(
     seed: int, part: float, channels: tuple[int, ...] = (0,), material: int = SHARP
-) -> tuple[Setting, Model, np.ndarray]:
+) -> tuple[DiagnosisContext, Model, np.ndarray]:
     """A ball whose channels end at a plateau, which this part of its pixels reaches, the model that
     knows it, and what photos that are not clipped show (n, 3)."""
-    setting = lit_ball(seed, material)
-    truth = setting.pixels.observed
+    context = lit_ball(seed, material)
+    truth = context.pixels.observed
     top = np.full(3, np.inf)
     for channel in channels:
         top[channel] = np.percentile(truth[:, channel], 100 * (1 - part))
-    setting = changed(setting, np.minimum(truth, top).astype(np.float32))
-    effect = Clipping.of(setting)
+    context = changed(context, np.minimum(truth, top).astype(np.float32))
+    effect = Clipping.of(context)
     level = np.log(8.0) + np.log(effect.top / np.minimum(top, 8 * effect.top))
-    return setting, Model(setting.pixels, setting.brdfs).with_effect(effect, level), truth
+    return context, Model(context.pixels, context.brdfs).with_effect(effect, level), truth
 
 
-def rows_of(table: SampleTable, setting: Setting) -> np.ndarray:
-    """Of a table's samples in the setting's pixels."""
-    key = setting.pixels.photo.astype(int) * EACH + setting.pixels.pixel
+def rows_of(table: SampleTable, context: DiagnosisContext) -> np.ndarray:
+    """Of a table's samples in the pixels of the context."""
+    key = context.pixels.photo.astype(int) * EACH + context.pixels.pixel
     return np.searchsorted(key, table.photo.astype(int) * EACH + table.pixel)
 
 
 def test_what_is_clipped_is_predicted_and_no_evidence():
     """A red channel that ends at a plateau: red stands as the BRDF has it, and the sample counts
     for nothing where unseen photos are judged; the other channels stay what the photo says."""
-    setting, model, truth = clipped_ball(4, 0.15)
-    top = setting.pixels.observed[:, 0].max()
-    found, light = rid_of(table_of(setting), model, setting)
+    context, model, truth = clipped_ball(4, 0.15)
+    top = context.pixels.observed[:, 0].max()
+    found, light = rid_of(table_of(context), model, context)
     for k, part in light.items():
         mine = found.photo == k
-        seen = np.sum(setting.pixels.observed[rows_of(found, setting)][mine] ** 2, axis=1)
+        seen = np.sum(context.pixels.observed[rows_of(found, context)][mine] ** 2, axis=1)
         told = np.sum(seen * found.read[mine]) / np.sum(seen)  # what is clipped is no miss
         assert part == pytest.approx(np.sqrt(told), rel=1e-3) and part < 1
     above = int(np.sum(truth[:, 0] > 1.02 * top))
     filled = found.select(~found.read)
     assert len(filled) > 0.95 * above > 40
-    predicted = setting.brdfs.evaluate(filled.angles, np.zeros(len(filled), np.int16))
+    predicted = context.brdfs.evaluate(filled.angles, np.zeros(len(filled), np.int16))
     level = top / (filled.irradiance * filled.cos_i[:, None])[:, 0]
     beyond = predicted[:, 0] > level  # the rest is at the plateau by its noise alone
     assert beyond.sum() > 0.8 * above
     np.testing.assert_allclose(filled.rho[beyond, 0], predicted[beyond, 0], rtol=1e-3)
     np.testing.assert_allclose(filled.rho[~beyond, 0], level[~beyond], rtol=0.02)
-    own = truth[rows_of(filled, setting)]
+    own = truth[rows_of(filled, context)]
     np.testing.assert_allclose(filled.radiance[:, 1:], own[:, 1:], rtol=1e-3)
     photo = int(filled.photo[0])
-    judged = unseen_photo(found, photo, _brdf_of(setting))
+    judged = unseen_photo(found, photo, _brdf_of(context))
     read = found.select((found.photo == photo) & found.read)
     assert judged.size == pytest.approx(float(np.sum(read.radiance**2)), rel=1e-3)
 
@@ -155,13 +155,13 @@ def test_what_is_clipped_is_predicted_and_no_evidence():
 def test_what_was_clipped_is_as_high_as_a_scan_of_such_normals_would_have_it(channels):
     """Normals are 1.5° off: what is clipped beside the highlight's middle is so since its normal is
     another one, and the BRDF at the scan's would be too dark."""
-    setting, model, bright = clipped_ball(5, 0.04, channels, GLOSSY)
+    context, model, bright = clipped_ball(5, 0.04, channels, GLOSSY)
     rng = np.random.default_rng(1)
     tilt = np.radians(1.5)
-    told = setting.pixels.normal + tilt * rng.standard_normal(setting.pixels.normal.shape)
+    told = context.pixels.normal + tilt * rng.standard_normal(context.pixels.normal.shape)
     told = (told / np.linalg.norm(told, axis=1, keepdims=True)).astype(np.float32)
-    pixels = replace(setting.pixels, normal=told)
-    off = replace(setting, pixels=pixels)
+    pixels = replace(context.pixels, normal=told)
+    off = replace(context, pixels=pixels)
     model = replace(model, pixels=pixels, footprint=None)
     errors = []
     for known in (0.0, tilt):
@@ -176,14 +176,14 @@ def test_what_was_clipped_is_as_high_as_a_scan_of_such_normals_would_have_it(cha
 
 def test_what_is_clipped_of_a_brushed_surface_stands_unstretched():
     """As its other samples do: ρ of the highlight that it has across and along alike."""
-    setting = lit_ball(5, GLOSSY)
+    context = lit_ball(5, GLOSSY)
     numbers = np.array([0.5, -0.2, -0.3])
-    whole = Model(setting.pixels, setting.brdfs).with_effect(Anisotropy.of(setting), numbers)
+    whole = Model(context.pixels, context.brdfs).with_effect(Anisotropy.of(context), numbers)
     shown = whole.predicted()
     top = np.percentile(shown[:, 0], 94)
     seen = shown.copy()
     seen[:, 0] = np.minimum(seen[:, 0], top)
-    there = changed(setting, seen)
+    there = changed(context, seen)
     effect = Clipping.of(there)
     level = np.log(8.0) + np.log(effect.top / np.minimum([top, np.inf, np.inf], 8 * effect.top))
     model = Model(there.pixels, there.brdfs).with_effect(Anisotropy.of(there), numbers)
@@ -198,13 +198,13 @@ def test_what_is_clipped_of_a_brushed_surface_stands_unstretched():
 
 def test_a_photo_that_is_not_clipped_says_what_arrived_though_the_prediction_is_beyond():
     """The scan's normal puts a highlight where the photo shows none."""
-    setting, model, truth = clipped_ball(6, 0.1)
+    context, model, truth = clipped_ball(6, 0.1)
     dark = (truth * np.float32(0.5)).astype(np.float32)
-    pixels = replace(setting.pixels, observed=np.minimum(dark, setting.pixels.observed))
-    off = replace(setting, pixels=pixels)
+    pixels = replace(context.pixels, observed=np.minimum(dark, context.pixels.observed))
+    off = replace(context, pixels=pixels)
     model = replace(model, pixels=pixels, footprint=None)
     found, _ = rid_of(table_of(off), model, off)
-    beyond = truth[rows_of(found, off), 0] > setting.pixels.observed[:, 0].max()
+    beyond = truth[rows_of(found, off), 0] > context.pixels.observed[:, 0].max()
     beyond &= found.read
     assert beyond.sum() > 30
     own = pixels.observed[rows_of(found, off)][beyond]
@@ -213,48 +213,48 @@ def test_a_photo_that_is_not_clipped_says_what_arrived_though_the_prediction_is_
 
 def test_the_same_numbers_speak_of_other_pixels():
     """Every effect of half of the pixels, moved to the other half, shows what it would have."""
-    setting = lit_ball(5)
+    context = lit_ball(5)
     rng = np.random.default_rng(0)
-    order = rng.permutation(len(setting.pixels))
-    one = replace(setting, pixels=setting.pixels.select(np.sort(order[: len(order) // 2])))
-    near = nearest(setting.pixels, one.pixels, setting.size)
-    assert (one.pixels.photo[near.photo] == setting.pixels.photo).all()
+    order = rng.permutation(len(context.pixels))
+    one = replace(context, pixels=context.pixels.select(np.sort(order[: len(order) // 2])))
+    near = nearest(context.pixels, one.pixels, context.size)
+    assert (one.pixels.photo[near.photo] == context.pixels.photo).all()
     for kind, numbers in EXAMPLES.items():
-        whole, half = kind.of(setting), kind.of(one)
+        whole, half = kind.of(context), kind.of(one)
         told = Model(one.pixels, one.brdfs).with_effect(half, numbers)
-        moved = elsewhere(told, setting, near).predicted()
+        moved = model_at_pixels(told, context, near).predicted()
         if kind is CameraResponse:  # what is grey was said when the numbers were found
             whole = half
-        x = whole.told(numbers)
-        plain = Model(setting.pixels, setting.brdfs).with_effect(whole, x).predicted()
+        x = whole.identified(numbers)
+        plain = Model(context.pixels, context.brdfs).with_effect(whole, x).predicted()
         np.testing.assert_allclose(moved, plain, rtol=1e-5, atol=1e-7)
 
 
 def test_a_shadow_is_where_its_photo_was_looked_at():
-    setting = shadowed(lit_ball(5), 2, 0.15, 0.6)
-    effect = CastShadow.of(setting)
-    rows = np.flatnonzero(np.arange(len(setting.pixels)) % 2)
-    here = replace(setting, pixels=setting.pixels.select(rows))
-    moved = effect.elsewhere(here, nearest(here.pixels, setting.pixels, setting.size))
-    np.testing.assert_array_equal(moved.parts, effect.parts[rows])
-    assert set(setting.pixels.photo[effect.parts >= 0]) == {2}
+    context = shadowed(lit_ball(5), 2, 0.15, 0.6)
+    effect = CastShadow.of(context)
+    rows = np.flatnonzero(np.arange(len(context.pixels)) % 2)
+    here = replace(context, pixels=context.pixels.select(rows))
+    moved = effect.at_pixels(here, nearest(here.pixels, context.pixels, context.size))
+    np.testing.assert_array_equal(moved.patch, effect.patch[rows])
+    assert set(context.pixels.photo[effect.patch >= 0]) == {2}
 
 
 @pytest.mark.parametrize("kind", EFFECTS, ids=lambda k: k.cause)
 def test_every_effect_can_be_moved(kind):
-    setting = lit_ball(6)
+    context = lit_ball(6)
     if kind is CastShadow:
-        setting = shadowed(setting, 1, 0.15, 0.6)
-    effect = kind.of(setting)
+        context = shadowed(context, 1, 0.15, 0.6)
+    effect = kind.of(context)
     if effect is None:
         pytest.skip("cannot be there on a ball alone")
-    near = nearest(setting.pixels, setting.pixels, setting.size)
-    moved = effect.elsewhere(setting, near)
-    assert moved is not None and len(moved.numbers) == len(effect.numbers)
+    near = nearest(context.pixels, context.pixels, context.size)
+    moved = effect.at_pixels(context, near)
+    assert moved is not None and len(moved.parameters) == len(effect.parameters)
 
 
 def test_a_gain_that_all_photos_share_is_the_brdfs():
     effect = LightIntensity.of(lit_ball(0))
-    np.testing.assert_allclose(effect.told(np.full(6, 0.3)), 0, atol=1e-12)
+    np.testing.assert_allclose(effect.identified(np.full(6, 0.3)), 0, atol=1e-12)
     drift = np.array([0.1, -0.1, 0.2, 0.0, -0.25, 0.05])
-    np.testing.assert_allclose(effect.told(drift + 1.0), drift, atol=1e-12)
+    np.testing.assert_allclose(effect.identified(drift + 1.0), drift, atol=1e-12)

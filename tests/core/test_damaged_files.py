@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from patina.core.brdf import nbrdf
 from patina.core.capture import read_capture
 from patina.core.errors import InputError, PatinaError
-from patina.core.job import FitJob
+from patina.core.jobs import FitJob
 from patina.core.photo import read_mask, read_radiance
 from patina.core.scan.mesh import read_mesh
 from patina.core.scan.readers.colmap import read_colmap

@@ -11,15 +11,15 @@ import pytest
 
 from patina.core.angles import Angles
 from patina.core.appearance.principled import Principled
-from patina.core.basis import Basis, PrincipalBRDF
+from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.brdf import TabulatedBRDF, metrics, nbrdf
 from patina.core.capture import read_capture
+from patina.core.concurrency.steps import drained
 from patina.core.fit.held_out import predicted, summarise
 from patina.core.fit.measured_result import MeasuredResult
-from patina.core.job.estimators import Estimate, estimate
-from patina.core.job.warnings import trust_warnings
+from patina.core.jobs.estimators import Estimate, estimate
+from patina.core.jobs.fit_warnings import trust_warnings
 from patina.core.samples import SampleTable
-from patina.core.steps import drained
 from tests import make_capture as made
 from tests.sampled import sampled, sampled_materials
 
@@ -33,7 +33,7 @@ def fitted(path: Path, name: str, table: SampleTable, method: str, most: int = S
     if len(table) > most:
         some = np.random.default_rng(0).choice(len(table), most, replace=False)
         table = table.select(np.sort(some))
-    return drained(estimate(table, Basis.default(), capture, name))
+    return drained(estimate(table, default_basis(), capture, name))
 
 
 def log_rms(found: Estimate, truth: TabulatedBRDF) -> float:
@@ -108,7 +108,7 @@ def test_a_photo_that_is_far_too_bright_is_named(tmp_path: Path) -> None:
 def test_held_out_error_is_that_of_the_samples() -> None:
     """A BRDF that is a tenth too bright misses every photo by a tenth."""
     n = 200
-    basis, rng = Basis.default(), np.random.default_rng(0)
+    basis, rng = default_basis(), np.random.default_rng(0)
     brdf = PrincipalBRDF(basis, np.zeros((3, 5)))
     angles = Angles(*(rng.uniform(0, top, n).astype(np.float32) for top in (1.0, 0.8, 3.0)))
     rho = brdf.evaluate(angles) / np.float32(1.1)

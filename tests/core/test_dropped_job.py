@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from threadpoolctl import threadpool_info
 
-from patina.core.job.crew import crew, crew_size
-from patina.core.job.job import Job, Step
+from patina.core.concurrency.job import Job, Step
+from patina.core.concurrency.thread_pool import thread_count, thread_pool
 
 
 class Counting(Job):
@@ -57,8 +57,12 @@ def test_never_begun() -> None:
 
 
 def test_a_crew_of_one_is_none() -> None:
-    assert crew_size(0) == crew_size(1) == 1 and crew_size(7) == 7 and 1 <= crew_size(None) <= 4
-    with crew(1) as pool:
+    assert (
+        thread_count(0) == thread_count(1) == 1
+        and thread_count(7) == 7
+        and 1 <= thread_count(None) <= 4
+    )
+    with thread_pool(1) as pool:
         assert pool is None
-    with crew(2) as pool:
+    with thread_pool(2) as pool:
         assert pool is not None and pool.submit(lambda: 5).result() == 5

@@ -14,22 +14,22 @@ HALF = np.radians(20)
 
 def described(effect: EnvironmentReflection, shown: np.ndarray) -> tuple[np.ndarray, float]:
     """Numbers that describe shown (n, 3) best, and what they leave of it, relative RMS."""
-    matrix = effect.reflected.reshape(len(effect.numbers), -1).T.astype(float)
+    matrix = effect.reflected.reshape(len(effect.parameters), -1).T.astype(float)
     x, left = nnls(matrix, shown.ravel().astype(float))
     return x, float(left / np.linalg.norm(shown))
 
 
 def test_the_edge_of_a_window_is_found_once_it_is_known_where_it_is_bright():
-    setting = lit_ball()
-    around = setting.surroundings
+    context = lit_ball()
+    around = context.surroundings
     inside = (around.towards @ WINDOW.astype(np.float32) > np.cos(HALF)) & around.open
-    shown = setting.own_level / np.pi * around.under(inside.astype(np.float32))
-    effect = EnvironmentReflection.of(setting)
+    shown = context.pixel_level / np.pi * around.reflected_light(inside.astype(np.float32))
+    effect = EnvironmentReflection.of(context)
     x, left = described(effect, shown)
-    finer = effect.remade(setting, x)
+    finer = effect.rebuilt(context, x)
     x_finer, left_finer = described(finer, shown)
-    assert LOBES < len(finer.numbers) <= LOBES + MOST
-    assert len(set(finer.numbers.names)) == len(finer.numbers)
+    assert LOBES < len(finer.parameters) <= LOBES + MOST
+    assert len(set(finer.parameters.names)) == len(finer.parameters)
     assert left_finer < 0.5 * left
     angle = np.radians(np.arange(0, 90, 1.0))
     aside = np.cross(WINDOW, [0.0, 0.0, 1.0])
@@ -41,6 +41,6 @@ def test_the_edge_of_a_window_is_found_once_it_is_known_where_it_is_bright():
 
 
 def test_a_room_that_is_bright_all_over_stays_within_bounds():
-    setting = lit_ball()
-    finer = EnvironmentReflection.of(setting).remade(setting, np.ones(LOBES))
-    assert len(finer.numbers) == LOBES + MOST
+    context = lit_ball()
+    finer = EnvironmentReflection.of(context).rebuilt(context, np.ones(LOBES))
+    assert len(finer.parameters) == LOBES + MOST

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from patina.core.diagnose.exchange import BEHIND, BOUNCES, faces_seen, to_and_fro
+from patina.core.diagnose.forward.radiosity import BEHIND, BOUNCES, bounced_radiance, visible_faces
 from patina.core.geometry import RayScene
 from patina.core.scan import Mesh
 from tests.make_lit_ball import lit_ball
@@ -36,7 +36,7 @@ def two_squares(apart: float, cells: int = 8) -> tuple[np.ndarray, np.ndarray]:
 def test_two_squares_see_as_much_of_each_other_as_is_known(apart, factor):
     """View factors of unit squares (Howell, A Catalog of Radiation Configuration Factors, C-11)."""
     vertices, faces = two_squares(apart)
-    seen = faces_seen(rays_of(vertices, faces))
+    seen = visible_faces(rays_of(vertices, faces))
     half = len(faces) // 2
     np.testing.assert_allclose((seen[:half] >= half).mean(), factor, atol=0.012)
     np.testing.assert_allclose(
@@ -48,10 +48,10 @@ def test_two_squares_see_as_much_of_each_other_as_is_known(apart, factor):
 def test_in_a_closed_room_light_adds_up_to_a_geometric_series(albedo):
     """All faces of a hollow ball see one another alike: Σ albedoᵏ of what they send off."""
     ball = trimesh.creation.icosphere(subdivisions=3)
-    seen = faces_seen(rays_of(ball.vertices, ball.faces[:, ::-1]))
+    seen = visible_faces(rays_of(ball.vertices, ball.faces[:, ::-1]))
     assert (seen >= 0).all()
     sent = np.tile(np.float32([1.0, 0.5, 0.1]), (len(seen), 1))
-    found = to_and_fro(sent, np.full((len(seen), 3), albedo, np.float32), seen)
+    found = bounced_radiance(sent, np.full((len(seen), 3), albedo, np.float32), seen)
     expected = sent * (1 - albedo**BOUNCES) / (1 - albedo)
     np.testing.assert_allclose(found, expected, rtol=1e-4)
 
@@ -61,35 +61,35 @@ def test_the_inside_of_a_scan_sends_off_nothing():
     vertices, faces = two_squares(1.0)
     half = len(faces) // 2
     faces[half:] = faces[half:, ::-1]
-    seen = faces_seen(rays_of(vertices, faces))
+    seen = visible_faces(rays_of(vertices, faces))
     assert (seen < 0).all()
     np.testing.assert_allclose((seen[:half] == BEHIND).mean(), 0.1998, atol=0.012)
     sent = np.ones((len(seen), 3), np.float32)
-    np.testing.assert_array_equal(to_and_fro(sent, np.full((len(seen), 3), 0.9), seen), sent)
+    np.testing.assert_array_equal(bounced_radiance(sent, np.full((len(seen), 3), 0.9), seen), sent)
 
 
 def test_a_face_without_area_sees_nothing():
     vertices, faces = two_squares(1.0, cells=2)
     faces = np.concatenate([faces, [[0, 0, 1]]])
-    seen = faces_seen(rays_of(vertices, faces))
+    seen = visible_faces(rays_of(vertices, faces))
     assert (seen[-1] < 0).all() and (seen[:-1] >= 0).any()
 
 
 def test_where_irradiance_is_not_known_bounces_are_as_bright_as_the_photos():
     """Photos half as bright, of the same material under half the light: so is what faces send off,
     of every bounce."""
-    setting = replace(lit_ball(), rays=rays_of(*two_squares(0.5)))
-    pixels = setting.pixels
+    context = replace(lit_ball(), rays=rays_of(*two_squares(0.5)))
+    pixels = context.pixels
     dim = replace(pixels, irradiance=pixels.irradiance / 2)
-    half = replace(setting, pixels=dim, scale=np.full(1, 2, np.float32)).glow(0)
-    whole = setting.glow(0)
+    half = replace(context, pixels=dim, scale=np.full(1, 2, np.float32)).face_radiosity(0)
+    whole = context.face_radiosity(0)
     assert whole.max() > 0
     np.testing.assert_allclose(half, whole / 2, rtol=1e-5)
 
 
 def test_what_sees_nothing_sends_off_what_the_lamp_gives():
     ball = trimesh.creation.icosphere(subdivisions=2)
-    seen = faces_seen(rays_of(ball.vertices, ball.faces))
+    seen = visible_faces(rays_of(ball.vertices, ball.faces))
     assert (seen < 0).all()
     sent = np.random.default_rng(0).random((len(seen), 3)).astype(np.float32)
-    np.testing.assert_array_equal(to_and_fro(sent, np.full((len(seen), 3), 0.9), seen), sent)
+    np.testing.assert_array_equal(bounced_radiance(sent, np.full((len(seen), 3), 0.9), seen), sent)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patina.core.angles import Angles, cosines, merl_grid
-from patina.core.basis import Basis, PrincipalBRDF
+from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.brdf import TabulatedBRDF
 from patina.core.brdf import metrics as core_metrics
 from patina.core.light import DistantLight
@@ -156,7 +156,7 @@ def test_covered_cells_are_those_that_hold_a_sample(taken: simulate.Sampled) -> 
 
 
 def test_all_samples_find_a_brdf_of_the_span(taken: simulate.Sampled) -> None:
-    basis = Basis.default()
+    basis = default_basis()
     c = np.random.default_rng(2).normal(0, 0.04, (3, 5))
     truth = PrincipalBRDF(basis, c)
     exact = taken.table.angles

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from patina.core.errors import InputError
-from patina.core.masks import faces_by_texture, faces_by_vertex_colour
-from patina.core.masks.oklab import oklab
+from patina.core.inputs.oklab import oklab
+from patina.core.inputs.painted_faces import faces_by_texture, faces_by_vertex_colour
 from patina.core.scan import Mesh
 from tests.make_capture import CENTRE, sphere_mesh
 

@@ -10,7 +10,7 @@ import pytest
 from patina.core.angles import Angles
 from patina.core.capture import read_capture
 from patina.core.errors import InputError
-from patina.core.job import FitJob
+from patina.core.jobs import FitJob
 from patina.core.maps import MapsJob, MapsSettings
 from patina.core.maps.level import MaterialLevel
 from patina.core.maps.normals import corner_tangents

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from patina.core.capture import read_capture
 from patina.core.errors import InputError
 from patina.core.geometry import RayScene, view_surface
-from patina.core.job import inputs
-from patina.core.job.lights import find_lights
-from patina.core.job.photos import LitPhotos
+from patina.core.inputs import capture_data
+from patina.core.inputs.lights import find_lights
+from patina.core.inputs.photos import LitPhotos
 from patina.core.masks.capture_text import _document, capture_with_masks
 from patina.core.masks.shadow import from_grey, light_visibility
 from patina.core.masks.write_masks import MasksJob, Wanted, check_final
@@ -53,13 +53,13 @@ def test_shadow_masks_are_the_visibilities_and_leave_partial_shadow_out(tmp_path
     path = two_balls(tmp_path / "in")
     done = write(path, tmp_path / "out", Wanted(uncertainty=0.0))
     capture = read_capture(done.capture)
-    scan = inputs.open_scan(capture)
-    inputs.check_photos(capture, scan)
+    scan = capture_data.open_scan(capture)
+    capture_data.check_photos(capture, scan)
     rays = RayScene.build(scan.mesh)
     lights = find_lights(capture, scan, LitPhotos.open(capture))
     partial = 0
     for place in range(3):
-        camera = inputs.camera_of(capture, scan, place)
+        camera = capture_data.camera_of(capture, scan, place)
         view = view_surface(rays, camera)
         exact = light_visibility(
             rays, view, lights.of(capture, place), camera, 512, uncertainty=0.0
@@ -69,7 +69,7 @@ def test_shadow_masks_are_the_visibilities_and_leave_partial_shadow_out(tmp_path
         assert (grey[~view.seen] == 0).all()
         told = from_grey(grey.ravel()[view.pixel])
         assert np.abs(told - exact).mean() < 0.01
-        _, out = inputs.material_pixels(capture, scan, view, place)
+        _, out = capture_data.material_pixels(capture, scan, view, place)
         assert out[exact < 0.88].all()
         assert not out[exact > 0.999].any()
         partial += int(((exact > 0.1) & (exact < 0.9)).sum())

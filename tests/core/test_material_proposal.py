@@ -217,16 +217,16 @@ def test_noise_is_smoothed_and_islands_vanish() -> None:
 def test_demo_capture(root: Path) -> None:
     """Glaze and clay of the embedded capture, against the masks that were painted for it."""
     from patina.core.geometry import view_surface
-    from patina.core.job import inputs
+    from patina.core.inputs import capture_data
 
     path = root / "assets" / "demo" / "demo.capture.toml"
     result = proposed(path)
     assert result.proposal.count == 2
     capture, right, all_of_them = read_capture(path), 0, 0
     for place in range(len(capture.photos)):
-        camera = inputs.camera_of(capture, result.scan, place)
+        camera = capture_data.camera_of(capture, result.scan, place)
         view = view_surface(result.rays, camera)
-        where, _ = inputs.material_pixels(capture, result.scan, view, place)
+        where, _ = capture_data.material_pixels(capture, result.scan, view, place)
         label = result.proposal.labels[view.face]
         right += (where["glaze"] & (label == 0)).sum() + (where["clay"] & (label == 1)).sum()
         all_of_them += where["glaze"].sum() + where["clay"].sum()

@@ -11,24 +11,24 @@ import numpy as np
 import pytest
 
 from patina.core.angles import Angles, half_difference
-from patina.core.basis import Basis
+from patina.core.basis import Basis, default_basis
 from patina.core.basis.log_table import LogTable
 from patina.core.capture import read_capture
 from patina.core.errors import FitError
 from patina.core.fit.held_out import LeftOut, predicted, summarise
 from patina.core.fit.measured import MeasuredFit, MeasuredSettings, fit_measured
-from patina.core.fit.measured.anchors import carried_on
+from patina.core.fit.measured.cell_weights import crowding
 from patina.core.fit.measured.cells import AngleCells, gather
-from patina.core.fit.measured.crowding import crowding
 from patina.core.fit.measured.equations import Arrow
 from patina.core.fit.measured.forward import CellModel
+from patina.core.fit.measured.grazing_prior import carried_on
 from patina.core.fit.measured.normals import refine_normals
 from patina.core.fit.measured.patches import Patches
 from patina.core.fit.measured.posterior import GAIN, STEP, _residuals, solve
 from patina.core.fit.measured.prior import ChannelPrior
 from patina.core.fit.measured_result import MeasuredResult
 from patina.core.geometry import RayScene, view_surface
-from patina.core.job import inputs
+from patina.core.inputs import capture_data
 from patina.core.light import MountedLight
 from patina.core.samples import SampleTable, sample_photo
 from patina.core.samples.take import light_surface
@@ -104,7 +104,7 @@ def samples(
 def truth() -> LogTable:
     c = np.zeros((3, 6))
     c[:, 0], c[:, 1] = 0.04, [0.03, 0.02, 0.01]
-    return LogTable.of(Basis.default(), c)
+    return LogTable.of(default_basis(), c)
 
 
 def is_whole(fit: MeasuredFit) -> None:
@@ -144,21 +144,21 @@ def is_whole(fit: MeasuredFit) -> None:
 )
 def test_odd_captures_give_whole_numbers(case: dict) -> None:
     table = samples(**case)
-    fit = fit_measured(table, Basis.default(), QUICK)
+    fit = fit_measured(table, default_basis(), QUICK)
     is_whole(fit)
     photos = np.unique(table.photo).tolist()
     assert sorted(fit.without) == (photos if len(photos) > 1 else [])
 
 
 def test_a_grey_material_stays_grey() -> None:
-    fit = fit_measured(samples(400, rho=(0.3, 0.3, 0.3)), Basis.default(), QUICK)
+    fit = fit_measured(samples(400, rho=(0.3, 0.3, 0.3)), default_basis(), QUICK)
     c = fit.brdf.coefficients
     assert np.allclose(c[0], c[1], atol=1e-5) and np.allclose(c[0], c[2], atol=1e-5)
 
 
 def test_a_black_material_is_black() -> None:
     table = samples(1000, rho=(0.0, 0.0, 0.0))
-    fit = fit_measured(table, Basis.default(), QUICK)
+    fit = fit_measured(table, default_basis(), QUICK)
     assert np.median(fit.brdf.evaluate(table.angles)) < 2e-3
 
 
@@ -166,7 +166,7 @@ def test_all_samples_in_one_place() -> None:
     table = samples(200)
     patches = Patches.of_points(np.ones((200, 3)))
     assert patches.count == 1 and patches.neighbours.shape == (1, 1)
-    is_whole(fit_measured(replace(table, point=np.ones((200, 3))), Basis.default(), QUICK))
+    is_whole(fit_measured(replace(table, point=np.ones((200, 3))), default_basis(), QUICK))
 
 
 def test_broken_samples_are_left_out() -> None:
@@ -180,8 +180,8 @@ def test_broken_samples_are_left_out() -> None:
     point[77, 0] = np.nan
     bad = [3, 17, 40, 41, 77]
     broken = replace(table, radiance=radiance, irradiance=irradiance, point=point)
-    fit = fit_measured(broken, Basis.default(), QUICK)
-    expected = fit_measured(table.select(np.delete(np.arange(600), bad)), Basis.default(), QUICK)
+    fit = fit_measured(broken, default_basis(), QUICK)
+    expected = fit_measured(table.select(np.delete(np.arange(600), bad)), default_basis(), QUICK)
     assert fit.samples == 595
     assert fit.brdf.coefficients.tobytes() == expected.brdf.coefficients.tobytes()
 
@@ -191,7 +191,7 @@ def test_too_few_whole_samples_are_refused() -> None:
     radiance = np.array(table.radiance)
     radiance[:20] = np.nan
     with pytest.raises(FitError, match="40 lit samples"):
-        fit_measured(replace(table, radiance=radiance), Basis.default(), QUICK)
+        fit_measured(replace(table, radiance=radiance), default_basis(), QUICK)
 
 
 def test_large_curved_patches_leave_a_normal_deviation() -> None:
@@ -264,7 +264,7 @@ def whole_matrices(
 
 @pytest.mark.parametrize("coupled", [False, True])
 def test_leaving_out_agrees_with_whole_matrices(coupled: bool) -> None:
-    basis = Basis.default()
+    basis = default_basis()
     model = model_of(5, 600, basis)
     prior = ChannelPrior.of(basis, 12, coupled)
     prior = prior.anchored(carried_on(model, np.zeros((3, 12))), 1.0)
@@ -282,7 +282,7 @@ def test_leaving_out_agrees_with_whole_matrices(coupled: bool) -> None:
 @pytest.mark.parametrize("photos", [2, 4])
 def test_leaving_out_is_near_a_fit_without(photos: int) -> None:
     """Photos that disagree by a tenth: one step goes to what the others alone say."""
-    basis = Basis.default()
+    basis = default_basis()
     table = samples(4000, photos)
     colour = np.exp(np.random.default_rng(0).normal(0, 0.1, (photos, 3))).astype(np.float32)
     table = replace(table, radiance=table.radiance * colour[table.photo])
@@ -309,7 +309,7 @@ def test_an_arrow_is_its_matrix() -> None:
 
 def test_memory_does_not_grow_with_the_photos() -> None:
     """Whole matrices of 400 photos would take 400 × 490² numbers, 770 MB; blocks 10 MB."""
-    basis = Basis.default()
+    basis = default_basis()
     prior = ChannelPrior.of(basis, 30, coupled=False)
     peaks = []
     for photos in (2, 400):
@@ -336,7 +336,7 @@ def test_a_black_photo_has_no_relative_error() -> None:
     dark = table.photo == 1
     radiance = np.where(dark[:, None], np.float32(0), table.radiance)
     table = replace(table, radiance=radiance)
-    fit = fit_measured(table, Basis.default(), QUICK)
+    fit = fit_measured(table, default_basis(), QUICK)
     held = summarise([predicted(table, p, fit.brdf) for p in (0, 1, 2)])
     assert held is not None and sorted(held.per_photo) == [0, 2]
     assert np.isfinite([held.error, held.typical]).all() and held.typical < 1.0
@@ -351,7 +351,7 @@ def test_noise_below_black_divides_nothing() -> None:
     radiance[:100] = 0.0
     radiance[100:180] = table.radiance[100:180]
     found = predicted(
-        replace(table, radiance=radiance), 0, fit_measured(table, Basis.default(), QUICK).brdf
+        replace(table, radiance=radiance), 0, fit_measured(table, default_basis(), QUICK).brdf
     )
     assert np.isfinite(found.relative).all() and (found.relative >= 0).all()
     assert len(found.relative) == 80
@@ -360,8 +360,8 @@ def test_noise_below_black_divides_nothing() -> None:
 def test_pixels_beside_a_narrow_beam_are_left_out(tmp_path: Path) -> None:
     """A torch lights the middle of a photo that is black elsewhere: 0/0 is no reflectance."""
     capture = read_capture(made.make_capture(tmp_path))
-    scan = inputs.open_scan(capture)
-    camera, rays = inputs.camera_of(capture, scan, 0), RayScene.build(scan.mesh)
+    scan = capture_data.open_scan(capture)
+    camera, rays = capture_data.camera_of(capture, scan, 0), RayScene.build(scan.mesh)
     view = view_surface(rays, camera)
     torch = MountedLight("torch", np.zeros(3), np.full(3, 50.0), beam=np.radians(1.0))
     lighting = light_surface(rays, view, torch, camera)

@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 
 from patina.core.angles import Angles, cosines, half_difference
-from patina.core.basis import Basis, mapping
+from patina.core.basis import Basis, default_basis, mapping
 from patina.core.basis.log_table import LogTable
 from patina.core.errors import FitError
 from patina.core.fit.measured import MeasuredSettings, fit_measured
-from patina.core.fit.measured.anchors import Anchors, directions
-from patina.core.fit.measured.caution import CAUTION, caution
 from patina.core.fit.measured.cells import gather
 from patina.core.fit.measured.forward import CellModel, _distinct
+from patina.core.fit.measured.grazing_prior import Anchors, directions
 from patina.core.fit.measured.lobes import Lobes, fit_lobes
+from patina.core.fit.measured.normal_quadrature import rings, scattered
 from patina.core.fit.measured.normals import refine_normals, seen_with
 from patina.core.fit.measured.patches import Patches
+from patina.core.fit.measured.power_likelihood import LARGEST, LEAST, size, tempered
 from patina.core.fit.measured.prior import ChannelPrior
-from patina.core.fit.measured.scatter import rings, scattered
-from patina.core.fit.measured.tempering import LARGEST, LEAST, size, tempered
+from patina.core.fit.measured.shrinkage import CAUTION, caution
 from patina.core.samples import SampleTable
 from tests import make_capture as made
 from tests.sampled import sampled
@@ -58,7 +58,7 @@ def test_cells_keep_every_sample_and_the_mean_light(table: SampleTable) -> None:
 
 
 def test_slopes_are_those_of_the_prediction(table: SampleTable) -> None:
-    basis = Basis.default()
+    basis = default_basis()
     cells = gather(table, np.radians(1.0)).select(np.arange(0, 400))
     model = CellModel.of(cells, basis)
     k = 12
@@ -75,7 +75,7 @@ def test_slopes_are_those_of_the_prediction(table: SampleTable) -> None:
 
 
 def test_part_of_a_model_predicts_as_the_whole(table: SampleTable) -> None:
-    model = CellModel.of(gather(table, np.radians(0.5)), Basis.default())
+    model = CellModel.of(gather(table, np.radians(0.5)), default_basis())
     c = 0.02 * np.random.default_rng(1).standard_normal((3, 8))
     some = np.random.default_rng(2).random(len(model.cells)) < 0.4
     whole, part = model.predict(c), model.select(some).predict(c)
@@ -96,7 +96,7 @@ def test_precision_is_the_inverse_of_the_priors_covariance() -> None:
 
 def test_anchors_carry_the_lobes_change_on() -> None:
     """A BRDF that IS lobes up to the edge goes on halfway between its edge and the lobes."""
-    basis = Basis.default()
+    basis = default_basis()
     lobes = Lobes(np.log([0.1] * 3 + [0.3, 1.0] + [0.05] * 3 + [0.1, 1.0] + [1e-6] * 3), 0.0)
     k = basis.count
     grid = Angles(*(a.ravel() for a in basis.grid.nodes()))
@@ -128,7 +128,7 @@ def test_lobes_find_a_lambertian_surface(table: SampleTable) -> None:
 
 def test_normals_come_back(table: SampleTable) -> None:
     """A glossy material, normals tilted smoothly by two degrees: most of the tilt is found."""
-    basis = Basis.default()
+    basis = default_basis()
     truth = made_brdf(basis)
     radiance = truth.evaluate(table.angles) * table.irradiance * table.cos_i[:, None]
     clean = replace(table, radiance=radiance.astype(np.float32))
@@ -150,7 +150,7 @@ def test_normals_come_back(table: SampleTable) -> None:
 
 
 def test_flat_materials_leave_normals_alone(table: SampleTable) -> None:
-    basis = Basis.default()
+    basis = default_basis()
     nodes = Angles(*(a.ravel() for a in basis.grid.nodes()))
     cos_i, cos_o = cosines(*nodes)
     flat = np.log(0.1 * np.clip(cos_i * cos_o, 0.01, 1.0) + 1e-3)
@@ -163,7 +163,7 @@ def test_flat_materials_leave_normals_alone(table: SampleTable) -> None:
 
 
 def test_the_whole_recovers_a_material(table: SampleTable) -> None:
-    basis = Basis.default()
+    basis = default_basis()
     truth = made_brdf(basis)
     shown = truth.evaluate(table.angles) * table.irradiance * table.cos_i[:, None]
     fit = fit_measured(replace(table, radiance=shown.astype(np.float32)), basis)
@@ -179,13 +179,13 @@ def test_the_whole_recovers_a_material(table: SampleTable) -> None:
 
 def test_the_same_input_gives_the_same_bytes(table: SampleTable) -> None:
     quick = MeasuredSettings(rounds=1, components=20)
-    first, second = (fit_measured(table, Basis.default(), quick) for _ in range(2))
+    first, second = (fit_measured(table, default_basis(), quick) for _ in range(2))
     assert first.brdf.coefficients.tobytes() == second.brdf.coefficients.tobytes()
 
 
 def test_too_few_samples_are_refused(table: SampleTable) -> None:
     with pytest.raises(FitError, match="at least"):
-        fit_measured(table.select(np.arange(10)), Basis.default())
+        fit_measured(table.select(np.arange(10)), default_basis())
 
 
 def test_patches_touch_their_neighbours(table: SampleTable) -> None:
@@ -211,7 +211,7 @@ def made_brdf(basis: Basis) -> LogTable:
 
 
 def test_a_log_table_is_the_basis(table: SampleTable) -> None:
-    basis = Basis.default()
+    basis = default_basis()
     c = 0.03 * np.random.default_rng(5).standard_normal((3, 10))
     angles = Angles(*(a[:500] for a in table.angles))
     assert np.allclose(
@@ -221,7 +221,7 @@ def test_a_log_table_is_the_basis(table: SampleTable) -> None:
 
 def test_cells_of_an_unlikely_material_count_less(table: SampleTable) -> None:
     """A lobe no measured material has: its coefficients are kept to what measured ones have."""
-    basis = Basis.default()
+    basis = default_basis()
     prior = ChannelPrior.of(basis, basis.count, coupled=False)
     likely = made_brdf(basis).evaluate(table.angles)
     odd = likely * (1 + 20 * np.exp(-np.square((table.theta_h - 0.35) / 0.05))[:, None])
@@ -238,7 +238,7 @@ def test_cells_of_an_unlikely_material_count_less(table: SampleTable) -> None:
 
 def test_caution_darkens_only_what_is_unsure() -> None:
     """One component unknown: the BRDF falls where that component matters, and nowhere else."""
-    basis = Basis.default()
+    basis = default_basis()
     k = basis.count
     covariance = np.tile(1e-8 * np.eye(k), (3, 1, 1))
     covariance[:, 2, 2] = basis.coefficient_variance

@@ -10,14 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patina.core.angles import Angles, cosines
-from patina.core.basis import AngleGrid, Basis, PrincipalBRDF
+from patina.core.basis import AngleGrid, PrincipalBRDF, default_basis
 from patina.core.fit.measured_result import COARSE, Band, MeasuredResult
 from patina.core.fit.spread import candidate_spread
 
 
 def made_result(deviation: float, gains: dict[int, float] | None = None) -> MeasuredResult:
     """A BRDF of the basis, everywhere as sure."""
-    basis = Basis.default()
+    basis = default_basis()
     grid = AngleGrid(*COARSE, basis.grid.knee)
     return MeasuredResult(
         brdf=PrincipalBRDF(basis, np.full((3, 5), 0.02)),
@@ -53,7 +53,7 @@ def test_a_band_of_one_width_is_that_width() -> None:
 
 def test_the_kept_band_is_the_fits_own() -> None:
     """A posterior of known covariance: the deviation between nodes is that of Q̂ c."""
-    basis = Basis.default()
+    basis = default_basis()
     rng = np.random.default_rng(0)
     covariance = np.diag(rng.uniform(1e-5, 1e-3, 30))
 
@@ -81,7 +81,7 @@ def test_only_gains_that_matter_are_told() -> None:
 
 def test_spread_of_candidates_is_their_standard_deviation() -> None:
     """Two candidates apart by a step in the first component: ± half of its size."""
-    basis = Basis.default()
+    basis = default_basis()
     c = np.zeros((2, 3, 5))
     c[1, :, 0] = 0.01
     found = candidate_spread(basis, c)

@@ -9,7 +9,7 @@ import pytest
 
 from patina.core.angles import Angles
 from patina.core.capture import read_capture
-from patina.core.job import FitJob
+from patina.core.jobs import FitJob
 from patina.core.scan.mesh import read_mesh
 from tests import make_capture as made
 

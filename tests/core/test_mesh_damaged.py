@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from patina.core.errors import InputError
 from patina.core.scan.mesh import Mesh, read_mesh
-from patina.core.scan.mesh_formats.beside import beside
+from patina.core.scan.mesh_formats.texture_path import beside
 from tests import make_meshes as made
 
 SAMPLES = made.samples()

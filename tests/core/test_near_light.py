@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patina.core.basis import Basis
+from patina.core.basis import default_basis
 from patina.core.capture import read_capture
+from patina.core.concurrency.steps import drained
 from patina.core.errors import InputError
 from patina.core.geometry import RayScene
-from patina.core.job import inputs
-from patina.core.job.lights import find_lights, refined
-from patina.core.job.photos import LitPhotos
+from patina.core.inputs import capture_data
+from patina.core.inputs.lights import find_lights, refined
+from patina.core.inputs.photos import LitPhotos
 from patina.core.light import DistantLight, MountedLight, NearLight
 from patina.core.scan import Camera, Pose
-from patina.core.steps import drained
 from tests import make_capture as made
 from tests.sampled import sampled
 
@@ -120,11 +120,11 @@ def test_taking_a_flash_for_a_distant_light_is_wrong(flash_photos: Path, tmp_pat
 
 def refined_lights(path: Path):
     capture = read_capture(path)
-    scan = inputs.open_scan(capture)
+    scan = capture_data.open_scan(capture)
     photos = LitPhotos.open(capture)
     lights = find_lights(capture, scan, photos)
     rays = RayScene.build(scan.mesh)
-    return drained(refined(lights, capture, scan, photos, rays, Basis.default()))
+    return drained(refined(lights, capture, scan, photos, rays, default_basis()))
 
 
 def test_a_flash_is_found_from_the_photos(flash_photos: Path) -> None:

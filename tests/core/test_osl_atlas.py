@@ -9,7 +9,7 @@ import pytest
 
 from patina.core.angles import Angles, cosines
 from patina.core.appearance import osl_atlas, osl_source
-from patina.core.basis import Basis, PrincipalBRDF, mapping
+from patina.core.basis import PrincipalBRDF, default_basis, mapping
 
 COUNT = 8
 
@@ -55,7 +55,7 @@ def _relative(read: np.ndarray, exact: np.ndarray, angles: Angles) -> np.ndarray
 
 @pytest.mark.parametrize("count", [5, 6, 20, 100])
 def test_the_shader_reads_the_brdf_itself(angles: Angles, count: int) -> None:
-    basis = Basis.default()
+    basis = default_basis()
     c = np.random.default_rng(2).normal(0, np.sqrt(basis.coefficient_variance), (3, count))
     # component by component, at every direction: no table of sums in between
     exact = basis.evaluate(c, angles).astype(float)
@@ -65,7 +65,7 @@ def test_the_shader_reads_the_brdf_itself(angles: Angles, count: int) -> None:
 
 def test_moving_a_coefficient_is_another_member_of_the_basis(angles: Angles) -> None:
     """An artist's change goes through half floats: a thousandth, not more."""
-    basis = Basis.default()
+    basis = default_basis()
     c = np.random.default_rng(3).normal(0, np.sqrt(basis.coefficient_variance), (3, 60))
     moved = c.copy()
     moved[:, :8] += np.random.default_rng(4).normal(0, 0.06, (3, 8))
@@ -77,7 +77,7 @@ def test_moving_a_coefficient_is_another_member_of_the_basis(angles: Angles) -> 
 def test_the_files_are_small_and_hold_what_was_written(tmp_path: Path) -> None:
     import OpenImageIO as oiio
 
-    basis = Basis.default()
+    basis = default_basis()
     brdf = PrincipalBRDF(basis, np.random.default_rng(5).normal(0, 0.06, (3, 100)))
     path = osl_atlas.write_components(tmp_path / osl_atlas.components_name(basis), basis)
     assert path.stat().st_size < 2e6
@@ -91,7 +91,7 @@ def test_the_files_are_small_and_hold_what_was_written(tmp_path: Path) -> None:
 
 
 def test_every_brdf_has_a_file_of_its_own() -> None:
-    basis = Basis.default()
+    basis = default_basis()
     c = np.random.default_rng(6).normal(0, 0.06, (3, 10))
     name = osl_atlas.remainder_name(PrincipalBRDF(basis, c))
     assert name == osl_atlas.remainder_name(PrincipalBRDF(basis, c.copy()))
@@ -99,7 +99,7 @@ def test_every_brdf_has_a_file_of_its_own() -> None:
 
 
 def test_source_has_every_input_and_no_word_left():
-    text = osl_source.source(Basis.default(), COUNT)
+    text = osl_source.source(default_basis(), COUNT)
     assert "@" not in text
     for item in osl_source.inputs(COUNT):
         assert f" {item.name} " in text

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from patina.core.basis import Basis
+from patina.core.basis import default_basis
 from patina.core.errors import FitError
 from patina.core.fit import PaperSettings, fit_paper, reliability, selection
 from patina.core.fit.held_out import leave_out, photos_to_hold_out, summarise
@@ -56,7 +56,7 @@ def test_selection_beats_random_sets_and_keeps_the_fixed_row() -> None:
 
 
 def test_chosen_samples_are_monotone_and_calm(table: SampleTable) -> None:
-    fit = fit_paper(table, Basis.default(), PaperSettings(trials=3))
+    fit = fit_paper(table, default_basis(), PaperSettings(trials=3))
     order = np.argsort(fit.chosen.theta_h)
     rho = fit.chosen.rho.mean(axis=1)[order]
     assert (np.diff(rho) < 0).all()  # farther from the half vector: darker
@@ -65,7 +65,7 @@ def test_chosen_samples_are_monotone_and_calm(table: SampleTable) -> None:
 
 
 def test_every_assumption_can_be_switched_off(table: SampleTable) -> None:
-    basis = Basis.default()
+    basis = default_basis()
     off = PaperSettings(
         trials=4, monotonicity=False, highest_intensity=False, curvature=None, subset=300
     )
@@ -95,7 +95,7 @@ def test_the_peak_takes_the_half_vector_for_its_normal(table: SampleTable) -> No
 def test_the_fit_is_the_material(table: SampleTable) -> None:
     """A Blinn lobe is no MERL material: within a fifth over what the photos saw is what six
     samples can do; the colour of the body is right."""
-    fit = fit_paper(table, Basis.default())
+    fit = fit_paper(table, default_basis())
     seen = fit.brdf.evaluate(table.angles)
     ratio = np.log(seen / table.rho)
     assert np.median(np.abs(ratio)) < 0.25
@@ -107,14 +107,14 @@ def test_the_fit_is_the_material(table: SampleTable) -> None:
 
 def test_same_seed_same_coefficients(table: SampleTable) -> None:
     a, b, c = (
-        fit_paper(table, Basis.default(), PaperSettings(trials=2, seed=seed)) for seed in (4, 4, 5)
+        fit_paper(table, default_basis(), PaperSettings(trials=2, seed=seed)) for seed in (4, 4, 5)
     )
     assert np.array_equal(a.brdf.coefficients, b.brdf.coefficients)
     assert not np.array_equal(a.brdf.coefficients, c.brdf.coefficients)
 
 
 def test_similarity_is_the_cosine(table: SampleTable) -> None:
-    basis = Basis.default()
+    basis = default_basis()
     c = np.random.default_rng(3).normal(0, 0.03, (2, 3, 6))
     part = table.select(np.arange(0, len(table), 7))
     found = similarity_sums(basis, c, part)
@@ -127,7 +127,7 @@ def test_similarity_is_the_cosine(table: SampleTable) -> None:
 
 
 def test_a_held_out_photo_is_predicted_and_one_photo_is_none(table: SampleTable) -> None:
-    basis = Basis.default()
+    basis = default_basis()
     assert photos_to_hold_out(table) == list(range(6))
     parts = [leave_out(table, photo, basis, PaperSettings(trials=2)) for photo in range(6)]
     held = summarise([part for part in parts if part is not None])
@@ -138,15 +138,15 @@ def test_a_held_out_photo_is_predicted_and_one_photo_is_none(table: SampleTable)
 
 def test_too_few_samples_are_refused(table: SampleTable) -> None:
     with pytest.raises(FitError, match="at least 24"):
-        fit_paper(table.select(np.arange(10)), Basis.default())
+        fit_paper(table.select(np.arange(10)), default_basis())
 
 
 def test_equal_candidates_have_no_spread() -> None:
     c = np.tile(np.random.default_rng(0).normal(0, 0.03, (1, 3, 6)), (4, 1, 1))
-    spread = candidate_spread(Basis.default(), c)
+    spread = candidate_spread(default_basis(), c)
     assert spread.median < 1e-5
     c[0] *= 2
-    assert candidate_spread(Basis.default(), c).median > 0.01
+    assert candidate_spread(default_basis(), c).median > 0.01
 
 
 def test_unknown_irradiance_is_one_scale(tmp_path: Path) -> None:
@@ -192,7 +192,7 @@ def test_a_brighter_lamp_is_no_highlight(table: SampleTable) -> None:
 
 def test_unknown_irradiance_fits_the_same_in_any_unit(table: SampleTable) -> None:
     """The mapping is not blind to scale; the level it is given must be."""
-    basis = Basis.default()
+    basis = default_basis()
     found = []
     for unit in (1e-3, 1.0, 500.0):
         scaled = replace(
@@ -208,7 +208,7 @@ def test_unknown_irradiance_fits_the_same_in_any_unit(table: SampleTable) -> Non
 
 def test_a_wrong_hue_is_an_error_too(table: SampleTable) -> None:
     """Red too bright and green too dark by as much: the channel mean is right, the photo is not."""
-    basis = Basis.default()
+    basis = default_basis()
     brdf = fit_paper(table.select(table.photo != 0), basis, PaperSettings(trials=2, seed=1)).brdf
     exact = brdf.evaluate(table.angles) * table.irradiance * table.cos_i[:, None]
     shift = 0.3 * exact.mean(axis=1)

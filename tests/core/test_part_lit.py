@@ -9,11 +9,15 @@ import pytest
 import trimesh
 
 from patina.core.diagnose.effects.area_light import RADII, AreaLight
+from patina.core.diagnose.effects.base.displaced_shadows import DisplacedShadows
 from patina.core.diagnose.effects.light_direction import LightDirection
-from patina.core.diagnose.moved_shadows import MovedShadows
-from patina.core.diagnose.part_lit import SIDE, part_lit, parts_of
-from patina.core.diagnose.pixels import Pixels
-from patina.core.diagnose.situation import Situation
+from patina.core.diagnose.forward.partial_visibility import (
+    SIDE,
+    partial_visibility,
+    pixel_part_points,
+)
+from patina.core.diagnose.forward.pixels import Pixels
+from patina.core.diagnose.forward.shading_state import ShadingState
 from patina.core.geometry import RayScene
 from patina.core.geometry.lift import LEAST, SHADOW_LIFT, facet_lift
 from patina.core.scan import Mesh
@@ -54,7 +58,7 @@ def test_a_pixel_is_lit_as_far_as_the_shadow_does_not_reach(elevation: float) ->
     x = ends + WIDE * np.linspace(-2, 2, 41)
     towards = _towards(elevation)
     pixels = _row_of_pixels(x, towards)
-    found = part_lit(_floor_and_wall(), pixels, pixels.light)
+    found = partial_visibility(_floor_and_wall(), pixels, pixels.light)
     true = np.clip((x - ends) / WIDE + 0.5, 0, 1)
     # columns of rays, and the lift by which a shadow begins late
     late = SHADOW_LIFT * 4 / np.tan(elevation) / WIDE
@@ -64,7 +68,7 @@ def test_a_pixel_is_lit_as_far_as_the_shadow_does_not_reach(elevation: float) ->
 
 def test_what_is_turned_away_is_not_in_a_shadow() -> None:
     pixels = _row_of_pixels(np.array([0.1]), _towards(0.5))
-    assert part_lit(_floor_and_wall(), pixels, -pixels.light) == pytest.approx(1.0)
+    assert partial_visibility(_floor_and_wall(), pixels, -pixels.light) == pytest.approx(1.0)
 
 
 def test_a_wide_lamp_softens_the_edge_of_whole_pixels() -> None:
@@ -77,7 +81,7 @@ def test_a_wide_lamp_softens_the_edge_of_whole_pixels() -> None:
     rays = _floor_and_wall()
     pixels = _row_of_pixels(x, _towards(high))
     pixels = replace(pixels, step=pixels.step * np.float32(wide / WIDE))
-    pixels = replace(pixels, visible=part_lit(rays, pixels, pixels.light))
+    pixels = replace(pixels, visible=partial_visibility(rays, pixels, pixels.light))
     effect = AreaLight.of(replace(make_lit_ball.lit_ball(), pixels=pixels, rays=rays))
     assert effect is not None and np.array_equal(effect.free[:, 0], pixels.visible)
     out, turn = np.sqrt(rng.random(4000)), 2 * np.pi * rng.random(4000)
@@ -100,20 +104,20 @@ def test_shadows_go_with_the_lamp() -> None:
     x = np.linspace(0.7, 1.3, 61)
     rays = _floor_and_wall()
     pixels = _row_of_pixels(x, _towards(high))
-    pixels = replace(pixels, visible=part_lit(rays, pixels, pixels.light))
-    setting = replace(make_lit_ball.lit_ball(), pixels=pixels, rays=rays)
-    effect = LightDirection.of(setting)
+    pixels = replace(pixels, visible=partial_visibility(rays, pixels, pixels.light))
+    context = replace(make_lit_ball.lit_ball(), pixels=pixels, rays=rays)
+    effect = LightDirection.of(context)
     assert effect is not None
     moved = _towards(low) / (_towards(low) @ _towards(high)) - _towards(high)
     angles = np.array([effect.aside[0] @ moved, effect.other[0] @ moved])
-    cast = effect.casting(setting, angles).before(Situation.of(pixels), angles)
-    true = part_lit(rays, pixels, np.broadcast_to(_towards(low), (len(x), 3)))
+    cast = effect.with_rays(context, angles).shading(ShadingState.of(pixels), angles)
+    true = partial_visibility(rays, pixels, np.broadcast_to(_towards(low), (len(x), 3)))
     assert np.abs(cast.visible - true).max() < 1e-5
     assert (cast.visible < 0.5).sum() > (pixels.visible < 0.5).sum() + 3
-    still = MovedShadows.of(setting, effect, np.zeros(2))
+    still = DisplacedShadows.of(context, effect, np.zeros(2))
     assert np.abs(still.more).max() == 0
     one_ray = replace(pixels, visible=np.round(pixels.visible))  # as beside no edge
-    still = MovedShadows.of(replace(setting, pixels=one_ray), effect, np.zeros(2))
+    still = DisplacedShadows.of(replace(context, pixels=one_ray), effect, np.zeros(2))
     assert np.abs(still.more).max() == 0
 
 
@@ -156,7 +160,7 @@ def test_a_hollow_under_its_lamp_is_lit() -> None:
     pixels = replace(
         pixels, point=point, normal=normal.astype(np.float32), view=np.tile(up, (50, 1))
     )
-    assert part_lit(rays, pixels, pixels.light) == pytest.approx(1.0)
+    assert partial_visibility(rays, pixels, pixels.light) == pytest.approx(1.0)
     # and parts of a pixel lie on the mesh
-    parts = parts_of(rays, pixels)
+    parts = pixel_part_points(rays, pixels)
     assert parts[..., 2] == pytest.approx(np.sum(parts[..., :2] ** 2, axis=-1), abs=1e-4)

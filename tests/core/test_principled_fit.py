@@ -8,7 +8,7 @@ import pytest
 from patina.core.appearance.cube_root import quadrature
 from patina.core.appearance.principled import Principled
 from patina.core.appearance.principled_fit import fit_principled
-from patina.core.basis import Basis, PrincipalBRDF
+from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.errors import FitError
 
 OWN = [
@@ -43,7 +43,7 @@ def test_recovers_a_coat():
 
 
 def test_the_mean_material_is_nearer_than_a_diffuse_one_and_quick(monkeypatch):
-    basis, asked = Basis.default(), []
+    basis, asked = default_basis(), []
     once = Principled.at
 
     def counted(self, where):

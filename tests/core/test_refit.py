@@ -7,10 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 
+from patina.core.concurrency.job import Step
 from patina.core.fit.held_out import HeldOut
-from patina.core.job import refit_job
-from patina.core.job.job import Step
-from patina.core.job.refused import Again, Refusal, worse
+from patina.core.jobs import refit_job
+from patina.core.jobs.acceptance import Refit, Rejection, worse
 
 
 def with_errors(*errors: float | None) -> list[SimpleNamespace]:
@@ -112,23 +112,23 @@ def test_what_unseen_photos_speak_against_is_left_out(monkeypatch, order, guilty
     """Second fits are refused that have a guilty cause in them. Those that gained less are tried
     without first; what was left out in vain is put back."""
     chosen = [SimpleNamespace(effect=SimpleNamespace(cause=name)) for name in order]
-    monkeypatch.setattr(refit_job, "can_be_applied", lambda found: chosen)
+    monkeypatch.setattr(refit_job, "correctable_effects", lambda found: chosen)
     monkeypatch.setattr(refit_job, "_applied", lambda trial, model: trial.effect.cause)
     fractions = []
 
     def fitted(self, before, found, taken, done):
         fractions.append(done)
         yield Step("fitting", done)
-        again = [Again(Material(("again",)), {}, ())]
+        again = [Refit(Material(("again",)), {}, ())]
         worse = any(t.effect.cause in guilty for t in taken)
-        refusal = Refusal("errors grow by 8 %", of_cause) if worse else None
+        refusal = Rejection("errors grow by 8 %", of_cause) if worse else None
         return again, SimpleNamespace(model=None), refusal
 
     monkeypatch.setattr(refit_job.RefitJob, "_with", fitted)
     checked = SimpleNamespace(result=Result((Material(("first",)),)), found=SimpleNamespace())
     job = refit_job.RefitJob(checked, portable=False)
     job.drain()
-    told, other = (job.doubted, job.unused) if of_cause else (job.unused, job.doubted)
+    told, other = (job.contradicted, job.unused) if of_cause else (job.unused, job.contradicted)
     assert told == dict.fromkeys(guilty, "errors grow by 8 %") and not other
     sound = tuple(name for name in order if name not in guilty)
     assert job.result.effects == sound

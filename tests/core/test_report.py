@@ -12,8 +12,8 @@ import pytest
 
 from patina.core.brdf import TabulatedBRDF, metrics
 from patina.core.capture import read_capture
-from patina.core.job import CaptureResult, FitJob
-from patina.core.job.warnings import black_photos
+from patina.core.jobs import CaptureResult, FitJob
+from patina.core.jobs.fit_warnings import black_photos
 from patina.core.photo import read_encoded
 from patina.core.report import figures, result_json, write_report
 from patina.core.views import display

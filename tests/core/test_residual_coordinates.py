@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from patina.core.diagnose.coordinates import coordinates, half_vector_turns, trend
+from patina.core.diagnose.selection.residual_trends import coordinates, half_vector_turns, trend
 from tests.make_lit_ball import lit_ball
 
 BETRAY = (
@@ -18,11 +18,11 @@ BETRAY = (
 
 
 def test_all_that_betrays_a_cause_is_there():
-    setting = lit_ball()
-    names = [c.name for c in coordinates(setting)]
+    context = lit_ball()
+    names = [c.name for c in coordinates(context)]
     assert len(set(names)) == len(names)
     assert [each for each in BETRAY if not any(each in name for name in names)] == []
-    assert all(c.values.shape == (len(setting.pixels),) for c in coordinates(setting))
+    assert all(c.values.shape == (len(context.pixels),) for c in coordinates(context))
 
 
 @pytest.mark.parametrize(("tilt", "expected"), [
@@ -42,22 +42,22 @@ def test_tangent_directions_are_those_of_the_half_vector(tilt, expected):
 
 
 def test_what_is_flat_has_no_tangent_direction_off_its_own_axis():
-    setting = lit_ball()
-    up = np.broadcast_to(np.float32([0, 0, 1]), setting.pixels.normal.shape)
-    flat = replace(setting, pixels=replace(setting.pixels, normal=up))
+    context = lit_ball()
+    up = np.broadcast_to(np.float32([0, 0, 1]), context.pixels.normal.shape)
+    flat = replace(context, pixels=replace(context.pixels, normal=up))
     (upright,) = [c for c in coordinates(flat) if c.name == "tangent direction, off z"]
-    shown = np.ones_like(setting.pixels.observed)
-    assert not len(trend(upright, 0 * shown, shown, 0.01 * shown, setting.pixels.block).at)
+    shown = np.ones_like(context.pixels.observed)
+    assert not len(trend(upright, 0 * shown, shown, 0.01 * shown, context.pixels.block).at)
 
 
 def test_a_trend_is_what_was_put_there():
     """3 % more light for each half diagonal, in photos of 1 % noise."""
-    setting = lit_ball(3)
-    pixels = setting.pixels
-    (away,) = [c for c in coordinates(setting) if "centre" in c.name]
+    context = lit_ball(3)
+    pixels = context.pixels
+    (away,) = [c for c in coordinates(context) if "centre" in c.name]
     shown = pixels.observed / (1 + 0.03 * away.values[:, None])
     found = trend(away, pixels.observed - shown, shown, 0.01 * shown, pixels.block)
     np.testing.assert_allclose(found.mean, 0.03 * found.at, atol=0.002)
-    turned = next(c for c in coordinates(setting) if c.name == "tangent direction, off z")
+    turned = next(c for c in coordinates(context) if c.name == "tangent direction, off z")
     along = trend(turned, 0 * shown, shown, 0.01 * shown, pixels.block)
     assert len(along.at) > 3 and np.abs(along.mean).max() == 0

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from patina.core.basis import Basis, storage
+from patina.core.basis import Basis, default_basis, storage
 from patina.core.errors import InputError
 from patina.core.result import read_result
 from tests import make_result as made
@@ -26,7 +26,7 @@ def test_what_a_fit_wrote_is_read_back(tmp_path: Path) -> None:
     for path in (folder, folder / "result.json"):
         result = read_result(path)
         assert [m.name for m in result.materials] == ["bronze", "old rug"]
-        assert result.basis is Basis.default() and result.scene is None
+        assert result.basis is default_basis() and result.scene is None
         bronze = result.materials[0]
         assert np.array_equal(bronze.brdf.coefficients, made.coefficients(made.BRONZE))
         assert bronze.principled.metallic == 1.0 and bronze.principled.roughness == 0.3
@@ -41,7 +41,7 @@ def test_the_scene_is_found_beside_it(tmp_path: Path) -> None:
 
 
 def test_a_basis_of_the_users_own_is_found_by_its_version(tmp_path: Path) -> None:
-    default = Basis.default()
+    default = default_basis()
     own = Basis(
         default.grid, default.mean, default.log_reference, default.components[:5],
         default.explained, 300, "mine",

@@ -11,9 +11,9 @@ from patina.core.angles import half_difference
 from patina.core.capture import read_capture
 from patina.core.geometry import RayScene, edges, view_surface
 from patina.core.geometry.curvature import mean_curvature
-from patina.core.job import inputs
-from patina.core.job.lights import find_lights
-from patina.core.job.photos import LitPhotos
+from patina.core.inputs import capture_data
+from patina.core.inputs.lights import find_lights
+from patina.core.inputs.photos import LitPhotos
 from patina.core.samples import Margins, SampleTable
 from patina.core.samples.face_votes import FaceVotes
 from patina.core.samples.take import light_surface, trusted_pixels
@@ -120,9 +120,9 @@ def test_faces_take_the_material_most_pixels_saw() -> None:
 def test_margins_leave_out_what_they_say(ball: Path) -> None:
     """With margins no sample lies at an outline, a shadow edge or a grazing angle."""
     capture = read_capture(ball)
-    scan = inputs.open_scan(capture)
+    scan = capture_data.open_scan(capture)
     rays = RayScene.build(scan.mesh)
-    camera = inputs.camera_of(capture, scan, 1)
+    camera = capture_data.camera_of(capture, scan, 1)
     view = view_surface(rays, camera)
     light = find_lights(capture, scan, LitPhotos.open(capture)).of(capture, 1)
     lighting = light_surface(rays, view, light, camera)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patina.core.angles import Angles
-from patina.core.basis import Basis
+from patina.core.basis import default_basis
 from patina.core.fit.candidate_tree import angle_cells
 from patina.core.fit.condition_bound import ConditionBound, condition_numbers
 from patina.core.fit.selection import choose, choose_from_cells
@@ -72,7 +72,7 @@ def test_never_worse_than_the_plain_search(k, n, m, spread, seed) -> None:
 @pytest.mark.parametrize("count", [6, 12])
 def test_never_worse_on_rows_of_the_basis(count: int) -> None:
     angles = real_angles(3000)
-    rows = Basis.default().rows(angles, count)[1]
+    rows = default_basis().rows(angles, count)[1]
     plain = np.linalg.cond(rows[choose_plainly(rows, count, lambda chosen: np.ones(3000, bool))])
     assert np.linalg.cond(rows[choose(rows, count)]) <= plain * (1 + 1e-4)
     many = choose_from_cells(rows, angle_cells(angles), count)

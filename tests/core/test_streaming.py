@@ -13,19 +13,20 @@ from hypothesis import strategies as st
 from scipy.ndimage import binary_dilation, generate_binary_structure
 
 from patina.core.capture import read_capture
+from patina.core.concurrency.ordered_map import ordered_map
+from patina.core.concurrency.steps import drained
 from patina.core.geometry import PixelRays, RayScene, bands, edges, view_surface, view_window
 from patina.core.geometry.window import whole
-from patina.core.job import FitJob, inputs, sampling
-from patina.core.job.in_order import in_order
-from patina.core.job.lights import find_lights
-from patina.core.job.photos import LitPhotos
-from patina.core.job.sampling import take_samples
+from patina.core.inputs import capture_data
+from patina.core.inputs.lights import find_lights
+from patina.core.inputs.photos import LitPhotos
+from patina.core.jobs import FitJob, sampling
+from patina.core.jobs.sampling import take_samples
 from patina.core.samples import Margins, SampleReservoir, SampleTable, sample_photo, weighted
 from patina.core.samples.reservoir import sample_hash, water_level
 from patina.core.samples.take import halo, inner_pixels, light_surface, trusted_pixels
 from patina.core.scan import Camera, Mesh
 from patina.core.scan.camera import Pose
-from patina.core.steps import drained
 from tests import make_capture as made
 
 VIEW = ("pixel", "face", "point", "normal", "view", "curvature")
@@ -63,11 +64,11 @@ def lens_with_distortion(size: int) -> Camera:
 def test_bands_give_what_the_whole_frame_gives(ball: Path, margins: Margins) -> None:
     """Cut at every few rows and at the mesh's columns, against one window of all: equal bits."""
     capture = read_capture(ball)
-    scan = inputs.open_scan(capture)
+    scan = capture_data.open_scan(capture)
     rays = RayScene.build(rough_ball())
     photos = LitPhotos.open(capture)
     light = find_lights(capture, scan, photos).of(capture, 1)
-    camera = inputs.camera_of(capture, scan, 1)
+    camera = capture_data.camera_of(capture, scan, 1)
     radiance = photos.read(1).radiance
     lines = PixelRays.of(camera)
     stripes = np.zeros((camera.height, camera.width), bool)
@@ -158,7 +159,7 @@ def test_widening_is_repeated_dilation() -> None:
 
 def test_threads_and_bands_change_no_byte(ball: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     capture = read_capture(ball)
-    scan = inputs.open_scan(capture)
+    scan = capture_data.open_scan(capture)
     rays, photos = RayScene.build(scan.mesh), LitPhotos.open(capture)
     lights = find_lights(capture, scan, photos)
     found = []
@@ -208,7 +209,7 @@ def test_a_sink_gets_every_sample_once_and_in_order(ball: Path) -> None:
             self.pieces.append(table)
 
     capture, sink = read_capture(ball), Sink()
-    scan = inputs.open_scan(capture)
+    scan = capture_data.open_scan(capture)
     photos = LitPhotos.open(capture)
     lights = find_lights(capture, scan, photos)
     steps = take_samples(
@@ -331,9 +332,9 @@ def test_results_come_in_order_and_errors_come_out() -> None:
         return i * i
 
     with ThreadPoolExecutor(3) as pool:
-        assert list(in_order(pool, work, range(6), ahead=2)) == [0, 1, 4, 9, 16, 25]
+        assert list(ordered_map(pool, work, range(6), ahead=2)) == [0, 1, 4, 9, 16, 25]
         with pytest.raises(ValueError, match="seven"):
-            list(in_order(pool, work, range(9), ahead=2))
+            list(ordered_map(pool, work, range(9), ahead=2))
 
 
 def test_far_from_the_origin_is_as_good_as_near() -> None:

@@ -14,13 +14,13 @@ from patina.core.appearance import trait_words, traits
 from patina.core.appearance.energy import directional_albedo
 from patina.core.appearance.hemisphere import Hemisphere
 from patina.core.appearance.trait_words import Effect
-from patina.core.basis import Basis, PrincipalBRDF, mapping
+from patina.core.basis import PrincipalBRDF, default_basis, mapping
 from patina.core.views.sphere import LitSphere, lit_sphere
 
 
 @pytest.fixture(scope="module")
 def brdf() -> PrincipalBRDF:
-    basis = Basis.default()
+    basis = default_basis()
     return PrincipalBRDF(basis, np.random.default_rng(0).normal(0, 0.03, (3, 40)))
 
 
@@ -145,7 +145,7 @@ def test_words_follow_from_what_is_measured() -> None:
 
 def test_a_component_does_what_its_words_say() -> None:
     """On a material that none of the words was measured on, by another way."""
-    basis = Basis.default()
+    basis = default_basis()
     words = trait_words.words(trait_words.effects(basis))
     plain = PrincipalBRDF(basis, np.zeros((3, 8)))
     theta = np.radians(np.linspace(0, 60, 241))
@@ -178,4 +178,4 @@ def test_the_table_of_the_documents_is_the_basis_own(root: Path) -> None:
 
     text = (root / "docs" / "traits.md").read_text(encoding="utf-8")
     written = re.search(r"<!-- begin traits -->\n(.*?)\n<!-- end traits -->", text, re.S)
-    assert written is not None and written.group(1) == table(Basis.default())
+    assert written is not None and written.group(1) == table(default_basis())

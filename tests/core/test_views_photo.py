@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from patina.core.basis import Basis, PrincipalBRDF
+from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.capture import Capture, read_capture
+from patina.core.concurrency.steps import drained
 from patina.core.fit.reliability import calm
 from patina.core.geometry import RayScene, view_surface
-from patina.core.job import inputs
-from patina.core.job.lights import Lights, find_lights
-from patina.core.job.photos import LitPhotos
-from patina.core.job.sampling import take_samples
-from patina.core.masks.oklab import LINEAR, oklab
+from patina.core.inputs import capture_data
+from patina.core.inputs.lights import Lights, find_lights
+from patina.core.inputs.oklab import LINEAR, oklab
+from patina.core.inputs.photos import LitPhotos
+from patina.core.jobs.sampling import take_samples
 from patina.core.samples import Criterion, SampleTable
-from patina.core.steps import drained
 from patina.core.views import display
 from patina.core.views.criteria import LOOKS, PALETTE, SPARE
 from patina.core.views.photo_pictures import comparison_picture, criteria_picture
@@ -76,7 +76,7 @@ class Opened:
 
     def __init__(self, capture: Capture) -> None:
         self.capture = capture
-        self.scan = inputs.open_scan(capture)
+        self.scan = capture_data.open_scan(capture)
         self.rays = RayScene.build(self.scan.mesh)
         self.photos = LitPhotos.open(capture)
         self.lights: Lights = find_lights(capture, self.scan, self.photos)
@@ -122,7 +122,7 @@ def views(opened: Opened) -> list[PhotoView]:
 
 def flat_brdf(level: float) -> PrincipalBRDF:
     """Some BRDF of the basis."""
-    return PrincipalBRDF(Basis.default(), np.full((3, 5), level))
+    return PrincipalBRDF(default_basis(), np.full((3, 5), level))
 
 
 def pixels_of(view: PhotoView, *criteria: Criterion) -> set[int]:
@@ -177,7 +177,7 @@ def test_the_first_that_speaks_against_a_pixel_decides(views: list[PhotoView]) -
 
 def test_shadows_are_told_apart_by_geometry(opened: Opened, views: list[PhotoView]) -> None:
     """Turned away is what the ball's own shape says; the moon's shadow lies on what faces it."""
-    camera = inputs.camera_of(opened.capture, opened.scan, 0)
+    camera = capture_data.camera_of(opened.capture, opened.scan, 0)
     seen = view_surface(opened.rays, camera)
     light = np.array(next(made.light_directions(PHOTOS)))
     facing = seen.normal @ light
@@ -188,7 +188,7 @@ def test_shadows_are_told_apart_by_geometry(opened: Opened, views: list[PhotoVie
 
 def test_counts_and_materials_are_of_the_surface(opened: Opened, views: list[PhotoView]) -> None:
     for place, view in enumerate(views):
-        seen = view_surface(opened.rays, inputs.camera_of(opened.capture, opened.scan, place))
+        seen = view_surface(opened.rays, capture_data.camera_of(opened.capture, opened.scan, place))
         assert view.surface == len(seen.pixel) and sum(view.shares.values()) == pytest.approx(1)
         assert view.counts[Criterion.NO_SURFACE] == 0
         assert view.criteria.shape == view.material.shape == view.measured.shape[:2]

@@ -10,13 +10,13 @@ pytest.importorskip("bpy")
 pytestmark = [pytest.mark.blender, pytest.mark.slow]
 
 from patina.core.capture import read_capture  # noqa: E402
-from patina.core.job import FitJob  # noqa: E402
-from patina.core.job.diagnose_job import DiagnoseJob  # noqa: E402
-from patina.scene import materials  # noqa: E402
+from patina.core.jobs import FitJob  # noqa: E402
+from patina.core.jobs.diagnose_job import DiagnoseJob  # noqa: E402
+from patina.scene.material import material_nodes  # noqa: E402
 from tools.hunt.make import CAPTURE, make  # noqa: E402
 
-if materials.osl_missing():
-    pytest.skip(f"{materials.osl_missing()}", allow_module_level=True)
+if material_nodes.osl_missing():
+    pytest.skip(f"{material_nodes.osl_missing()}", allow_module_level=True)
 
 CASES = {
     "none": (0.0, 5, "none"),
@@ -38,11 +38,11 @@ def test_what_is_hidden_is_named(cause, tmp_path):
     assert (found.causes or ("none",)) == (name,)
     if not found.accepted:
         return
-    assert found.unseen_after.mean < found.unseen_before.mean
+    assert found.held_out_after.mean < found.held_out_before.mean
     trial = found.accepted[0]
     if cause == "cast_shadow":
-        off = trial.told + truth.numbers["darkness"]
-        assert (np.abs(off) < np.maximum(3 * trial.deviation, 0.03)).all()
+        off = trial.identified + truth.numbers["darkness"]
+        assert (np.abs(off) < np.maximum(3 * trial.standard_errors, 0.03)).all()
     if cause == "vignetting":
         corner = trial.effect.gain(trial.x)[np.argmax(trial.effect.r2)]
         r2 = trial.effect.r2.max()

@@ -21,12 +21,12 @@ ROW = Row("area_light", 0.01, 1, 0.01, ("area_light",), (), 5.0, 1.1, 0.3, (0.2,
 
 def test_a_near_lamp_is_as_far_as_the_diagnosis_counts():
     """From the middle of what the photos show, not from the origin."""
-    setting = replace(lit_ball(0), centre=np.array([0.1, -0.2, 0.3]))
+    context = replace(lit_ball(0), centre=np.array([0.1, -0.2, 0.3]))
     light = 1
-    towards = setting.pixels.light[setting.pixels.photo == 2][0]
+    towards = context.pixels.light[context.pixels.photo == 2][0]
     lamp = 2.5 * towards.astype(float)
-    found = judged._nearness(1 / 2.5, light, setting)
-    assert found == pytest.approx(setting.size / np.linalg.norm(lamp - setting.centre))
+    found = judged._nearness(1 / 2.5, light, context)
+    assert found == pytest.approx(context.size / np.linalg.norm(lamp - context.centre))
 
 
 def test_what_is_there_is_not_made_again(tmp_path, monkeypatch):

@@ -17,7 +17,7 @@ from tools.package import load_patina
 load_patina()
 
 from patina.core.geometry import RayScene, view_surface  # noqa: E402
-from patina.core.job import inputs  # noqa: E402
+from patina.core.inputs import capture_data  # noqa: E402
 from patina.core.maps.write import base_color  # noqa: E402
 from tests.wheel import maps_scene  # noqa: E402
 from tests.wheel import test_maps_truth as truth  # noqa: E402
@@ -40,7 +40,7 @@ def coordinates(mesh, face, point):
 
 def panels(folder, result):
     """(h, 3 w, 3) sRGB: a photo, what was found and what was painted, from its viewpoint."""
-    camera = inputs.camera_of(result.capture, result.scan, SHOWN)
+    camera = capture_data.camera_of(result.capture, result.scan, SHOWN)
     view = view_surface(RayScene.build(result.scan.mesh), camera)
     uv = coordinates(result.scan.mesh, view.face, view.point)
     size = result.texels.size

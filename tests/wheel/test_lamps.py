@@ -15,9 +15,9 @@ import bpy  # noqa: E402
 
 from patina.core.light import DistantLight, Light, MountedLight, NearLight  # noqa: E402
 from patina.core.scan.camera import Camera, Pose  # noqa: E402
-from patina.scene import lights  # noqa: E402
-from patina.scene.cameras import create_camera  # noqa: E402
-from patina.scene.properties import CAPTURE  # noqa: E402
+from patina.scene.photos import lamps  # noqa: E402
+from patina.scene.photos.cameras import create_camera  # noqa: E402
+from patina.scene.property_keys import CAPTURE  # noqa: E402
 from tests.make_capture import look_at  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
 
@@ -48,10 +48,10 @@ def _rendered(light: Light, folder: Path, samples: int = 1) -> np.ndarray:
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(matte.outputs[0], output.inputs["Surface"])
     sphere.data.materials.append(white)
-    lamp = lights.create_lamp(light, ORIGIN, np.zeros(3), 2.0, scene.collection)
+    lamp = lamps.create_lamp(light, ORIGIN, np.zeros(3), 2.0, scene.collection)
     camera = create_camera(_camera(), ORIGIN, 2.0, scene.collection)
     camera["patina_light"], lamp[CAPTURE], camera[CAPTURE] = light.name, "x", "x"
-    lights.shine_only(scene, camera)
+    lamps.shine_only(scene, camera)
     return cycles_sphere.render(folder)
 
 
@@ -120,7 +120,7 @@ def test_a_flash_stands_where_its_camera_had_it(far: float) -> None:
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     scene, origin = bpy.context.scene, np.array([far, -far / 8, 40.0])
     light = MountedLight("flash", np.array([0.31, -0.17, 0.05]), COLOUR, beam=0.6)
-    lamp = lights.create_lamp(light, origin, np.zeros(3), 2.0, scene.collection)
+    lamp = lamps.create_lamp(light, origin, np.zeros(3), 2.0, scene.collection)
     lamp[CAPTURE] = "x"
     rng = np.random.default_rng(1)
     made = []
@@ -131,7 +131,7 @@ def test_a_flash_stands_where_its_camera_had_it(far: float) -> None:
         made.append((camera, create_camera(camera, origin, 3.0, scene.collection)))
         made[-1][1][CAPTURE], made[-1][1]["patina_light"] = "x", "flash"
     for turn, (camera, stood) in enumerate(made * 2):
-        lights.shine_only(scene, stood)
+        lamps.shine_only(scene, stood)
         bpy.context.view_layer.update()
         here = np.array(lamp.matrix_world.translation)
         assert np.abs(here + origin - light.position(camera)).max() < 2e-6 + 2e-9 * far

@@ -13,9 +13,9 @@ import bpy  # noqa: E402
 from patina.core.appearance.lobe_fit import fit_lobe_stack  # noqa: E402
 from patina.core.appearance.lobe_stack import Lobe, LobeStack  # noqa: E402
 from patina.core.appearance.principled_fit import fit_principled  # noqa: E402
-from patina.core.basis import Basis, PrincipalBRDF  # noqa: E402
-from patina.scene.lobe_group import NAME, add_lobe_stack, fill_lobe_stack  # noqa: E402
-from patina.scene.materials import create_material  # noqa: E402
+from patina.core.basis import PrincipalBRDF, default_basis  # noqa: E402
+from patina.scene.material.lobe_group import NAME, add_lobe_stack, fill_lobe_stack  # noqa: E402
+from patina.scene.material.material_nodes import create_material  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
 
 BLACK, BROWN = np.zeros(3), np.array([0.5, 0.25, 0.1])
@@ -75,7 +75,7 @@ def test_the_group_is_made_once(node):
 def test_a_material_has_the_stack_for_eevee_and_the_principled_for_exports():
     evaluate = CASES["glossy"].evaluate
     fit, lobes = fit_principled(evaluate), fit_lobe_stack(evaluate, most=1)
-    brdf = PrincipalBRDF(Basis.default(), np.zeros((3, 5)))
+    brdf = PrincipalBRDF(default_basis(), np.zeros((3, 5)))
     material = create_material("both", brdf, fit, None, lobes)
     outputs = {n.target: n for n in material.node_tree.nodes if n.type == "OUTPUT_MATERIAL"}
     source = {k: n.inputs["Surface"].links[0].from_node.type for k, n in outputs.items()}

@@ -18,7 +18,7 @@ import bpy  # noqa: E402
 from patina.core.capture import read_capture  # noqa: E402
 from patina.core.errors import InputError  # noqa: E402
 from patina.core.geometry import RayScene  # noqa: E402
-from patina.core.job import inputs  # noqa: E402
+from patina.core.inputs import capture_data  # noqa: E402
 from patina.core.maps import MapsJob, MapsSettings, rasterise  # noqa: E402
 from patina.core.maps.write import base_color, roughness, write_maps  # noqa: E402
 from patina.core.result import read_result  # noqa: E402
@@ -218,7 +218,7 @@ def test_the_command_leaves_maps_and_a_scene_that_wears_them(painted):
 
 
 def test_a_mesh_without_coordinates_is_unwrapped(painted):
-    from patina.scene.unwrap import unwrapped
+    from patina.scene.scan.unwrap import unwrapped
 
     text = (painted / "painted.capture.toml").read_text()
     (painted / "bare").mkdir(exist_ok=True)
@@ -230,7 +230,7 @@ def test_a_mesh_without_coordinates_is_unwrapped(painted):
     found = made(painted, "bare.capture.toml", size=512, unwrap=unwrapped)
     assert found.unwrapped and found.texels.overlapped < 0.01 * len(found.texels)
     # the paint at the same surface points, by the nearest texel of the mesh's own coordinates
-    own = inputs.open_scan(read_capture(painted / "painted.capture.toml"))
+    own = capture_data.open_scan(read_capture(painted / "painted.capture.toml"))
     texels = rasterise(own.mesh, 1024)
     from scipy.spatial import cKDTree
 

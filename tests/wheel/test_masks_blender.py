@@ -85,7 +85,7 @@ def test_proposed_materials_are_slots_and_the_fit_takes_them(scene) -> None:
     assert bpy.ops.patina.fit() == {"FINISHED"}
     assert mesh.mode == "OBJECT"
     assert np.array_equal(slots(mesh), true)
-    from patina.scene.properties import capture_path, stored_result
+    from patina.scene.session.scene_properties import capture_path, stored_result
 
     said = stored_result(capture_path(scene))
     assert [m["name"] for m in said["materials"]] == ["red_gold", "material_2"]
@@ -101,7 +101,7 @@ def test_proposed_materials_are_slots_and_the_fit_takes_them(scene) -> None:
 
 def test_without_consent_slots_are_not_fitted(scene) -> None:
     from patina.core.capture import read_capture
-    from patina.scene.face_slots import with_painted_slots
+    from patina.scene.scan.face_slots import with_painted_slots
 
     capture = read_capture(Path(scene.patina.capture))
     assert with_painted_slots(capture, scene) == (capture, None)
@@ -130,7 +130,7 @@ def test_a_mesh_that_was_cut_is_refused(scene) -> None:
 def test_painted_shadow_masks_reach_the_fit(scene) -> None:
     from patina.core.capture import read_capture
     from patina.core.photo import read_mask
-    from patina.scene.mask_images import shadow_images, with_mask_images
+    from patina.scene.paint.mask_images import shadow_images, with_mask_images
 
     path = scene.patina.capture
     assert bpy.ops.patina.shadow_masks() == {"FINISHED"}

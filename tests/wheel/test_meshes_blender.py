@@ -14,7 +14,7 @@ pytestmark = pytest.mark.blender
 import bpy  # noqa: E402
 
 from patina.core.scan.mesh import Mesh, read_mesh  # noqa: E402
-from patina.scene.meshes import create_mesh_object  # noqa: E402
+from patina.scene.scan.meshes import create_mesh_object  # noqa: E402
 from tests import make_meshes as made  # noqa: E402
 from tests.make_capture import sphere_mesh  # noqa: E402
 

@@ -17,12 +17,12 @@ from mathutils import Matrix, Vector  # noqa: E402
 
 from patina.core.capture import Capture, read_capture  # noqa: E402
 from patina.core.errors import PatinaError  # noqa: E402
-from patina.core.job import inputs  # noqa: E402
-from patina.core.job.lights import Lights  # noqa: E402
+from patina.core.inputs import capture_data  # noqa: E402
+from patina.core.inputs.lights import Lights  # noqa: E402
 from patina.core.light import DistantLight, MountedLight, NearLight  # noqa: E402
 from patina.core.scan import Scan  # noqa: E402
-from patina.scene import lights, moved_lamps, photo_list  # noqa: E402
-from patina.scene.scan_collection import create_scan_collection  # noqa: E402
+from patina.scene.photos import dragged_lamps, lamps, photo_list  # noqa: E402
+from patina.scene.scan.scan_collection import create_scan_collection  # noqa: E402
 from tests import make_capture as made  # noqa: E402
 
 FAR = [np.zeros(3), np.array([500_000.0, 4_000_000.0, 120.0])]
@@ -62,7 +62,7 @@ class Built:
     scan: Scan
 
     def now(self) -> tuple[dict, list[str]]:
-        capture, names = moved_lamps.with_dragged_lamps(self.capture, self.scene)
+        capture, names = dragged_lamps.with_dragged_lamps(self.capture, self.scene)
         return {light.name: light for light in capture.lights}, names
 
 
@@ -80,7 +80,7 @@ def _build(folder: Path, far: np.ndarray, known: bool = True) -> Built:
     if not known:  # a file may not mix near and distant lights so, for want of a common scale
         bare = (replace(light, strength=None, white=None) for light in capture.lights)
         capture = replace(capture, lights=tuple(bare))
-    scan = inputs.open_scan(capture)
+    scan = capture_data.open_scan(capture)
     moved = [
         replace(c, pose=replace(c.pose, translation=c.pose.translation - c.pose.rotation @ far))
         for c in scan.cameras
@@ -121,7 +121,7 @@ def listed_photos() -> Iterator[None]:
 
 def _step_through(built: Built) -> None:
     for camera in (*built.cameras, *built.cameras[::-1]):
-        lights.shine_only(built.scene, camera)
+        lamps.shine_only(built.scene, camera)
         bpy.context.view_layer.update()
 
 
@@ -131,7 +131,7 @@ def test_nobody_touched_them(built: Built, tmp_path: Path) -> None:
     _step_through(built)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "x.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "x.blend"))
-    entries, names = moved_lamps.with_dragged_lamps(built.capture, bpy.context.scene)
+    entries, names = dragged_lamps.with_dragged_lamps(built.capture, bpy.context.scene)
     assert names == []
     assert all(a is b for a, b in zip(entries.lights, built.capture.lights, strict=True))
 
@@ -142,9 +142,9 @@ def test_a_lamp_is_where_the_light_was(built: Built) -> None:
     assert np.allclose(np.array(built.lamps["lamp"].matrix_world.translation) + origin,
                        built.capture.lights[2].position, atol=1e-6, rtol=0)  # fmt: skip
     flash = MountedLight("flash", OFFSET)
-    lights.shine_only(built.scene, built.cameras[3])
+    lamps.shine_only(built.scene, built.cameras[3])
     bpy.context.view_layer.update()
-    camera = inputs.camera_of(built.capture, built.scan, 3)
+    camera = capture_data.camera_of(built.capture, built.scan, 3)
     here = np.array(built.lamps["flash"].matrix_world.translation) + origin
     assert np.allclose(here, flash.position(camera), atol=2e-6, rtol=0)
 
@@ -182,7 +182,7 @@ def test_what_is_dragged_is_taken(built: Built, update: bool) -> None:
 
 
 def test_a_flash_dragged_on_one_camera_goes_with_all(built: Built) -> None:
-    lights.shine_only(built.scene, built.cameras[3])
+    lamps.shine_only(built.scene, built.cameras[3])
     built.lamps["flash"].location = (0.1, 0.2, -0.3)
     _step_through(built)
     assert np.allclose(built.now()[0]["flash"].mounted, (0.1, -0.2, 0.3), atol=1e-6)
@@ -248,7 +248,7 @@ def test_odd_things_do_not_crash(built: Built) -> None:
     lamps["sun"].data.type = "AREA"
     lamps["ball"].scale = (0, 0, 0)
     assert built.now()[1] == ["lamp"]
-    lights.shine_only(scene, built.cameras[3])
+    lamps.shine_only(scene, built.cameras[3])
     bpy.data.objects.remove(built.cameras[3])
     assert built.now()[1] == ["lamp"]  # the flash lost its camera
     empty = bpy.data.objects.new("rig", None)
@@ -273,7 +273,7 @@ def test_what_was_saved_counts_as_made(built: Built) -> None:
     lamps["flash"].location = (0.1, 0.2, -0.3)
     lamps["sun"].rotation_quaternion = (0.9, 0.1, 0.2, 0.3)
     assert len(built.now()[1]) == 3
-    moved_lamps.accept(built.capture, built.scene)
+    dragged_lamps.accept(built.capture, built.scene)
     assert built.now()[1] == []
     _step_through(built)
     assert built.now()[1] == []

@@ -15,16 +15,22 @@ import bpy  # noqa: E402
 from patina.core.angles import half_difference  # noqa: E402
 from patina.core.appearance.principled_fit import fit_principled  # noqa: E402
 from patina.core.appearance.traits import MovableAlbedo, excess  # noqa: E402
-from patina.core.basis import Basis, PrincipalBRDF  # noqa: E402
-from patina.scene import follow_traits, materials, moved, osl_files, traits  # noqa: E402
-from patina.scene.apply import MEASURED  # noqa: E402
+from patina.core.basis import PrincipalBRDF, default_basis  # noqa: E402
+from patina.scene.material import (  # noqa: E402
+    material_nodes,
+    osl_files,
+    trait_offsets,
+    trait_properties,
+    trait_update,
+)
+from patina.scene.scan.apply_result import MEASURED_NAME  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
 
 LIGHT = np.array([0.6, 0.2, 0.77]) / np.linalg.norm([0.6, 0.2, 0.77])
 VIEW = np.array([0.0, 0.0, 1.0])
 
-if materials.osl_missing():
-    pytest.skip(f"{materials.osl_missing()}", allow_module_level=True)
+if material_nodes.osl_missing():
+    pytest.skip(f"{material_nodes.osl_missing()}", allow_module_level=True)
 
 
 @pytest.fixture(autouse=True)
@@ -34,20 +40,20 @@ def sliders(monkeypatch) -> Iterator[None]:
     def quick(evaluate):
         return fit_principled(evaluate, coat=False, nodes=(10, 4, 3))
 
-    monkeypatch.setattr(follow_traits, "fit_principled", quick)
-    traits.register()
-    follow_traits.register()
+    monkeypatch.setattr(trait_update, "fit_principled", quick)
+    trait_properties.register()
+    trait_update.register()
     yield
-    follow_traits.unregister()
-    traits.unregister()
+    trait_update.unregister()
+    trait_properties.unregister()
 
 
 def _material(sphere: bpy.types.Object) -> bpy.types.Material:
     coefficients = np.random.default_rng(1).normal(0, 0.03, (3, 30))
-    brdf = PrincipalBRDF(Basis.default(), coefficients)
+    brdf = PrincipalBRDF(default_basis(), coefficients)
     fit = fit_principled(brdf.evaluate, coat=False, nodes=(10, 4, 3))
-    made = materials.create_material("moved", brdf, fit, osl_files.ensure_files(brdf))
-    made[MEASURED] = "moved"
+    made = material_nodes.create_material("moved", brdf, fit, osl_files.ensure_files(brdf))
+    made[MEASURED_NAME] = "moved"
     sphere.data.materials.append(made)
     return made
 
@@ -65,14 +71,14 @@ def test_cycles_shows_the_moved_brdf_before_and_after_the_rest_has_followed(tmp_
     normal, inside = cycles_sphere.normals()
     kept = inside & (normal @ LIGHT > 0.1) & (normal @ VIEW > 0.1)
     light, view = np.broadcast_to(LIGHT, normal.shape), np.broadcast_to(VIEW, normal.shape)
-    rho = moved.moved_brdf(material).evaluate(half_difference(normal, light, view))
+    rho = trait_offsets.moved_brdf(material).evaluate(half_difference(normal, light, view))
     expected = (2.0 * rho * (normal @ LIGHT)[..., None])[kept]
     scale = np.sqrt(np.mean(expected**2))
     # the render would wait for the rest
-    bpy.app.handlers.render_pre.remove(follow_traits._in_background)
+    bpy.app.handlers.render_pre.remove(trait_update._in_background)
     before = cycles_sphere.render(tmp_path)[kept]
     assert inputs["sampling"].default_value == table
-    bpy.app.handlers.render_pre.append(follow_traits._in_background)
+    bpy.app.handlers.render_pre.append(trait_update._in_background)
     after = cycles_sphere.render(tmp_path)[kept]
     assert inputs["sampling"].default_value != table, "a render in the background waits for it"
     for image in (before, after):
@@ -84,9 +90,11 @@ def test_a_material_moved_beyond_what_can_be_is_held_to_the_light_it_gets(tmp_pa
     cycles_sphere.sky(1.0)
     material = _material(sphere)
     material.patina_traits.every.trait_2 = -4.0
-    albedo = MovableAlbedo.of(moved.measured_brdf(material)).at(moved.shifts(material))
+    albedo = MovableAlbedo.of(trait_offsets.measured_brdf(material)).at(
+        trait_offsets.shifts(material)
+    )
     assert excess(albedo)[0] > 1.5
-    follow_traits.settle()
+    trait_update.settle()
     image = cycles_sphere.render(tmp_path)
     normal, inside = cycles_sphere.normals()
     kept = inside & (normal @ VIEW > 0.4)

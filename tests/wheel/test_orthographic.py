@@ -15,7 +15,7 @@ from bpy_extras.object_utils import world_to_camera_view  # noqa: E402
 from mathutils import Vector  # noqa: E402
 
 from patina.core.scan.camera import Camera, Pose  # noqa: E402
-from patina.scene import cameras  # noqa: E402
+from patina.scene.photos import cameras  # noqa: E402
 from tests.make_capture import look_at, write_exr  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
 

@@ -15,7 +15,8 @@ from patina.core.appearance.principled import Principled  # noqa: E402
 from patina.core.geometry import RayScene  # noqa: E402
 from patina.core.scan import Mesh  # noqa: E402
 from patina.core.scan.mesh import read_mesh  # noqa: E402
-from patina.scene import materials, relight  # noqa: E402
+from patina.scene.export import relight  # noqa: E402
+from patina.scene.material import material_nodes  # noqa: E402
 from tests.projected import projected  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
 from tests.wheel.world_light import VIEW, directions, lambert, reflected, wear, world  # noqa: E402
@@ -27,8 +28,8 @@ BALL = (np.array([0.9, 0.9, 0.9]), 0.45)  # black: centre and radius
 GLOSSY = Principled(base_color=np.array([0.4, 0.1, 0.05]), roughness=0.3)
 WORLDS = relight.shipped_worlds()
 
-if materials.osl_missing():
-    pytest.skip(f"{materials.osl_missing()}", allow_module_level=True)
+if material_nodes.osl_missing():
+    pytest.skip(f"{material_nodes.osl_missing()}", allow_module_level=True)
 
 
 @pytest.fixture

@@ -15,9 +15,15 @@ import bpy  # noqa: E402
 from patina.core.angles import Angles, half_difference  # noqa: E402
 from patina.core.appearance.principled import Principled  # noqa: E402
 from patina.core.appearance.principled_fit import fit_principled  # noqa: E402
-from patina.core.basis import Basis, PrincipalBRDF  # noqa: E402
+from patina.core.basis import PrincipalBRDF, default_basis  # noqa: E402
 from patina.core.brdf import nbrdf  # noqa: E402
-from patina.scene import fallback, lamps, materials, osl_files, worlds  # noqa: E402
+from patina.scene.material import (  # noqa: E402
+    fallback,
+    lamp_inputs,
+    material_nodes,
+    osl_files,
+    world_inputs,
+)
 from tests.projected import projected  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
 
@@ -28,8 +34,8 @@ MATERIALS = [("analytic", 5), ("dark-red-paint", 5), ("alum-bronze", 10), ("pink
 MORE = [("chrome", 100), ("steel", 100), ("white-fabric", 100), ("fruitwood-241", 100),
         ("green-latex", 100), ("blue-acrylic", 100), ("black-phenolic", 100)]  # fmt: skip
 
-if materials.osl_missing():
-    pytest.skip(f"{materials.osl_missing()}", allow_module_level=True)
+if material_nodes.osl_missing():
+    pytest.skip(f"{material_nodes.osl_missing()}", allow_module_level=True)
 
 
 def _brdf(name: str, count: int, shared: Path | None) -> PrincipalBRDF:
@@ -54,8 +60,8 @@ def brdf(request) -> PrincipalBRDF:
 def _material(brdf: PrincipalBRDF, sphere: bpy.types.Object) -> bpy.types.Material:
     fit = fit_principled(brdf.evaluate)
     files = osl_files.ensure_files(brdf)
-    material = materials.create_material("measured", brdf, fit, files)
-    assert materials.REASON_PROPERTY not in material
+    material = material_nodes.create_material("measured", brdf, fit, files)
+    assert material_nodes.NO_OSL_REASON not in material
     sphere.data.materials.clear()
     sphere.data.materials.append(material)
     return material
@@ -223,12 +229,12 @@ def test_the_files_come_back_when_the_blend_moves(tmp_path):
 
 def test_the_material_keeps_all_coefficients():
     sphere = cycles_sphere.new_scene(osl=True)
-    basis = Basis.default()
+    basis = default_basis()
     c = np.random.default_rng(0).normal(0, 0.03, (3, 100))
     material = _material(PrincipalBRDF(basis, c), sphere)
-    kept = np.array(material[materials.COEFFICIENTS]).reshape(3, -1)
+    kept = np.array(material[material_nodes.COEFFICIENTS]).reshape(3, -1)
     np.testing.assert_array_equal(kept, c)
-    assert material[materials.BASIS] == basis.version
+    assert material[material_nodes.BASIS_VERSION] == basis.version
     (node,) = osl_files.script_nodes(material)
     shown = [s for s in node.inputs if s.name.startswith("Coefficient")]
     np.testing.assert_allclose([tuple(s.default_value) for s in shown], c[:, :8].T, rtol=1e-6)
@@ -238,7 +244,7 @@ def test_a_moved_coefficient_shows_in_the_render(tmp_path):
     sphere = cycles_sphere.new_scene(size=80, osl=True)
     cycles_sphere.sun(LIGHT, 2.0)
     c = np.random.default_rng(1).normal(0, 0.03, (3, 30))
-    material = _material(PrincipalBRDF(Basis.default(), c), sphere)
+    material = _material(PrincipalBRDF(default_basis(), c), sphere)
     (node,) = osl_files.script_nodes(material)
     moved = c.copy()
     moved[:, 1] += (0.03, 0.0, -0.02)
@@ -246,7 +252,7 @@ def test_a_moved_coefficient_shows_in_the_render(tmp_path):
     image = cycles_sphere.render(tmp_path)
     normal, inside = cycles_sphere.normals()
     kept = inside & (normal @ LIGHT > 0.1) & (normal @ VIEW > 0.1)
-    expected = 2.0 * _expected(PrincipalBRDF(Basis.default(), moved), LIGHT)[kept]
+    expected = 2.0 * _expected(PrincipalBRDF(default_basis(), moved), LIGHT)[kept]
     assert _relative_rms(image[kept], expected) < 0.003
 
 
@@ -255,7 +261,7 @@ def test_a_replaced_material_leaves_no_picture_behind():
     names = []
     for seed in range(2):
         c = np.random.default_rng(seed).normal(0, 0.03, (3, 10))
-        material = _material(PrincipalBRDF(Basis.default(), c), sphere)
+        material = _material(PrincipalBRDF(default_basis(), c), sphere)
         names.append(material[osl_files.PROPERTIES["remainder"]])
         if seed == 0:
             sphere.data.materials.clear()
@@ -289,7 +295,7 @@ def test_where_osl_is_off_cycles_gets_the_portable_material(tmp_path):
 def test_handlers_come_and_go():
     groups = ("load_post", "save_post", "depsgraph_update_post", "render_pre")
     before = {g: list(getattr(bpy.app.handlers, g)) for g in groups}
-    modules = (osl_files, lamps, worlds, fallback)
+    modules = (osl_files, lamp_inputs, world_inputs, fallback)
     for module in modules:
         module.register()
     added = {g: len(getattr(bpy.app.handlers, g)) - len(before[g]) for g in groups}
@@ -302,10 +308,10 @@ def test_handlers_come_and_go():
 
 def test_without_osl_the_portable_material_is_made_and_says_so(monkeypatch):
     sphere = cycles_sphere.new_scene(osl=True)
-    monkeypatch.setattr(materials, "osl_missing", lambda: "no OSL here")
+    monkeypatch.setattr(material_nodes, "osl_missing", lambda: "no OSL here")
     brdf = _brdf("analytic", 5, None)
     files = osl_files.ensure_files(brdf)
-    material = materials.create_material("plain", brdf, fit_principled(brdf.evaluate), files)
+    material = material_nodes.create_material("plain", brdf, fit_principled(brdf.evaluate), files)
     sphere.data.materials.append(material)
-    assert material[materials.REASON_PROPERTY] == "no OSL here"
+    assert material[material_nodes.NO_OSL_REASON] == "no OSL here"
     assert [n.target for n in material.node_tree.nodes if n.type == "OUTPUT_MATERIAL"] == ["ALL"]

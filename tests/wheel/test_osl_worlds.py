@@ -16,7 +16,8 @@ from patina.core.appearance.energy import directional_albedo  # noqa: E402
 from patina.core.appearance.principled import Principled  # noqa: E402
 from patina.core.basis import PrincipalBRDF  # noqa: E402
 from patina.core.maps.split import split_body  # noqa: E402
-from patina.scene import materials, relight  # noqa: E402
+from patina.scene.export import relight  # noqa: E402
+from patina.scene.material import material_nodes  # noqa: E402
 from tests.projected import projected  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
 from tests.wheel.world_light import VIEW, lambert, reflected, wear, world  # noqa: E402
@@ -24,8 +25,8 @@ from tests.wheel.world_light import VIEW, lambert, reflected, wear, world  # noq
 WORLDS = relight.shipped_worlds()
 PIXELS = 24  # that are compared, of every world
 
-if materials.osl_missing():
-    pytest.skip(f"{materials.osl_missing()}", allow_module_level=True)
+if material_nodes.osl_missing():
+    pytest.skip(f"{material_nodes.osl_missing()}", allow_module_level=True)
 
 
 def brdf_of(evaluate) -> PrincipalBRDF:

@@ -27,8 +27,8 @@ def _paint(image: bpy.types.Image, where: np.ndarray, colour: tuple[int, int, in
 
 
 def _canvas(scene, place: int) -> bpy.types.Image:  # noqa: F811
-    from patina.scene.canvas import canvases
-    from patina.scene.properties import capture_path
+    from patina.scene.paint.canvas import canvases
+    from patina.scene.session.scene_properties import capture_path
 
     scene.patina_photos.active = place
     assert bpy.ops.patina.paint_photo() == {"FINISHED"}
@@ -36,7 +36,7 @@ def _canvas(scene, place: int) -> bpy.types.Image:  # noqa: F811
 
 
 def _colour(scene, name: str) -> tuple[int, int, int]:  # noqa: F811
-    from patina.scene.paints import paints
+    from patina.scene.paint.paint_kinds import paints
 
     return next(paint.colour for paint in paints(scene) if paint.name == name)
 
@@ -50,10 +50,10 @@ def _two_materials(scene) -> None:  # noqa: F811
 def test_strokes_on_photos_reach_the_mesh_and_come_back(scene) -> None:  # noqa: F811
     """The second half painted in every photo, where its faces are seen: the mesh wears it, and
     every canvas shows it."""
-    from patina.scene.canvas import canvases
-    from patina.scene.mask_images import read_pixels
-    from patina.scene.properties import capture_path
-    from patina.scene.scan_rays import scan_rays
+    from patina.scene.paint.canvas import canvases
+    from patina.scene.paint.mask_images import read_pixels
+    from patina.scene.scan.scan_rays import scan_rays
+    from patina.scene.session.scene_properties import capture_path
 
     _two_materials(scene)
     mesh, capture = scene.patina.mesh, capture_path(scene)
@@ -83,8 +83,8 @@ def test_strokes_on_photos_reach_the_mesh_and_come_back(scene) -> None:  # noqa:
 def test_what_is_left_out_is_a_mask_that_the_fit_heeds(scene, tmp_path: Path) -> None:  # noqa: F811
     from patina.core.capture import read_capture
     from patina.core.photo import read_mask
-    from patina.scene.mask_images import mask_images, with_mask_images
-    from patina.scene.properties import capture_path
+    from patina.scene.paint.mask_images import mask_images, with_mask_images
+    from patina.scene.session.scene_properties import capture_path
 
     capture = capture_path(scene)
     image = _canvas(scene, 1)
@@ -119,8 +119,8 @@ def test_what_is_left_out_is_a_mask_that_the_fit_heeds(scene, tmp_path: Path) ->
 
 
 def test_a_canvas_that_lost_its_pixels_erases_nothing(scene) -> None:  # noqa: F811
-    from patina.scene.mask_images import mask_images, read_mask_image
-    from patina.scene.properties import capture_path
+    from patina.scene.paint.mask_images import mask_images, read_mask_image
+    from patina.scene.session.scene_properties import capture_path
 
     image = _canvas(scene, 0)
     where = np.zeros((made.HEIGHT, made.WIDTH), bool)
@@ -140,7 +140,7 @@ def test_a_canvas_that_lost_its_pixels_erases_nothing(scene) -> None:  # noqa: F
 
 def test_a_fit_leaves_out_what_is_ignored(scene) -> None:  # noqa: F811
     """All of one photo painted out: none of its pixels is used, though nobody pressed Take."""
-    from patina.scene.properties import capture_path, stored_result
+    from patina.scene.session.scene_properties import capture_path, stored_result
 
     assert bpy.ops.patina.fit() == {"FINISHED"}
     before = stored_result(capture_path(scene))["materials"][0]["samples"]["used"]
@@ -174,9 +174,9 @@ def test_vertex_paint_reaches_the_slots(scene) -> None:  # noqa: F811
 
 def test_a_large_photo_is_painted_on_in_a_smaller_size(scene, monkeypatch) -> None:  # noqa: F811
     """Three of its pixels a pixel of the canvas, sides that are no multiple of it."""
-    from patina.scene import canvas
-    from patina.scene.mask_images import mask_images, read_mask_image
-    from patina.scene.properties import capture_path
+    from patina.scene.paint import canvas
+    from patina.scene.paint.mask_images import mask_images, read_mask_image
+    from patina.scene.session.scene_properties import capture_path
 
     monkeypatch.setattr(canvas, "LARGEST", 47)
     _two_materials(scene)
@@ -223,8 +223,8 @@ def test_masks_are_exported(scene, tmp_path: Path) -> None:  # noqa: F811
 
 
 def test_nothing_is_lost_by_importing_anew(scene) -> None:  # noqa: F811
-    from patina.scene.mask_images import mask_images
-    from patina.scene.properties import capture_path
+    from patina.scene.paint.mask_images import mask_images
+    from patina.scene.session.scene_properties import capture_path
 
     assert bpy.ops.patina.shadow_masks() == {"FINISHED"}
     image = mask_images(capture_path(scene))[0, "shadow"]

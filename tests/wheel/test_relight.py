@@ -16,7 +16,7 @@ import OpenImageIO as oiio  # noqa: E402
 from patina.commands import render as command  # noqa: E402
 from patina.core.errors import InputError  # noqa: E402
 from patina.core.photo import write_exr  # noqa: E402
-from patina.scene import relight  # noqa: E402
+from patina.scene.export import relight  # noqa: E402
 from tests.make_result import two_materials  # noqa: E402
 
 

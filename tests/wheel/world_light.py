@@ -12,7 +12,8 @@ import OpenImageIO as oiio
 from patina.core.angles import Angles, half_difference
 from patina.core.appearance.principled_fit import fit_principled
 from patina.core.basis import PrincipalBRDF
-from patina.scene import materials, osl_files, relight
+from patina.scene.export import relight
+from patina.scene.material import material_nodes, osl_files
 
 VIEW = np.array([0.0, 0.0, 1.0])  # the camera of cycles_sphere
 
@@ -26,8 +27,8 @@ def wear(brdf: PrincipalBRDF, *things: bpy.types.Object) -> bpy.types.Node:
     """Give objects the measured material; returns its script node."""
     files = osl_files.ensure_files(brdf)
     fit = fit_principled(brdf.evaluate, coat=False, nodes=(12, 6, 4))
-    material = materials.create_material("measured", brdf, fit, files)
-    assert materials.REASON_PROPERTY not in material
+    material = material_nodes.create_material("measured", brdf, fit, files)
+    assert material_nodes.NO_OSL_REASON not in material
     for thing in things:
         thing.data.materials.clear()
         thing.data.materials.append(material)

@@ -6,9 +6,9 @@ from functools import lru_cache
 from pathlib import Path
 
 from patina.core.capture import Capture, read_capture
-from patina.core.job import inputs
-from patina.core.job.lights import find_lights
-from patina.core.job.photos import LitPhotos
+from patina.core.inputs import capture_data
+from patina.core.inputs.lights import find_lights
+from patina.core.inputs.photos import LitPhotos
 from patina.core.light import DistantLight
 from patina.core.scan import Camera, Mesh, Scan
 from patina.core.scan.mesh import read_mesh
@@ -39,14 +39,14 @@ def true_bunny() -> Mesh:
 def opened(tool: str) -> tuple[Capture, Scan, tuple[Shot, ...]]:
     """The capture as the program reads it, its scan and its eight shots."""
     capture = read_capture(folder(tool) / "scan.capture.toml")
-    scan = inputs.open_scan(capture)
+    scan = capture_data.open_scan(capture)
     lights = find_lights(capture, scan, LitPhotos.open(capture))
     shots = []
     for place in range(len(capture.photos)):
         light = lights.of(capture, place)
         if not isinstance(light, DistantLight):
             raise TypeError("the bunnies' lights are distant")
-        shots.append(Shot(inputs.camera_of(capture, scan, place), light))
+        shots.append(Shot(capture_data.camera_of(capture, scan, place), light))
     return capture, scan, tuple(shots)
 
 

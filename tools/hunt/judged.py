@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from patina.core.basis import Basis, PrincipalBRDF, mapping
+from patina.core.basis import PrincipalBRDF, default_basis, mapping
 from patina.core.capture import read_capture
-from patina.core.diagnose.effect import Setting
-from patina.core.diagnose.found import Trial
+from patina.core.diagnose.forward.diagnosis_context import DiagnosisContext
+from patina.core.diagnose.selection.diagnosis import Trial
 from patina.core.fit.spread import directions
-from patina.core.job import CaptureResult, FitJob
-from patina.core.job.check_job import CheckJob
+from patina.core.jobs import CaptureResult, FitJob
+from patina.core.jobs.check_job import CheckJob
 
 from .make import CAPTURE, OUTSIDERS, Truth, make, make_plain
 from .state import state
@@ -91,7 +91,7 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
         job.drain()
         done = time.perf_counter()
         found, before, after = job.checked.found, job.checked.result, job.result
-        assert found is not None and job.checked.setting is not None
+        assert found is not None and job.checked.context is not None
         assert before is not None and after is not None
         first = found.named[0] if found.named else None
         of = {trial.effect.cause: trial for trial in found.named}
@@ -99,7 +99,7 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
             each
             for name in cause.split("+")
             if name in of
-            for each in _off(of[name], truth.numbers, job.checked.setting)
+            for each in _off(of[name], truth.numbers, job.checked.context)
         ]
     error = error_before = None
     if not set(cause.split("+")) & set(OWN_BRDF):
@@ -135,7 +135,7 @@ def _plain_error(seed: int, threads: int | None) -> float:
 
 def _brdf_error(result: CaptureResult, truth: Truth) -> float:
     """RMS of ln(ρ·cosMap + ε) over all directions."""
-    basis = Basis.default()
+    basis = default_basis()
     assert basis.training is not None
     rows = basis.training[3 * truth.material : 3 * truth.material + 3]
     angles = directions(basis.grid)
@@ -147,34 +147,34 @@ def _brdf_error(result: CaptureResult, truth: Truth) -> float:
     return float(np.sqrt(np.mean((ours - true) ** 2)))
 
 
-def _nearness(inverse: float, light: int, setting: Setting) -> float:
+def _nearness(inverse: float, light: int, context: DiagnosisContext) -> float:
     """The object's size over the distance of its middle from a lamp that stands where the capture
     says the light comes from, at a distance 1 / inverse from the origin."""
-    towards = setting.pixels.light[setting.light[setting.pixels.photo] == light][0]
-    return float(setting.size / np.linalg.norm(towards / inverse - setting.centre))
+    towards = context.pixels.light[context.light[context.pixels.photo] == light][0]
+    return float(context.size / np.linalg.norm(towards / inverse - context.centre))
 
 
-def _off(trial: Trial, truth: Mapping[str, float], setting: Setting) -> list[float]:
+def _off(trial: Trial, truth: Mapping[str, float], context: DiagnosisContext) -> list[float]:
     """What numbers that the truth says are off by, in standard errors."""
-    x, deviation = trial.told, trial.deviation
+    x, deviation = trial.identified, trial.standard_errors
     cause = trial.effect.cause
     if cause == "light_intensity":
         wanted = np.array([truth[f"photo {k + 1}"] for k in range(len(x))])
         wanted -= wanted.mean()
     elif cause == "near_light":
         x, deviation = x[::4], deviation[::4]
-        wanted = np.array([_nearness(truth["1 / distance"], k, setting) for k in range(len(x))])
+        wanted = np.array([_nearness(truth["1 / distance"], k, context) for k in range(len(x))])
     elif cause == "light_direction":
         moved, spread = x.reshape(-1, 2), deviation.reshape(-1, 2)
         x = np.hypot(*moved.T)
         deviation = np.hypot(*(moved * spread).T) / np.maximum(x, 1e-9)
         wanted = np.full(len(x), np.tan(truth["angle"]))
     elif cause == "camera_pose":
-        shifts = [k for k, name in enumerate(trial.effect.numbers.names) if name in truth]
+        shifts = [k for k, name in enumerate(trial.effect.parameters.names) if name in truth]
         x, deviation = x[shifts], deviation[shifts]
-        wanted = np.array([truth[trial.effect.numbers.names[k]] for k in shifts])
+        wanted = np.array([truth[trial.effect.parameters.names[k]] for k in shifts])
     elif cause == "ambient_light":
-        wanted = np.full(3, truth["radiance"] * np.pi / setting.level)
+        wanted = np.full(3, truth["radiance"] * np.pi / context.level)
     elif cause == "cast_shadow":
         wanted = np.full(len(x), -truth["darkness"])
     elif cause == "area_light":

@@ -17,7 +17,7 @@ import numpy as np
 import OpenImageIO as oiio
 import trimesh
 
-from patina.core.basis import Basis
+from patina.core.basis import default_basis
 
 from . import camera_faults, camera_makers, light_makers, surface_makers
 from .drawn import LIGHTS, SIZE, any_brdf, any_shots
@@ -106,7 +106,7 @@ def _scene(seed: int) -> tuple[Scene, int]:
     studio = HuntStudio()
     surface = lumpy(seed)
     studio.shape(surface)
-    material, brdf = any_brdf(Basis.default(), rng)
+    material, brdf = any_brdf(default_basis(), rng)
     studio.dress(studio.measured(brdf))
     return Scene(studio, surface, brdf, any_shots(rng), [], 0.0, rng, _kept(seed)), material
 

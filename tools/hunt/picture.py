@@ -38,8 +38,8 @@ def make() -> None:
 
 def _row(folder: Path, cause: str, seed: int) -> Array:
     from patina.core.capture import read_capture
-    from patina.core.job import FitJob, finished
-    from patina.core.job.diagnose_job import DiagnoseJob
+    from patina.core.jobs import FitJob, finished
+    from patina.core.jobs.diagnose_job import DiagnoseJob
     from patina.core.report.residual_picture import photo_most_changed, residual_picture
     from patina.core.views import display
 
@@ -51,7 +51,7 @@ def _row(folder: Path, cause: str, seed: int) -> Array:
     job.drain()
     found, result = finished(job.found), finished(job.result)
     say(f"{cause}: {', '.join(found.causes) or 'none'}")
-    trial, pixels = found.accepted[0], finished(job.setting).pixels
+    trial, pixels = found.accepted[0], finished(job.context).pixels
     changed = trial.changed() / found.before.deviation
     photo = photo_most_changed(pixels, changed)
     assert photo is not None

@@ -8,8 +8,8 @@ from mathutils import Vector
 
 from patina.core.appearance.principled_fit import fit_principled
 from patina.core.basis import PrincipalBRDF
-from patina.scene import materials, osl_files
-from patina.scene.lamps import update_lamps
+from patina.scene.material import material_nodes, osl_files
+from patina.scene.material.lamp_inputs import update_lamps
 
 from ..demo_render import Array, Camera, Studio
 from ..demo_shape import Surface
@@ -36,7 +36,7 @@ class HuntStudio(Studio):
         """The BRDF itself, as Patina's OSL material."""
         files = osl_files.ensure_files(brdf)
         fit = fit_principled(brdf.evaluate, coat=False, nodes=(12, 6, 4))
-        return materials.create_material("measured", brdf, fit, files)
+        return material_nodes.create_material("measured", brdf, fit, files)
 
     def near(self, position: Array, irradiance: float, centre: Array) -> None:
         """A lamp without size at a place, as bright at ``centre`` as a sun of this irradiance."""

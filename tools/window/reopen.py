@@ -34,12 +34,12 @@ def main() -> None:
     told = json.loads((folder / "session.json").read_text("utf-8"))
     extension()
     bpy.ops.wm.open_mainfile(filepath=str(folder / "session.blend"))
-    from patina.scene.apply import measured_of
-    from patina.scene.charted import subject_of
-    from patina.scene.mask_images import mask_images, read_mask_image
-    from patina.scene.paints import paints, worn_slots
-    from patina.scene.properties import DIAGNOSIS, capture_path, stored_result
-    from patina.scene.view_image import view_image
+    from patina.scene.material.material_evidence import subject_of
+    from patina.scene.material.measured_materials import measured_of
+    from patina.scene.paint.mask_images import mask_images, read_mask_image
+    from patina.scene.paint.paint_kinds import paints, worn_slots
+    from patina.scene.session.scene_properties import DIAGNOSIS, capture_path, stored_result
+    from patina.scene.views.view_image import view_image
 
     scene = bpy.context.scene
     capture = capture_path(scene)

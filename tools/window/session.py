@@ -110,7 +110,7 @@ def open_panel(stage: str) -> Iterator[float]:
 
 def until_done() -> Iterator[float]:
     """While a job runs."""
-    running = part("scene.running").running
+    running = part("scene.session.running_job").running
     yield DRAWN
     while running(bpy.context.scene) is not None:
         yield 0.5
@@ -166,7 +166,10 @@ def materials_and_masks() -> Iterator[float]:
     press("patina.propose_materials", "INVOKE_DEFAULT")
     yield from until_done()
     photograph("4_proposed")
-    slots, paints = part("scene.paints").worn_slots, part("scene.paints").paints
+    slots, paints = (
+        part("scene.paint.paint_kinds").worn_slots,
+        part("scene.paint.paint_kinds").paints,
+    )
     before = slots(mesh)
     press("patina.paint_mesh")
     press("patina.pick_paint", number=1)
@@ -206,8 +209,8 @@ def materials_and_masks() -> Iterator[float]:
     yield DRAWN
     photograph("7_taken")
     found["faces painted on a photo"] = int((slots(mesh) != before).sum())
-    masks = part("scene.mask_images")
-    capture = part("scene.properties").capture_path(scene)
+    masks = part("scene.paint.mask_images")
+    capture = part("scene.session.scene_properties").capture_path(scene)
     found["painted photo"] = scene.patina_photos.active
     found["pixels ignored"] = {
         kind: int(masks.read_mask_image(image).sum())
@@ -254,13 +257,13 @@ def fit_and_check() -> Iterator[float]:
     press("patina.mark_assets")
     yield DRAWN
     photograph("13_material")
-    stored = part("scene.properties")
+    stored = part("scene.session.scene_properties")
     result = stored.stored_result(stored.capture_path(bpy.context.scene))
     found["materials"] = {m["name"]: m["samples"]["used"] for m in result["materials"]}
     scene = bpy.context.scene
     found["photos"] = len(scene.patina_photos.photos)
     found["lamps"] = sum(o.type == "LIGHT" for o in scene.objects)
-    slots = part("scene.paints").worn_slots(scene.patina.mesh)
+    slots = part("scene.paint.paint_kinds").worn_slots(scene.patina.mesh)
     found["faces"] = np.bincount(slots).tolist()
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from ..effect import Effect, Setting
+from ..forward.diagnosis_context import DiagnosisContext
 from .ambient_light import AmbientLight
 from .anisotropy import Anisotropy
 from .area_light import AreaLight
+from .base.effect import Effect
 from .camera_pose import CameraPose
 from .camera_response import CameraResponse
 from .cast_shadow import CastShadow
@@ -44,7 +45,7 @@ EFFECTS: tuple[type[Effect], ...] = (
 )
 
 
-def made_for(setting: Setting) -> list[Effect]:
+def made_for(context: DiagnosisContext) -> list[Effect]:
     """All effects that may be there."""
-    made = [kind.of(setting) for kind in EFFECTS]
+    made = [kind.of(context) for kind in EFFECTS]
     return [effect for effect in made if effect is not None]

@@ -9,9 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...angles.vectors import tangents
-from ..effect import Array, Effect, Near, Numbers, Setting
-from ..part_lit import RAYS, part_lit, parts_of
-from ..situation import Situation
+from ..forward.diagnosis_context import DiagnosisContext, NearestPixels
+from ..forward.partial_visibility import RAYS, partial_visibility, pixel_part_points
+from ..forward.shading_state import ShadingState
+from .base.capabilities import WidensHighlights
+from .base.effect import Array
+from .base.image_formation import ExtendsLamp
+from .base.parameters import Parameters
 
 RADII = np.radians([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 13.0])  # about the lamp's middle, of shadow rays
 TURNS = 7  # of RAYS, from the direction of one ray to that of the next: all of them, in no order
@@ -37,7 +41,7 @@ DISCS = {start: _disc(count) for start, count in STARTS.items()}
 
 
 @dataclass(frozen=True)
-class AreaLight(Effect):
+class AreaLight(ExtendsLamp, WidensHighlights):
     """numbers: the lamp's angular diameter. first, other: (n, 3) unit, across the light; free:
     (n, r) part of a disc of RADII about its middle that the mesh does not hide; distant: (n,);
     start: where the search begins."""
@@ -48,20 +52,19 @@ class AreaLight(Effect):
     distant: NDArray[np.bool_]
     start: float = min(STARTS)
     cause = "area_light"
-    blurs = True
-    proof = "a photo of the lamp from where the object stands"
-    accuracy = 0.02  # a dozen points or two stand for it
+    deciding_photo = "a photo of the lamp from where the object stands"
+    systematic_error = 0.02  # a dozen points or two stand for it
 
     @classmethod
-    def of(cls, setting: Setting) -> AreaLight | None:
-        pixels = setting.pixels
-        distant = setting.distant[setting.light[pixels.photo]]
+    def of(cls, context: DiagnosisContext) -> AreaLight | None:
+        pixels = context.pixels
+        distant = context.distant[context.light[pixels.photo]]
         if not distant.any():
             return None
         first, other = (v.astype(np.float32) for v in tangents(pixels.light))
         ring = np.empty((len(pixels), len(RADII)))
         ring[:, 0] = pixels.visible
-        parts = parts_of(setting.rays, pixels)
+        parts = pixel_part_points(context.rays, pixels)
         for k, radius in enumerate(RADII[1:], start=1):
 
             def towards(ray: int, radius: float = radius) -> Array:
@@ -70,48 +73,48 @@ class AreaLight(Effect):
                 return (pixels.light + aside) * np.float32(np.cos(radius))
 
             # as the light of a point was: else the edges' pixels alone would ask for a lamp's size
-            ring[:, k] = part_lit(setting.rays, pixels, towards, parts=parts)
+            ring[:, k] = partial_visibility(context.rays, pixels, towards, parts=parts)
         # of a disc: the integral of rings, linear between them
         middle = 0.5 * (ring[:, 1:] + ring[:, :-1]) * np.diff(RADII**2)
         free = ring.copy()
         free[:, 1:] = np.cumsum(middle, axis=1) / RADII[1:] ** 2
         return cls(first, other, free.astype(np.float32), distant)
 
-    def elsewhere(self, setting: Setting, near: Near) -> AreaLight | None:
-        found = AreaLight.of(setting)
+    def at_pixels(self, context: DiagnosisContext, nearest: NearestPixels) -> AreaLight | None:
+        found = AreaLight.of(context)
         return None if found is None else replace(found, start=self.start)
 
     @property
-    def numbers(self) -> Numbers:
-        return Numbers.alike(
+    def parameters(self) -> Parameters:
+        return Parameters.alike(
             ["angular diameter"], "rad", USUAL, 0.0, 2 * RADII[-1], step=2e-3, start=self.start
         )
 
     @property
-    def beginnings(self) -> Sequence[AreaLight]:
+    def starts(self) -> Sequence[AreaLight]:
         return [replace(self, start=start) for start in STARTS]
 
-    def worth(self, x: np.ndarray) -> bool:
+    def is_relevant(self, x: np.ndarray) -> bool:
         return bool(x[0] > LEAST)
 
-    def lamps(self, now: Situation, x: np.ndarray) -> list[Situation]:
+    def lamp_parts(self, state: ShadingState, x: np.ndarray) -> list[ShadingState]:
         radius = np.clip(x[0] / 2, 0, RADII[-1])
         if radius < 1e-5:
-            return [now]
+            return [state]
         k = min(int(np.searchsorted(RADII, radius, side="right")), len(RADII) - 1)
         share = (radius - RADII[k - 1]) / (RADII[k] - RADII[k - 1])
         free = (1 - share) * self.free[:, k - 1] + share * self.free[:, k]
-        visible = np.clip(now.visible + free - now.pixels.visible, 0, 1)
-        visible = np.where(self.distant, visible, now.visible)
+        visible = np.clip(state.visible + free - state.pixels.visible, 0, 1)
+        visible = np.where(self.distant, visible, state.visible)
         parts = []
         for first, other in np.tan(radius) * DISCS[self.start]:
             aside = first * self.first + other * self.other
-            towards = now.light + np.where(self.distant[:, None], aside, 0).astype(np.float32)
+            towards = state.light + np.where(self.distant[:, None], aside, 0).astype(np.float32)
             towards /= np.linalg.norm(towards, axis=1, keepdims=True)
-            parts.append(replace(now, light=towards, visible=visible))
+            parts.append(replace(state, light=towards, visible=visible))
         return parts
 
-    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+    def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         return (
             f"the lamp is not a point: it is {np.degrees(x[0]):.1f}° wide as the object sees it, "
             "so that highlights are wider and the edges of shadows softer than the material makes "

@@ -8,10 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dark_spots import DIM
-from ..effect import Array, Effect, Near, Numbers, Setting, felt_by
-from ..moved_view import MovedView
-from ..situation import Situation
+from ..forward.diagnosis_context import DiagnosisContext, NearestPixels
+from ..forward.shading_state import ShadingState
+from ..pixels.unexplained_shadows import DIM
+from .base.capabilities import TracesRays
+from .base.displaced_view import DisplacedView
+from .base.effect import Array, Effect
+from .base.image_formation import ChangesRecording, ChangesShading
+from .base.parameters import Parameters, parameter_columns
 
 USUAL = 1.0  # pixels
 AFAR = np.linspace(-7.5, 7.5, 7)  # pixels right, and down, that are tried,
@@ -22,7 +26,7 @@ BESIDE = 2.0  # pixels from the edge of a shadow, where light changes, not the n
 
 
 @dataclass(frozen=True)
-class CameraPose(Effect):
+class CameraPose(ChangesShading, ChangesRecording, TracesRays):
     """numbers: for each photo a shift to the right and down, and a turn, in pixels (of the turn:
     at half the diagonal). turn: (n, 2, 3) of the normal, step: (n, 2, 3) of the point, slope:
     (n, 2, 3) of what the photo shows, a pixel to the right and down. beside: (n,) whether the edge
@@ -42,14 +46,14 @@ class CameraPose(Effect):
     beside: NDArray[np.bool_]
     x: Array
     y: Array
-    seen: MovedView | None = None
+    seen: DisplacedView | None = None
     cause = "camera_pose"
-    accuracy = 0.05  # a camera that is turned does not shift all of its photo alike
-    proof = "the same photos aligned again, with more landmarks"
+    systematic_error = 0.05  # a camera that is turned does not shift all of its photo alike
+    deciding_photo = "the same photos aligned again, with more landmarks"
 
     @classmethod
-    def of(cls, setting: Setting) -> CameraPose:
-        pixels = setting.pixels
+    def of(cls, context: DiagnosisContext) -> CameraPose:
+        pixels = context.pixels
         photos, place = np.unique(pixels.photo, return_inverse=True)
         beside = pixels.edge < BESIDE
         return cls(
@@ -57,49 +61,52 @@ class CameraPose(Effect):
             pixels.x, pixels.y,
         )  # fmt: skip
 
-    def elsewhere(self, setting: Setting, near: Near) -> CameraPose:
-        pixels = setting.pixels
+    def at_pixels(self, context: DiagnosisContext, nearest: NearestPixels) -> CameraPose:
+        pixels = context.pixels
         found = replace(
-            self, photo=self.photo[near.photo], turn=self.turn[near.photo],
-            step=self.step[near.photo], slope=pixels.slope, beside=pixels.edge < BESIDE,
+            self, photo=self.photo[nearest.photo], turn=self.turn[nearest.photo],
+            step=self.step[nearest.photo], slope=pixels.slope, beside=pixels.edge < BESIDE,
             x=pixels.x, y=pixels.y, seen=None,
         )  # fmt: skip
         if self.seen is None:
             return found
-        return replace(found, seen=found._seen(setting, self.seen.x).dark_where_it_ends)
+        return replace(found, seen=found._seen(context, self.seen.x).dark_where_it_ends)
 
-    def casting(self, setting: Setting, x: np.ndarray) -> CameraPose:
-        return replace(self, seen=self._seen(setting, x.copy()))
+    def with_rays(self, context: DiagnosisContext, x: np.ndarray) -> CameraPose:
+        return replace(self, seen=self._seen(context, x.copy()))
 
-    def sought(
-        self, setting: Setting, x: np.ndarray, shown: Callable[[Effect, np.ndarray], Array]
+    def ray_parameters(
+        self,
+        context: DiagnosisContext,
+        x: np.ndarray,
+        predict: Callable[[Effect, np.ndarray], Array],
     ) -> np.ndarray:
         """Photo by photo by trial, all photos at once: edges of shadows and outlines have no slope
         that leads to them from afar, and to a robust fit they are outliers. Once is enough."""
         if self.seen is not None:
             return x
-        low, high = self.numbers.low[0], self.numbers.high[0]
+        low, high = self.parameters.low[0], self.parameters.high[0]
         # of roots neither highlights nor noise count most
-        truth = np.sqrt(np.maximum(setting.pixels.observed, 0))
+        truth = np.sqrt(np.maximum(context.pixels.observed, 0))
 
-        def missed(x: np.ndarray) -> NDArray[np.float64]:
-            moved = self.casting(setting, x)
+        def squared_error(x: np.ndarray) -> NDArray[np.float64]:
+            moved = self.with_rays(context, x)
             assert moved.seen is not None
-            off = np.sqrt(np.maximum(shown(moved, x), 0)) - truth
-            told = moved.seen.known & setting.pixels.usable
+            off = np.sqrt(np.maximum(predict(moved, x), 0)) - truth
+            told = moved.seen.known & context.pixels.usable
             each = np.square(off).mean(axis=1)[told]
             photo, count = self.photo[told], len(self.photos)
             return np.bincount(photo, each, count) / np.maximum(np.bincount(photo, None, count), 1)
 
-        lit = setting.pixels.observed.sum(axis=1)
+        lit = context.pixels.observed.sum(axis=1)
         lit = lit > DIM * np.percentile(lit, 90)
         enough = np.bincount(self.photo, lit, len(self.photos)) >= FEWEST
-        best, least = x, np.where(enough, missed(x), -np.inf)
+        best, least = x, np.where(enough, squared_error(x), -np.inf)
 
         def better(tried: np.ndarray) -> None:
             nonlocal best, least
             tried = np.clip(tried, low, high)
-            costs = missed(tried)
+            costs = squared_error(tried)
             best = np.where(np.repeat(costs < least, 3), tried, best)
             least = np.minimum(costs, least)
 
@@ -110,9 +117,9 @@ class CameraPose(Effect):
                 better(best + np.tile(size * way, len(self.photos)))
         return best
 
-    def _seen(self, setting: Setting, x: np.ndarray) -> MovedView:
-        pixels = replace(setting.pixels, turn=self.turn, step=self.step)
-        return MovedView.of(replace(setting, pixels=pixels), self._moved(self.step, x), x)
+    def _seen(self, context: DiagnosisContext, x: np.ndarray) -> DisplacedView:
+        pixels = replace(context.pixels, turn=self.turn, step=self.step)
+        return DisplacedView.of(replace(context, pixels=pixels), self._moved(self.step, x), x)
 
     @property
     def _ends(self) -> NDArray[np.bool_]:
@@ -121,33 +128,33 @@ class CameraPose(Effect):
             return self.beside
         return np.where(self.seen.known, self.seen.ends, self.beside)
 
-    def own_error(self, x: np.ndarray) -> np.ndarray:
-        return np.repeat(np.hypot(self.accuracy * np.hypot(x[0::3], x[1::3]), PART), 3)
+    def systematic_errors(self, x: np.ndarray) -> np.ndarray:
+        return np.repeat(np.hypot(self.systematic_error * np.hypot(x[0::3], x[1::3]), PART), 3)
 
     @property
-    def numbers(self) -> Numbers:
+    def parameters(self) -> Parameters:
         names = [f"photo {p + 1}, {way}" for p in self.photos for way in ("right", "down", "turn")]
-        found = Numbers.alike(names, "px", USUAL, -8.0, 8.0, step=0.01)
+        found = Parameters.alike(names, "px", USUAL, -8.0, 8.0, step=0.01)
         return found if self.seen is None else replace(found, start=self.seen.x)
 
     @property
-    def feels(self) -> NDArray[np.intp]:
-        return felt_by(self.photo, 3)
+    def columns(self) -> NDArray[np.intp]:
+        return parameter_columns(self.photo, 3)
 
-    def before(self, now: Situation, x: np.ndarray) -> Situation:
+    def shading(self, state: ShadingState, x: np.ndarray) -> ShadingState:
         if not x.any():
-            return now
+            return state
         turned = np.where(self._ends[:, None], 0, self._rest(self.turn, x))
-        visible = now.visible
+        visible = state.visible
         if self.seen is not None:
             turned += self.seen.more
-            more = self.seen.visible - now.pixels.visible
+            more = self.seen.visible - state.pixels.visible
             visible = np.clip(visible + more, 0, 1).astype(np.float32)
-        normal = now.normal + turned
+        normal = state.normal + turned
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        return replace(now, normal=normal, visible=visible)
+        return replace(state, normal=normal, visible=visible)
 
-    def after(self, radiance: Array, now: Situation, x: np.ndarray) -> Array:
+    def recorded(self, radiance: Array, state: ShadingState, x: np.ndarray) -> Array:
         if not x.any():
             return radiance
         return radiance + np.where(self._ends[:, None], self._rest(self.slope, x), 0)
@@ -166,7 +173,7 @@ class CameraPose(Effect):
             return moved
         return moved - np.where(self.seen.known[:, None], self._moved(slope, self.seen.x), 0)
 
-    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+    def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         far = np.hypot(x[0::3], x[1::3])
         worst = int(np.argmax(far))
         return (

@@ -6,8 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..effect import Array, Effect, Near, Numbers, Setting
-from ..situation import Situation
+from ..forward.diagnosis_context import DiagnosisContext, NearestPixels
+from ..forward.shading_state import ShadingState
+from .base.effect import Array
+from .base.image_formation import CameraEffect
+from .base.parameters import Parameters
 
 USUAL = 0.15
 WHITE = 99.0  # percentile
@@ -15,37 +18,36 @@ DARKEST = 1e-4  # of white, where the curve's logarithm is cut off
 
 
 @dataclass(frozen=True)
-class CameraResponse(Effect):
+class CameraResponse(CameraEffect):
     """numbers: what the exponent is off by, and how it changes over a factor e of brightness; both
     about ``grey``, the photos' mean radiance, which stays as it is: how bright the whole is, no
     photo tells of its own curve."""
 
     grey: float
     cause = "camera_response"
-    of_camera = True
-    proof = "two photos of one view, one of them at half the exposure"
+    deciding_photo = "two photos of one view, one of them at half the exposure"
 
     @classmethod
-    def of(cls, setting: Setting) -> CameraResponse:
-        seen = setting.pixels.observed
+    def of(cls, context: DiagnosisContext) -> CameraResponse:
+        seen = context.pixels.observed
         white = float(np.percentile(seen, WHITE))
         return cls(max(float(np.minimum(seen, white).mean()), 1e-9))
 
-    def elsewhere(self, setting: Setting, near: Near) -> CameraResponse:
+    def at_pixels(self, context: DiagnosisContext, nearest: NearestPixels) -> CameraResponse:
         return self
 
     @property
-    def numbers(self) -> Numbers:
-        return Numbers(
+    def parameters(self) -> Parameters:
+        return Parameters(
             ("gamma − 1", "its change"), ("", "1/ln"), np.array([USUAL, 0.03]),
             np.array([-0.7, -0.15]), np.array([1.5, 0.15]), np.array([1e-3, 1e-3]),
         )  # fmt: skip
 
-    def after(self, radiance: Array, now: Situation, x: np.ndarray) -> Array:
+    def recorded(self, radiance: Array, state: ShadingState, x: np.ndarray) -> Array:
         level = np.log(np.maximum(radiance / self.grey, DARKEST))
         return radiance * np.exp(x[0] * level + x[1] * level * np.abs(level))
 
-    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+    def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         way = "flatter" if x[0] < 0 else "steeper"
         return (
             f"the photos are not linear: they follow light to the power {1 + x[0]:.2f}, {way} than "

@@ -6,38 +6,39 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..effect import Array, Effect, Near, Numbers, Setting
-from ..situation import Situation
+from ..forward.diagnosis_context import DiagnosisContext, NearestPixels
+from ..forward.shading_state import ShadingState
+from .base.capabilities import AffectsHighlightsOnly, JudgedByPixel
+from .base.effect import Array
+from .base.image_formation import CameraEffect
+from .base.parameters import Parameters
 
 SOFT = 0.01  # of the plateau, over which the end is rounded
 CROWD, BESIDE = 12, 0.03  # values that photos show so near, relative, to a plateau
 
 
 @dataclass(frozen=True)
-class Clipping(Effect):
+class Clipping(CameraEffect, AffectsHighlightsOnly, JudgedByPixel):
     """numbers: how far the plateau lies below ``top``, the brightest that a channel shows, as a
     logarithm, for each channel. observed: (n, 3)."""
 
     top: Array
     observed: Array
     cause = "clipping"
-    of_camera = True
-    proof = "one photo of each view at a quarter of the exposure"
-    of_highlights = True
-    fine = True  # highlights lie in a few squares of the photos
+    deciding_photo = "one photo of each view at a quarter of the exposure"
 
     @classmethod
-    def of(cls, setting: Setting) -> Clipping:
-        seen = setting.pixels.observed
+    def of(cls, context: DiagnosisContext) -> Clipping:
+        seen = context.pixels.observed
         return cls(np.maximum(seen.max(axis=0), 1e-9).astype(np.float64), seen)
 
-    def elsewhere(self, setting: Setting, near: Near) -> Clipping:
+    def at_pixels(self, context: DiagnosisContext, nearest: NearestPixels) -> Clipping:
         return self
 
     @property
-    def numbers(self) -> Numbers:
+    def parameters(self) -> Parameters:
         # far above the brightest there is no effect: so 0 is a plateau at 8 times the brightest
-        return Numbers.alike(
+        return Parameters.alike(
             ["red", "green", "blue"], "ln", 2.0, 0.0, 4.0, step=5e-3, start=np.log(8.0)
         )
 
@@ -45,16 +46,16 @@ class Clipping(Effect):
         """(3,) radiance that no photo exceeds."""
         return self.top * 8.0 * np.exp(-x)
 
-    def worth(self, x: np.ndarray) -> bool:
+    def is_relevant(self, x: np.ndarray) -> bool:
         near = np.abs(self.observed / self.plateau(x) - 1) < BESIDE
         return bool((near.sum(axis=0) >= CROWD).any())
 
-    def after(self, radiance: Array, now: Situation, x: np.ndarray) -> Array:
+    def recorded(self, radiance: Array, state: ShadingState, x: np.ndarray) -> Array:
         plateau = self.plateau(x)
         over = (radiance - plateau) / (SOFT * plateau)
         return radiance - SOFT * plateau * np.logaddexp(0.0, over)
 
-    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+    def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         return (
             "highlights are clipped: no photo exceeds "
             f"{', '.join(f'{v:.3g}' for v in self.plateau(x))} (red, green, blue), though the "

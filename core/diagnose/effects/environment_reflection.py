@@ -7,10 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..brdfs import BRDFs
-from ..effect import Array, Effect, Near, Numbers, Setting
-from ..situation import Situation
-from ..surroundings import ACCURACY
+from ..forward.diagnosis_context import DiagnosisContext, NearestPixels
+from ..forward.material_brdfs import MaterialBRDFs
+from ..forward.shading_state import ShadingState
+from ..forward.surroundings import ACCURACY
+from .base.capabilities import BuiltFromBRDFs
+from .base.effect import Array
+from .base.image_formation import AddsRadiance
+from .base.parameters import Parameters
 
 LOBES = 64  # directions that the surroundings are described by
 SHARP = 21.0  # of each: half as bright 15° from its middle; the next is 24° away
@@ -20,7 +24,7 @@ DIM = 0.1  # of the brightest: is not
 
 
 @dataclass(frozen=True)
-class EnvironmentReflection(Effect):
+class EnvironmentReflection(AddsRadiance, BuiltFromBRDFs):
     """numbers: how bright the surroundings are about each of ``directions`` (l, 3), radiance over
     the lamp's irradiance / π; sharp: (l,) of each. reflected: (l, n, 3) of a radiance of 1
     there."""
@@ -29,29 +33,30 @@ class EnvironmentReflection(Effect):
     sharp: Array
     reflected: Array
     cause = "environment_reflection"
-    of_brdf = True
-    accuracy = ACCURACY
-    proof = "one photo with the lamp off"
+    systematic_error = ACCURACY
+    deciding_photo = "one photo with the lamp off"
 
     @classmethod
-    def of(cls, setting: Setting) -> EnvironmentReflection:
-        return cls._towards(setting, _evenly(LOBES), np.full(LOBES, SHARP))
+    def of(cls, context: DiagnosisContext) -> EnvironmentReflection:
+        return cls._towards(context, _evenly(LOBES), np.full(LOBES, SHARP))
 
     @classmethod
-    def _towards(cls, setting: Setting, directions: Array, sharp: Array) -> EnvironmentReflection:
-        around = setting.surroundings
-        level = setting.own_level / np.pi
+    def _towards(
+        cls, context: DiagnosisContext, directions: Array, sharp: Array
+    ) -> EnvironmentReflection:
+        around = context.surroundings
+        level = context.pixel_level / np.pi
         open_ = around.open.astype(np.float32)
         reflected = []
         for d, k in zip(directions.astype(np.float32), sharp.astype(np.float32), strict=True):
             bright = np.exp(k * (around.towards @ d - 1)) * open_
-            reflected.append(level * around.under(bright))
+            reflected.append(level * around.reflected_light(bright))
         return cls(directions, sharp, np.stack(reflected))
 
-    def elsewhere(self, setting: Setting, near: Near) -> EnvironmentReflection:
-        return self._towards(setting, self.directions, self.sharp)
+    def at_pixels(self, context: DiagnosisContext, nearest: NearestPixels) -> EnvironmentReflection:
+        return self._towards(context, self.directions, self.sharp)
 
-    def remade(self, setting: Setting, x: np.ndarray) -> EnvironmentReflection:
+    def rebuilt(self, context: DiagnosisContext, x: np.ndarray) -> EnvironmentReflection:
         """With more and sharper directions about what is bright: the edge of a window, mirrored, is
         sharp, and what is too soft here would be taken by a tone curve."""
         finer = _evenly(FINER * LOBES)
@@ -60,21 +65,21 @@ class EnvironmentReflection(Effect):
         brightest = brightest[radiance[brightest] > DIM * radiance.max()]
         directions = np.concatenate([_evenly(LOBES), finer[brightest]])
         sharp = np.repeat([SHARP, FINER * SHARP], [LOBES, len(brightest)])
-        return self._towards(setting, directions, sharp)
+        return self._towards(context, directions, sharp)
 
     def radiance(self, towards: Array, x: np.ndarray) -> Array:
         """(m,) of the surroundings towards (m, 3), over the lamp's irradiance / π."""
         return np.asarray(np.exp(self.sharp * (towards @ self.directions.T - 1)) @ x)
 
     @property
-    def numbers(self) -> Numbers:
+    def parameters(self) -> Parameters:
         names = [f"({x:.2f}, {y:.2f}, {z:.2f})" for x, y, z in self.directions]
-        return Numbers.alike(names, "of E/π", 0.2, 0.0, 20.0)
+        return Parameters.alike(names, "of E/π", 0.2, 0.0, 20.0)
 
-    def added(self, now: Situation, brdfs: BRDFs, x: np.ndarray) -> Array:
+    def added_radiance(self, state: ShadingState, brdfs: MaterialBRDFs, x: np.ndarray) -> Array:
         return np.tensordot(x.astype(np.float32), self.reflected, 1)
 
-    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+    def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         radiance = self.radiance(self.directions, x)
         bright = self.directions[int(np.argmax(radiance))]
         return (

@@ -7,48 +7,50 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effect import Effect, Near, Numbers, Setting, felt_by, without_mean
-from ..situation import Situation
+from ..forward.diagnosis_context import DiagnosisContext, NearestPixels
+from ..forward.shading_state import ShadingState
+from .base.image_formation import ChangesShading
+from .base.parameters import Parameters, mean_removal, parameter_columns
 
 USUAL = 0.1  # of the logarithm
 
 
 @dataclass(frozen=True)
-class LightIntensity(Effect):
+class LightIntensity(ChangesShading):
     """numbers: ln of each photo's gain; what they have in common is the BRDF's, and the prior
     keeps their mean at 0. photo: (n,) place of each pixel's among ``photos``, their numbers."""
 
     photos: tuple[int, ...]
     photo: NDArray[np.intp]
     cause = "light_intensity"
-    proof = "a grey card beside the object in every photo"
+    deciding_photo = "a grey card beside the object in every photo"
 
     @classmethod
-    def of(cls, setting: Setting) -> LightIntensity | None:
-        photos, place = np.unique(setting.pixels.photo, return_inverse=True)
+    def of(cls, context: DiagnosisContext) -> LightIntensity | None:
+        photos, place = np.unique(context.pixels.photo, return_inverse=True)
         return cls(tuple(photos.tolist()), place.ravel()) if len(photos) > 1 else None
 
-    def elsewhere(self, setting: Setting, near: Near) -> LightIntensity:
-        return replace(self, photo=self.photo[near.photo])
+    def at_pixels(self, context: DiagnosisContext, nearest: NearestPixels) -> LightIntensity:
+        return replace(self, photo=self.photo[nearest.photo])
 
     @property
-    def numbers(self) -> Numbers:
+    def parameters(self) -> Parameters:
         names = [f"photo {p + 1}" for p in self.photos]
-        return Numbers.alike(names, "ln", USUAL, -1.5, 1.5)
+        return Parameters.alike(names, "ln", USUAL, -1.5, 1.5)
 
     @property
-    def feels(self) -> NDArray[np.intp]:
-        return felt_by(self.photo, 1)
+    def columns(self) -> NDArray[np.intp]:
+        return parameter_columns(self.photo, 1)
 
     @property
-    def anchor(self) -> NDArray[np.float64]:
-        return without_mean(len(self.photos), 1, 0)
+    def identifiable(self) -> NDArray[np.float64]:
+        return mean_removal(len(self.photos), 1, 0)
 
-    def before(self, now: Situation, x: np.ndarray) -> Situation:
+    def shading(self, state: ShadingState, x: np.ndarray) -> ShadingState:
         gain = np.exp(x)[self.photo].astype(np.float32)
-        return replace(now, irradiance=now.irradiance * gain[:, None])
+        return replace(state, irradiance=state.irradiance * gain[:, None])
 
-    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+    def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         gain = np.exp(x - x.mean())
         low, high = int(np.argmin(gain)), int(np.argmax(gain))
         return (

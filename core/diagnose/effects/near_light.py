@@ -7,9 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effect import Array, Effect, Near, Numbers, Setting, felt_by, without_mean
-from ..moved_shadows import MovedShadows
-from ..situation import Situation
+from ..forward.diagnosis_context import DiagnosisContext, NearestPixels
+from ..forward.shading_state import ShadingState
+from .base.capabilities import TracesRays
+from .base.displaced_shadows import DisplacedShadows
+from .base.effect import Array
+from .base.image_formation import ChangesShading
+from .base.parameters import Parameters, mean_removal, parameter_columns
 from .light_direction import LightDirection
 
 USUAL = 0.3  # sizes of the object over the distance
@@ -20,7 +24,7 @@ START = 0.15  # of the nearness: away from its bound, where steps are cut short
 
 
 @dataclass(frozen=True)
-class NearLight(Effect):
+class NearLight(ChangesShading, TracesRays):
     """numbers: for each distant light the object's size over the lamp's distance, then two angles
     and ln of a gain: where direction and irradiance were measured, a near lamp's are others than at
     the object's centre. from_afar: the same lights as distant ones; offset: (n, 3) from the centre,
@@ -29,30 +33,30 @@ class NearLight(Effect):
     from_afar: LightDirection
     offset: Array
     size: float
-    shadows: MovedShadows | None = None
+    shadows: DisplacedShadows | None = None
     cause = "near_light"
-    proof = "the same photos with the lamp twice as far away"
+    deciding_photo = "the same photos with the lamp twice as far away"
 
     @classmethod
-    def of(cls, setting: Setting) -> NearLight | None:
-        from_afar = LightDirection.of(setting)
+    def of(cls, context: DiagnosisContext) -> NearLight | None:
+        from_afar = LightDirection.of(context)
         if from_afar is None:
             return None
-        return cls(from_afar, _offset(setting), setting.size)
+        return cls(from_afar, _offset(context), context.size)
 
-    def elsewhere(self, setting: Setting, near: Near) -> NearLight:
-        from_afar = self.from_afar.elsewhere(setting, near)
-        found = replace(self, from_afar=from_afar, offset=_offset(setting), shadows=None)
-        return found if self.shadows is None else found.casting(setting, self.shadows.x)
+    def at_pixels(self, context: DiagnosisContext, nearest: NearestPixels) -> NearLight:
+        from_afar = self.from_afar.at_pixels(context, nearest)
+        found = replace(self, from_afar=from_afar, offset=_offset(context), shadows=None)
+        return found if self.shadows is None else found.with_rays(context, self.shadows.x)
 
     @property
-    def numbers(self) -> Numbers:
+    def parameters(self) -> Parameters:
         names, units = [], []
         for light in self.from_afar.names:
             names += [f"{light}, {what}" for what in ("nearness", "first", "second", "gain")]
             units += ["size / distance", "rad", "rad", "ln"]
         count = len(self.from_afar.names)
-        return Numbers(
+        return Parameters(
             tuple(names), tuple(units),
             np.tile([USUAL, ASIDE, ASIDE, BRIGHTER], count),
             np.tile([0.0, -0.2, -0.2, -0.5], count),
@@ -62,34 +66,34 @@ class NearLight(Effect):
         )  # fmt: skip
 
     @property
-    def feels(self) -> NDArray[np.intp]:
-        return felt_by(self.from_afar.light, EACH)
+    def columns(self) -> NDArray[np.intp]:
+        return parameter_columns(self.from_afar.light, EACH)
 
     @property
-    def anchor(self) -> NDArray[np.float64]:
-        return without_mean(len(self.from_afar.names), EACH, EACH - 1)
+    def identifiable(self) -> NDArray[np.float64]:
+        return mean_removal(len(self.from_afar.names), EACH, EACH - 1)
 
     def nearness(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(lights,) sizes of the object over the distance."""
         return x[::EACH]
 
-    def casting(self, setting: Setting, x: np.ndarray) -> NearLight:
-        return replace(self, shadows=MovedShadows.of(setting, replace(self, shadows=None), x))
+    def with_rays(self, context: DiagnosisContext, x: np.ndarray) -> NearLight:
+        return replace(self, shadows=DisplacedShadows.of(context, replace(self, shadows=None), x))
 
-    def before(self, now: Situation, x: np.ndarray) -> Situation:
-        now = now if self.shadows is None else self.shadows.on(now)
+    def shading(self, state: ShadingState, x: np.ndarray) -> ShadingState:
+        state = state if self.shadows is None else self.shadows.on(state)
         angles = np.stack([x[1::EACH], x[2::EACH]], axis=1).ravel()
-        now = self.from_afar.before(now, angles)
+        state = self.from_afar.shading(state, angles)
         light = self.from_afar.light
         # a lamp at light / nearness, in sizes: seen from a point it is at light − nearness · offset
         inverse = np.where(light >= 0, x[::EACH][light], 0.0).astype(np.float32)
         gain = np.where(light >= 0, np.exp(x[3::EACH])[light], 1.0).astype(np.float32)
-        towards = now.light - inverse[:, None] * self.offset
+        towards = state.light - inverse[:, None] * self.offset
         length = np.linalg.norm(towards, axis=1, keepdims=True)
-        irradiance = now.irradiance * gain[:, None] / length**2
-        return replace(now, light=towards / length, irradiance=irradiance)
+        irradiance = state.irradiance * gain[:, None] / length**2
+        return replace(state, light=towards / length, irradiance=irradiance)
 
-    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+    def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         nearest = int(np.argmax(self.nearness(x)))
         nearness = max(float(self.nearness(x)[nearest]), 1e-9)
         half = min(nearness / 2, 0.9)
@@ -101,6 +105,6 @@ class NearLight(Effect):
         )
 
 
-def _offset(setting: Setting) -> Array:
+def _offset(context: DiagnosisContext) -> Array:
     """(n, 3) from the centre, in sizes."""
-    return ((setting.pixels.point - setting.centre) / setting.size).astype(np.float32)
+    return ((context.pixels.point - context.centre) / context.size).astype(np.float32)

@@ -6,11 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..brdfs import BRDFs
-from ..effect import Array, Near, Numbers, Setting
-from ..patch_effect import PatchEffect
-from ..patches import median_of, surface_patches
-from ..situation import Situation
+from ..forward.diagnosis_context import DiagnosisContext, NearestPixels
+from ..forward.material_brdfs import MaterialBRDFs
+from ..forward.shading_state import ShadingState
+from .base.effect import Array
+from .base.image_formation import AddsRadiance, ChangesShading
+from .base.parameters import Parameters
+from .base.patch_effect import PatchEffect
+from .base.surface_patches import median_of, surface_patches
 
 ACROSS = 10  # patches over the object's size: small ones are predicted by few others
 USUAL = (0.1, 0.05, 0.05, 0.05)
@@ -20,7 +23,7 @@ EACH = 4
 
 
 @dataclass(frozen=True)
-class SecondMaterial(PatchEffect):
+class SecondMaterial(PatchEffect, ChangesShading, AddsRadiance):
     """numbers: for each patch of the surface how much more it reflects of what the material does,
     as a part, and how much more it scatters evenly, albedo, red, green, blue. (Linear, so that a
     patch that is left out, and falls back to 0, is predicted by a Newton step as well as by the
@@ -28,43 +31,45 @@ class SecondMaterial(PatchEffect):
 
     received: Array
     cause = "second_material"
-    proof = "a mask of the part that looks different, painted in one photo"
+    deciding_photo = "a mask of the part that looks different, painted in one photo"
 
     @classmethod
-    def of(cls, setting: Setting) -> SecondMaterial | None:
-        parts = surface_patches(setting, ACROSS)
+    def of(cls, context: DiagnosisContext) -> SecondMaterial | None:
+        parts = surface_patches(context, ACROSS)
         if not (parts >= 0).any():
             return None
-        return cls(parts, USUAL, Situation.of(setting.pixels).received)
+        return cls(parts, USUAL, ShadingState.of(context.pixels).received)
 
-    def elsewhere(self, setting: Setting, near: Near) -> SecondMaterial:
-        received = Situation.of(setting.pixels).received
-        return replace(self, parts=self.parts[near.surface], received=received)
+    def at_pixels(self, context: DiagnosisContext, nearest: NearestPixels) -> SecondMaterial:
+        received = ShadingState.of(context.pixels).received
+        return replace(self, patch=self.patch[nearest.surface], received=received)
 
     @property
-    def numbers(self) -> Numbers:
+    def parameters(self) -> Parameters:
         count = self.count
         kinds = ("more", "red", "green", "blue")
         names = [f"patch {k + 1}, {kind}" for k in range(count) for kind in kinds]
         low, high = np.tile([-0.95, -1, -1, -1], count), np.tile([9.0, 1, 1, 1], count)
-        return replace(Numbers.alike(names, "", 1.0), low=low, high=high, deviation=self.deviation)
+        return replace(
+            Parameters.alike(names, "", 1.0), low=low, high=high, deviation=self.deviation
+        )
 
-    def guess(self, missed: Array, shown: Array) -> np.ndarray:
+    def initial(self, residual: Array, predicted: Array) -> np.ndarray:
         level = self.received.mean(axis=1)
         lit = level > LIT * np.percentile(level, 90)
-        albedo = np.where(lit[:, None], np.pi * missed / np.where(lit, level, 1)[:, None], 0)
+        albedo = np.where(lit[:, None], np.pi * residual / np.where(lit, level, 1)[:, None], 0)
         out = np.zeros((self.count, EACH))
         for c in range(3):
-            out[:, 1 + c] = np.clip(median_of(self.parts, albedo[:, c]), -1, 1)
+            out[:, 1 + c] = np.clip(median_of(self.patch, albedo[:, c]), -1, 1)
         return out.ravel()
 
-    def before(self, now: Situation, x: np.ndarray) -> Situation:
-        return replace(now, irradiance=now.irradiance * (1 + self.felt(x)[:, :1]))
+    def shading(self, state: ShadingState, x: np.ndarray) -> ShadingState:
+        return replace(state, irradiance=state.irradiance * (1 + self.at_patch(x)[:, :1]))
 
-    def added(self, now: Situation, brdfs: BRDFs, x: np.ndarray) -> Array:
-        return self.felt(x)[:, 1:] * self.received / np.pi
+    def added_radiance(self, state: ShadingState, brdfs: MaterialBRDFs, x: np.ndarray) -> Array:
+        return self.at_patch(x)[:, 1:] * self.received / np.pi
 
-    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+    def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         patches = x.reshape(-1, EACH) - np.median(x.reshape(-1, EACH), axis=0)
         more, albedo = patches[:, 0], patches[:, 1:].mean(axis=1)
         other = (np.abs(more) > OTHER) | (np.abs(albedo) > OTHER)

@@ -1,4 +1,4 @@
-"""Light enters the surface and leaves it elsewhere: shadows' edges and folds glow."""
+"""Light enters the surface and leaves it elsewhere: shadows' edges and folds radiosity."""
 
 from __future__ import annotations
 
@@ -9,9 +9,12 @@ from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from ...geometry.view import cast_shadow
-from ..brdfs import BRDFs
-from ..effect import Array, Effect, Numbers, Setting
-from ..situation import Situation
+from ..forward.diagnosis_context import DiagnosisContext
+from ..forward.material_brdfs import MaterialBRDFs
+from ..forward.shading_state import ShadingState
+from .base.effect import Array
+from .base.image_formation import AddsRadiance
+from .base.parameters import Parameters
 
 RADII = (0.015, 0.04, 0.1)  # of the object's size, over which light spreads
 CUT = 2.5  # radii
@@ -21,54 +24,54 @@ NEAREST = 160  # points of a pixel that are looked up at most
 
 
 @dataclass(frozen=True)
-class Subsurface(Effect):
+class Subsurface(AddsRadiance):
     """numbers: the part of the light that enters and spreads over each of RADII, red, green, blue.
     spread: (r, n, 3) radiance that a white surface gains or loses by it, parts of 1."""
 
     spread: Array
     size: float
     cause = "subsurface"
-    proof = "one photo of the edge of a sharp shadow, from near"
+    deciding_photo = "one photo of the edge of a sharp shadow, from near"
 
     @classmethod
-    def of(cls, setting: Setting) -> Subsurface:
-        pixels, mesh = setting.pixels, setting.rays.mesh
+    def of(cls, context: DiagnosisContext) -> Subsurface:
+        pixels, mesh = context.pixels, context.rays.mesh
         spread = np.zeros((len(RADII), len(pixels), 3), np.float32)
         cosine = np.maximum(np.einsum("ij,ij->i", pixels.normal, pixels.light), 0)
         own = pixels.irradiance * (cosine * pixels.visible)[:, None]
         corners = mesh.vertices[mesh.faces]
         edges = corners[:, 1:] - corners[:, :1]
         areas = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) / 2
-        area = float(areas.sum()) / setting.size**2
+        area = float(areas.sum()) / context.size**2
         for k, radius in enumerate(RADII):
             count = int(min(MOST, NEIGHBOURS * area / (np.pi * (CUT * radius) ** 2)))
             points, faces = _spread(corners, areas, max(count, 200), seed=k)
             normals = mesh.face_normals[faces].astype(np.float32)
-            mixing = _mixing(pixels.point, points, radius * setting.size)
+            mixing = _mixing(pixels.point, points, radius * context.size)
             for photo in np.unique(pixels.photo):
                 rows = np.flatnonzero(pixels.photo == photo)
                 towards = np.broadcast_to(pixels.light[rows[0]], points.shape)
                 received = np.maximum(normals @ pixels.light[rows[0]], 0)
-                received *= ~cast_shadow(setting.rays, points, normals, towards, None)
+                received *= ~cast_shadow(context.rays, points, normals, towards, None)
                 blurred = (mixing[rows] @ received)[:, None] * pixels.irradiance[rows]
                 spread[k, rows] = (blurred - own[rows]) / np.pi
-        return cls(spread, setting.size)
+        return cls(spread, context.size)
 
     @property
-    def numbers(self) -> Numbers:
+    def parameters(self) -> Parameters:
         names = [f"{100 * r:.1f} % of the size, {c}" for r in RADII for c in "rgb"]
-        return Numbers.alike(names, "of the light", 0.15, 0.0, 1.0)
+        return Parameters.alike(names, "of the light", 0.15, 0.0, 1.0)
 
-    def added(self, now: Situation, brdfs: BRDFs, x: np.ndarray) -> Array:
+    def added_radiance(self, state: ShadingState, brdfs: MaterialBRDFs, x: np.ndarray) -> Array:
         return np.einsum("knc,kc->nc", self.spread, x.reshape(-1, 3).astype(np.float32))
 
-    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+    def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         part = x.reshape(-1, 3).mean(axis=1)
         far = float(np.sum(part * np.array(RADII)) / max(float(part.sum()), 1e-9))
         return (
             "light enters the surface and leaves it elsewhere (marble, wax, skin): about "
             f"{100 * part.sum():.0f} % of it spreads over {far * self.size:.2g} scan units, so "
-            "that shadows' edges glow"
+            "that shadows' edges radiosity"
         )
 
 

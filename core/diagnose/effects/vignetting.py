@@ -6,26 +6,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..effect import Array, Effect, Numbers, Setting
-from ..situation import Situation
+from ..forward.diagnosis_context import DiagnosisContext
+from ..forward.shading_state import ShadingState
+from .base.effect import Array
+from .base.image_formation import CameraEffect
+from .base.parameters import Parameters
 
 
 @dataclass(frozen=True)
-class Vignetting(Effect):
+class Vignetting(CameraEffect):
     """numbers: a, b of the gain 1 + a r² + b r⁴, r (n,) from the photo's centre, 1 in a corner."""
 
     r2: Array
     cause = "vignetting"
-    of_camera = True
-    proof = "one photo with the object in a corner"
+    deciding_photo = "one photo with the object in a corner"
 
     @classmethod
-    def of(cls, setting: Setting) -> Vignetting:
-        return cls(np.square(setting.pixels.x) + np.square(setting.pixels.y))
+    def of(cls, context: DiagnosisContext) -> Vignetting:
+        return cls(np.square(context.pixels.x) + np.square(context.pixels.y))
 
     @property
-    def numbers(self) -> Numbers:
-        return Numbers(
+    def parameters(self) -> Parameters:
+        return Parameters(
             ("r²", "r⁴"), ("", ""), np.array([0.4, 0.4]), np.array([-2.0, -2.0]),
             np.array([1.0, 2.0]), np.array([1e-3, 1e-3]),
         )  # fmt: skip
@@ -34,10 +36,10 @@ class Vignetting(Effect):
         """(n,) what the lens lets through."""
         return np.maximum(1 + x[0] * self.r2 + x[1] * self.r2**2, 0.05)
 
-    def after(self, radiance: Array, now: Situation, x: np.ndarray) -> Array:
+    def recorded(self, radiance: Array, state: ShadingState, x: np.ndarray) -> Array:
         return radiance * self.gain(x)[:, None]
 
-    def sentence(self, x: np.ndarray, deviation: np.ndarray) -> str:
+    def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         gain = self.gain(x)
         return (
             "the lens is not equally bright everywhere (vignetting): where the object reaches "

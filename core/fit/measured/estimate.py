@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 from ...angles import Angles
 from ...basis import Basis, PrincipalBRDF
 from ...basis.log_table import LogTable
+from ...concurrency.steps import drained
 from ...errors import FitError
 from ...samples import SampleTable
-from ...steps import drained
-from .anchors import carried_on
-from .caution import caution
 from .cells import gather
 from .forward import CellModel
+from .grazing_prior import carried_on
 from .normals import TOLERANCE, refine_normals
 from .patches import Patches
 from .posterior import solve
+from .power_likelihood import LEAST, tempered
 from .prior import ChannelPrior
-from .tempering import LEAST, tempered
+from .shrinkage import caution
 
 FEWEST = 50  # samples
 SETTLED = 0.02  # RMS change of ln ρ, all directions alike: the normals are refined enough
@@ -49,11 +49,11 @@ class MeasuredSettings:
 
 @dataclass(frozen=True)
 class MeasuredFit:
-    """brdf: the most probable one, cautious where that is unsure (caution.py). samples: how many.
+    """brdf: the most probable one, cautious where that is unsure (shrinkage.py). samples: how many.
     normal_deviation: degrees per tangent, what the scan's normals are off by. gains: photo → its
     own gain. anchoring: what unseen directions rest on, in words. without: photo → the BRDF had it
     not been there. covariance: (3, k, k) of each channel's coefficients. together: how many
-    regions' votes count as one (crowding.py, tempering.py)."""
+    regions' votes count as one (cell_weights.py, power_likelihood.py)."""
 
     brdf: PrincipalBRDF
     samples: int

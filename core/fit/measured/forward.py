@@ -12,7 +12,7 @@ from ...angles import Angles, cosines
 from ...basis import Basis, mapping
 from ...basis.log_table import LogTable
 from .cells import AngleCells
-from .scatter import scattered
+from .normal_quadrature import scattered
 
 LEAST_COSINE = 0.01
 

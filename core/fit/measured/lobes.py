@@ -2,7 +2,7 @@
 
 Principal components know how measured materials look; where no photo saw this one they may run
 wild towards grazing light. A Fresnel lobe cannot. It is never the result: its prediction is a weak
-observation in unseen directions (anchors.py).
+observation in unseen directions (grazing_prior.py).
 """
 
 from __future__ import annotations

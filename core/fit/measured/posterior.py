@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .crowding import crowding
+from .cell_weights import crowding
 from .equations import Arrow, PhotoEquations, add_blocks
 from .forward import CellModel, Prediction
 from .prior import ChannelPrior
@@ -57,7 +57,7 @@ def solve(
     together: float = 1.0,
 ) -> Posterior:
     """floor: log-relative deviation that the model is granted everywhere. together: so many votes
-    of a region (crowding.py) count as one (tempering.py)."""
+    of a region (cell_weights.py) count as one (power_likelihood.py)."""
     k = len(prior.own)
     crowd = crowding(model.cells)[:, None]
     photos, place = np.unique(model.cells.photo, return_inverse=True)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...basis import Basis
-from .anchors import Anchors
+from .grazing_prior import Anchors
 
 LEAST_OWN = 0.02  # of the variance, each channel's own: no component is exactly grey
 

@@ -14,11 +14,11 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from .beside import MOST_TEXTURES, beside
 from .gltf_buffers import COMPRESSED, Gltf
 from .gltf_nodes import placed_meshes
 from .polygons import Polygons
 from .precision import float32_note
+from .texture_path import MOST_TEXTURES, beside
 
 MOST_PARTS = 20_000
 POINTS, LINES, TRIANGLES, STRIP, FAN = 0, (1, 2, 3), 4, 5, 6

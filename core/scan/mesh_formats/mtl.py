@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .beside import MOST_TEXTURES, beside
+from .texture_path import MOST_TEXTURES, beside
 
 LARGEST_FILE = 16 << 20
 MOST_LIBRARIES = 64

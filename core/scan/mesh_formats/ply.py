@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from .beside import beside
 from .ply_elements import Table, read_table
 from .ply_header import Element, Header, read_header
 from .polygons import Polygons
 from .precision import float32_note
 from .text_lines import SPACE, parse_numbers, text_bytes
+from .texture_path import beside
 
 COORDINATES = ("x", "y", "z")
 COLOURS = (

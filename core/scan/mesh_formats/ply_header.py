@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ...errors import InputError
-from .beside import MOST_TEXTURES
+from .texture_path import MOST_TEXTURES
 
 LARGEST_HEADER = 1 << 16
 TYPES = {

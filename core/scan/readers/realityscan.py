@@ -17,16 +17,15 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..camera import Camera, Pose
-from ..lenses.brown import Lens, brown_lens
 from ..parsing.json_record import as_number
 from ..parsing.photo_labels import labels_of
 from ..parsing.photo_sizes import PhotoSizes
 from ..reconstruction import Reconstruction, reconstruction_of
+from .realityscan_lens import normalised_lens
 from .realityscan_xmp import read_xmp_folder
 
 Array = NDArray[np.float64]
 
-FILM = 36.0  # millimetres: the larger side of the photo that "35 mm" speaks of
 LARGEST = 1 << 26  # bytes; a hundred thousand cameras are 25 MB
 TURN = np.diag([1.0, -1.0, -1.0])  # x right, y up, z back → x right, y down, z forward
 NEWER = {"yaw": "heading", "f_35mm": "f", "px_norm": "px", "py_norm": "py"}
@@ -65,17 +64,6 @@ def read_realityscan(path: Path, images: Path | None, chunk: str | None) -> Reco
             "'division', export with a Brown model"
         )
     return reconstruction_of(cameras, path, notes=tuple(notes))
-
-
-def normalised_lens(values: dict[str, float], size: tuple[int, int]) -> Lens:
-    """The lens of f (mm of a 36 mm wide film), px, py (from the middle, in units of the photo's
-    larger side), k1 … k4, t1, t2 (OpenCV's p2, p1)."""
-    width, height = size
-    larger = max(size)
-    f = values["f"] / FILM * larger
-    cx, cy = values["px"] * larger + width / 2, values["py"] * larger + height / 2
-    radial = [values[f"k{i}"] for i in (1, 2, 3, 4)]
-    return brown_lens(f, f, cx, cy, radial, (values["t2"], values["t1"]))
 
 
 def _rows(path: Path) -> list[tuple[str, dict[str, float], int]]:

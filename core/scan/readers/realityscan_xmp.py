@@ -20,6 +20,7 @@ from ..parsing.photo_labels import labels_of
 from ..parsing.photo_sizes import PhotoSizes
 from ..parsing.xml_file import line_of, read_xml
 from ..reconstruction import Reconstruction, reconstruction_of
+from .realityscan_lens import normalised_lens
 
 Array = NDArray[np.float64]
 
@@ -74,8 +75,6 @@ def _value(element: Element, name: str) -> str | None:
 
 
 def _camera(label: str, file: Path, description: Element, photos: PhotoSizes) -> Camera:
-    from .realityscan import normalised_lens  # which reads these files too
-
     size = photos.size(file.stem)
     if size is None:
         raise InputError(

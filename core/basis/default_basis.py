@@ -1,0 +1,17 @@
+"""The embedded basis, computed from the neural encodings of the 100 MERL materials."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from .basis import Basis
+from .storage import load
+
+DEFAULT_FILE = Path(__file__).parents[2] / "assets" / "basis" / "nbrdf_basis.npz"
+
+
+@lru_cache(maxsize=1)
+def default_basis() -> Basis:
+    """Loaded once; needs neither a network nor a file of the user's."""
+    return load(DEFAULT_FILE)

@@ -1,0 +1,1 @@
+"""Stepped jobs, thread pools and background steps that every long task shares."""

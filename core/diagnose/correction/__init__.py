@@ -1,0 +1,1 @@
+"""Reflectance samples with the accepted effects removed."""

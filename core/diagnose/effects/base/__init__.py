@@ -1,0 +1,1 @@
+"""The interface of an effect and the parts that several effects share."""

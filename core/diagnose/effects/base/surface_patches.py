@@ -1,0 +1,36 @@
+"""Small parts of the surface, each seen by several photos."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...forward.diagnosis_context import DiagnosisContext
+
+ACROSS = 24  # patches over the object's size
+FEWEST = 12  # pixels that say something of a patch
+
+
+def surface_patches(context: DiagnosisContext, across: int = ACROSS) -> NDArray[np.intp]:
+    """(n,) number of each pixel's patch: cubes of space, the two sides of a thin wall apart; −1 of
+    patches that too few pixels show."""
+    pixels = context.pixels
+    place = np.floor((pixels.point - context.centre) / (context.size / across)).astype(np.int64)
+    axis = np.abs(pixels.normal).argmax(axis=1)
+    side = np.take_along_axis(pixels.normal, axis[:, None], axis=1)[:, 0] > 0
+    place -= place.min(axis=0)
+    wide = place.max(axis=0) + 1
+    key = ((place[:, 0] * wide[1] + place[:, 1]) * wide[2] + place[:, 2]) * 2 + side
+    _, of, count = np.unique(key, return_inverse=True, return_counts=True)
+    of = of.ravel()
+    number = np.where(count >= FEWEST, np.cumsum(count >= FEWEST) - 1, -1)
+    return np.asarray(number[of], np.intp)
+
+
+def median_of(patch: NDArray[np.intp], values: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(p,) of each patch's pixels; patch: (n,) of each pixel, −1 none; values: (n,)."""
+    known = np.flatnonzero(patch >= 0)
+    order = known[np.lexsort((values[known], patch[known]))]
+    count = np.bincount(patch[known])
+    middle = np.cumsum(count) - count + count // 2
+    return np.asarray(values[order[np.minimum(middle, len(order) - 1)]], np.float64)

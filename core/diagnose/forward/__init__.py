@@ -1,0 +1,1 @@
+"""The forward model without effects: surface, light, visibility, radiosity, surroundings."""

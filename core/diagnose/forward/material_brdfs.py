@@ -1,0 +1,88 @@
+"""The BRDFs of all materials of a capture, and how what they reflect changes with coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...angles import Angles
+from ...basis import Basis, PrincipalBRDF, mapping
+from ...basis.log_table import LogTable
+from . import basis_slack
+from .shading_state import ShadingState
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class MaterialBRDFs:
+    """coefficients: (m, 3, k) of m materials in a basis with slack (basis_slack.py). variance: (k,)
+    of their prior."""
+
+    basis: Basis
+    coefficients: NDArray[np.float64]
+    variance: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, brdfs: Sequence[PrincipalBRDF]) -> MaterialBRDFs:
+        """Fitted BRDFs of one basis, with a little slack."""
+        basis = brdfs[0].basis
+        variance = basis_slack.variances(basis, basis_slack.LITTLE)
+        coefficients = np.zeros((len(brdfs), 3, len(variance)))
+        for index, brdf in enumerate(brdfs):
+            coefficients[index, :, : brdf.coefficients.shape[1]] = brdf.coefficients
+        return cls(basis_slack.with_slack(basis), coefficients, variance)
+
+    @classmethod
+    def without_slack(cls, brdf: PrincipalBRDF) -> MaterialBRDFs:
+        """One BRDF as it is, to be predicted with and not fitted."""
+        variance = np.zeros(brdf.coefficients.shape[1])
+        return cls(brdf.basis, brdf.coefficients[None], variance)
+
+    def tight(self) -> MaterialBRDFs:
+        """The same with nearly no slack; what it held is left out."""
+        variance = self.variance.copy()
+        variance[-basis_slack.COUNT :] = basis_slack.TINY**2
+        coefficients = self.coefficients.copy()
+        coefficients[..., -basis_slack.COUNT :] = 0
+        return replace(self, coefficients=coefficients, variance=variance)
+
+    @cached_property
+    def tables(self) -> tuple[LogTable, ...]:
+        """One a material."""
+        return tuple(LogTable.of(self.basis, c) for c in self.coefficients)
+
+    def evaluate(self, angles: Angles, material: NDArray[np.integer]) -> Array:
+        """ρ (n, 3) in 1/sr at n directions, each of the material that its pixel shows."""
+        out = np.zeros((len(material), 3), np.float32)
+        for index, table in enumerate(self.tables):
+            rows = np.flatnonzero(material == index)
+            if len(rows):
+                out[rows] = table.evaluate(Angles(*(a.take(rows) for a in angles)))
+        return out
+
+    def reflected(self, state: ShadingState) -> Array:
+        """(n, 3) radiance of the lamp's light."""
+        return self.evaluate(state.angles, state.pixels.material) * state.received
+
+    def log_derivative(self, state: ShadingState) -> Array:
+        """(n, 3) ∂ radiance/∂ ln(ρ·cosMap + ε)."""
+        return self.reflected(state) + _offset(state)
+
+    def reflected_with_derivative(self, state: ShadingState) -> Array:
+        """(n, 6) both."""
+        reflected = self.reflected(state)
+        return np.concatenate([reflected, reflected + _offset(state)], axis=1)
+
+    def rows(self, angles: Angles) -> Array:
+        """Q̂ (n, k): ∂ρ/∂c = (ρ + ε / cosMap) Q̂."""
+        return self.basis.rows(angles, self.coefficients.shape[2])[1]
+
+
+def _offset(state: ShadingState) -> Array:
+    """(n, 3) radiance of a BRDF ε / cosMap: what the mapping adds before it takes the logarithm."""
+    return (mapping.EPSILON / mapping.cos_map(state.angles))[:, None] * state.received

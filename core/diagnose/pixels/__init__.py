@@ -1,0 +1,1 @@
+"""Which pixels of the photos a diagnosis uses, and where in a photo they lie."""

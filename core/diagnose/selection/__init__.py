@@ -1,0 +1,1 @@
+"""Which effects are accepted: score test, significance, cross-validation, search."""

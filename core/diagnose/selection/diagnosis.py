@@ -1,0 +1,84 @@
+"""The result of a diagnosis: effects with their gains, and which of them are named."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..solver.model_fit import ModelFit
+from .cross_validation import HeldOutPrediction
+from .held_out_error import HeldOutErrors
+from .residual_structure import ResidualStructure
+from .trial import Trial
+
+Array = NDArray[np.floating]
+
+MIN_GAIN_FRACTION = 0.05
+"""Of what the accepted effects gained; a smaller gain is more likely a flaw of their models."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What was found.
+
+    accepted: the effect with the largest gain in the full model first; the freedom beside the basis
+    last. rounds: the trials of each round, best first; the last round accepted nothing. before,
+    after: the fits without and with the named effects. residual: structure that these do not
+    explain. error_before, error_after: of held-out regions and photos. expected: (n, 3) standard
+    deviation before anything was fitted. contradicted: causes that gain, and the evidence against
+    them in words: a material that contradicts it, or a second fit that does not confirm it.
+    """
+
+    accepted: tuple[Trial, ...]
+    rounds: tuple[tuple[Trial, ...], ...]
+    before: ModelFit
+    after: ModelFit
+    held_out_before: HeldOutPrediction
+    held_out_after: HeldOutPrediction
+    residual: ResidualStructure
+    error_before: HeldOutErrors
+    error_after: HeldOutErrors
+    expected: Array
+    contradicted: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def ranked(self) -> list[Trial]:
+        """The accepted effects, then the rest of the first round, best first."""
+        first = self.rounds[0] if self.rounds else ()
+        accepted = {trial.effect.cause for trial in self.accepted}
+        return [*self.accepted, *(t for t in first if t.effect.cause not in accepted)]
+
+    @property
+    def named(self) -> tuple[Trial, ...]:
+        """The accepted effects without evidence against them."""
+        return tuple(t for t in self.accepted if t.effect.cause not in self.contradicted)
+
+    @property
+    def reported(self) -> tuple[Trial, ...]:
+        """The effects that the report describes in words."""
+        return tuple(
+            t for t in self.ranked if t in self.accepted or t.effect.cause in self.contradicted
+        )
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """The named effects, by the words of the vocabulary; ``unknown`` where structure
+        remains."""
+        causes = tuple(trial.effect.cause for trial in self.named)
+        return (*causes, "unknown") if self.unexplained else causes
+
+    def sentence(self, trial: Trial) -> str:
+        """What an effect means, and the evidence against it."""
+        evidence = self.contradicted.get(trial.effect.cause)
+        said = trial.sentence()
+        return said if evidence is None else f"{said}. But that is doubtful: {evidence}"
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether structure remains that no cause explains, and that is more than a flaw of an
+        accepted effect's model."""
+        gained = sum(trial.gain for trial in self.named)
+        return self.residual.is_significant and self.residual.gain > MIN_GAIN_FRACTION * gained

@@ -1,0 +1,165 @@
+"""Fit an effect together with a model, and measure what it gains on held-out regions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache, partial
+from threading import Lock
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects.base.capabilities import (
+    AffectsHighlightsOnly,
+    BuiltFromBRDFs,
+    JudgedByPixel,
+    TracesRays,
+)
+from ..effects.base.effect import Effect
+from ..effects.base.image_formation import CameraEffect
+from ..effects.base.patch_effect import PatchEffect
+from ..forward.diagnosis_context import DiagnosisContext
+from ..pixels.unexplained_shadows import DIM
+from ..solver.gauss_newton import fit
+from ..solver.model import Model
+from ..solver.model_fit import ModelFit
+from .cross_validation import (
+    parameter_variances,
+    predict_held_out_regions,
+    regions,
+    standard_error_of_sum,
+    sum_by_region,
+)
+from .relative_change import relative_rms_change
+from .significance import Candidate
+from .trial import Trial
+
+Array = NDArray[np.floating]
+Vector = NDArray[np.float64]
+HeldOutCosts = Callable[[bool, bool], Array]
+"""(single pixels are held out, patches are frozen) → (n,) nats of every held-out pixel."""
+
+PRIOR_ROUNDS = 1  # rounds of expectation and maximisation for the prior of patches
+MAX_RAY_ROUNDS = 3  # rounds in which rays are traced anew for a moved lamp or photo
+MIN_RAY_GAIN = 0.02  # of the gain, that another such round has to bring
+CONTRADICTION = 2.0  # standard errors that a material loses by a camera effect
+MIN_REGIONS = 10  # of a material, below which it cannot contradict anything
+
+
+def held_out_costs(now: ModelFit) -> HeldOutCosts:
+    """The costs of a model as it is, computed when they are asked for, and once."""
+    one_at_a_time = Lock()
+
+    @cache
+    def costs(by_pixel: bool, patches_frozen: bool) -> Array:
+        base = replace(now, model=now.model.with_patches_frozen()) if patches_frozen else now
+        return predict_held_out_regions(base, by_pixel).cost
+
+    def locked(by_pixel: bool, patches_frozen: bool) -> Array:
+        with one_at_a_time:
+            return costs(by_pixel, patches_frozen)
+
+    return locked
+
+
+def try_effect(now: ModelFit, costs: HeldOutCosts, candidate: Candidate) -> Trial:
+    """Fit one effect together with the model. costs: held_out_costs(now)."""
+    effect = candidate.effect
+    by_pixel, in_patches = isinstance(effect, JudgedByPixel), isinstance(effect, PatchEffect)
+    # another patch effect freezes the patches of the model, so they must be frozen without it too:
+    # the parameters of a held-out region are then known
+    frozen = in_patches and now.model.patch_place is not None
+    start = effect.initial(_residual_where_bright(now), now.predicted)
+    fitted = fit(now.model.with_effect(effect, start), now.deviation)
+    for _ in range(PRIOR_ROUNDS):
+        if isinstance(effect, PatchEffect):
+            effect = effect.with_prior(_patch_prior(fitted))
+            model = now.model.with_effect(effect)
+            model = replace(model, brdfs=fitted.model.brdfs, x=fitted.model.x)
+            fitted = fit(model, now.deviation)
+    held_out = predict_held_out_regions(fitted, by_pixel)
+    # single pixels, since the gain of an effect in a few regions could never be significant
+    saved = costs(by_pixel, frozen) - held_out.cost
+    by_region = sum_by_region(regions(now, by_pixel), saved)
+    removable = not in_patches and len(effect.parameters) > 0
+    without = fitted.model.predicted_without(effect.cause) if removable else now.predicted
+    highlights = isinstance(effect, AffectsHighlightsOnly)
+    change = relative_rms_change(fitted.predicted, without, now.deviation, highlights)
+    contradicted = _materials_that_lose(now, saved) if isinstance(effect, CameraEffect) else ()
+    return Trial(
+        effect, fitted, held_out, by_region, change, candidate.p_value, contradicted_by=contradicted
+    )
+
+
+def try_rebuilt(
+    now: ModelFit, costs: HeldOutCosts, best: Trial, context: DiagnosisContext
+) -> Trial:
+    """With the BRDFs that are found when the effect is in the model: those without it have absorbed
+    a part of it. In finer detail where that gains more. Unchanged where no BRDF matters."""
+    if not isinstance(best.effect, BuiltFromBRDFs):
+        return best
+    context = replace(context, brdfs=best.fitted.model.brdfs)
+    effects: list[Effect] = [best.effect.rebuilt(context, best.x)]
+    if len(effects[0].parameters) != len(best.effect.parameters):
+        plain = best.effect.of(context)
+        effects += [] if plain is None else [plain]
+    tried = [try_effect(now, costs, Candidate(e, best.gain, best.p_value)) for e in effects]
+    return replace(max(tried, key=lambda trial: trial.gain), ties=best.ties)
+
+
+def try_with_rays(
+    now: ModelFit, costs: HeldOutCosts, best: Trial, context: DiagnosisContext
+) -> Trial:
+    """With visibility traced anew for where the effect moves the lamp or the photos; unchanged
+    where it moves neither."""
+    for _ in range(MAX_RAY_ROUNDS):
+        if not isinstance(best.effect, TracesRays):
+            break
+        predict = partial(_predicted_with_last, best.fitted.model)
+        x = best.effect.ray_parameters(context, best.x, predict)
+        effect = best.effect.with_rays(context, x)
+        again = try_effect(now, costs, Candidate(effect, best.gain, best.p_value))
+        if again.gain < best.gain:  # the mesh is too coarse to say where shadows end
+            break
+        converged = again.gain < (1 + MIN_RAY_GAIN) * best.gain
+        best = replace(again, ties=best.ties)
+        if converged:
+            break
+    return best
+
+
+def _predicted_with_last(model: Model, effect: Effect, x: Vector) -> Array:
+    """(n, 3) prediction with another version of the model's last effect."""
+    last = replace(model, effects=(*model.effects[:-1], effect), x=(*model.x[:-1], x))
+    return last.predicted()
+
+
+def _materials_that_lose(now: ModelFit, saved: Array) -> tuple[int, ...]:
+    """Materials whose held-out regions are predicted significantly worse."""
+    material = now.model.pixels.material
+    found = []
+    for index in np.unique(material):
+        mine = np.flatnonzero(material == index)
+        gained = sum_by_region(regions(now)[mine], saved[mine])
+        loss = CONTRADICTION * standard_error_of_sum(gained)
+        if len(gained) > MIN_REGIONS and gained.sum() < -loss:
+            found.append(int(index))
+    return tuple(found)
+
+
+def _residual_where_bright(now: ModelFit) -> Array:
+    """(n, 3) photo minus prediction, 0 where the prediction is dark or the photo clipped."""
+    bright = now.predicted > DIM * np.percentile(now.predicted, 90)
+    counted = bright & np.isfinite(now.deviation)
+    return np.where(counted, now.model.pixels.observed - now.predicted, 0.0)
+
+
+def _patch_prior(fitted: ModelFit) -> Vector:
+    """(e,) standard deviations of the parameters of patches: the mean squares of what was found,
+    and of its uncertainty (one step of expectation and maximisation)."""
+    model, effect = fitted.model, fitted.model.patch_effect
+    assert model.patch_place is not None and effect is not None
+    variance = parameter_variances(fitted)[model.patch_place]
+    each = (np.square(model.x[model.patch_place]) + variance).reshape(effect.count, -1)
+    return np.asarray(np.maximum(np.sqrt(each.mean(axis=0)), 1e-3))

@@ -1,0 +1,115 @@
+"""Every number of a pixel that may betray a cause, and what the residual does along it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...angles.vectors import dot
+from ..forward.diagnosis_context import DiagnosisContext
+from ..forward.pixels import Pixels
+from ..forward.shading_state import ShadingState
+from ..forward.tangent_directions import tangential_axes, tangential_half_vector
+
+Array = NDArray[np.floating]
+
+BINS, FEWEST = 12, 40
+UPRIGHT = np.radians(2.0)  # θh: nearer the normal, a half vector points nowhere on the surface
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """name, unit; values: (n,) of every pixel, NaN unknown."""
+
+    name: str
+    unit: str
+    values: Array
+
+
+@dataclass(frozen=True)
+class Trend:
+    """What the photos show more than the prediction along a coordinate, relative to the prediction:
+    at: (b,) middles of the bins; mean: (b,), weighted by how sure pixels are; error: (b,) standard
+    errors, squares of the photos counting as independent."""
+
+    at: Array
+    mean: Array
+    error: Array
+
+
+def coordinates(context: DiagnosisContext) -> list[Coordinate]:
+    """Of every pixel that a diagnosis looks at."""
+    pixels = context.pixels
+    now = ShadingState.of(pixels)
+    angles = now.angles
+    cos_o = dot(pixels.normal, pixels.view)
+    cos_i = dot(pixels.normal, pixels.light)
+    open_ = context.surroundings.share * context.surroundings.open
+    place = pixels.point - context.centre
+    degrees = [
+        ("half angle θh", angles.theta_h), ("difference angle θd", angles.theta_d),
+        ("angle of incidence θi", np.arccos(np.clip(cos_i, -1, 1))),
+        ("angle of view θo", np.arccos(np.clip(cos_o, -1, 1))),
+    ]  # fmt: skip
+    found = [Coordinate(name, "°", np.degrees(values)) for name, values in degrees]
+    found += [
+        Coordinate(
+            "distance from the photo's centre", "half diagonals", np.hypot(pixels.x, pixels.y)
+        ),
+        Coordinate("photo", "", pixels.photo + 1.0),
+        Coordinate("brightness", "log10", np.log10(np.maximum(pixels.observed.mean(axis=1), 1e-6))),
+        Coordinate("curvature", "1/pixel", pixels.curvature),
+        Coordinate("distance to a shadow's edge", "pixels", pixels.edge),
+        Coordinate("open part of the surroundings", "", open_.sum(axis=1) / np.pi),
+        Coordinate("towards the lamp", "scan units", np.einsum("ij,ij->i", place, pixels.light)),
+    ]
+    found += [
+        Coordinate(f"place on the object, {'xyz'[k]}", "scan units", place[:, k]) for k in range(3)
+    ]
+    turns = half_vector_turns(pixels)
+    found += [Coordinate(f"tangent direction, off {'xyz'[k]}", "°", turns[:, k]) for k in range(3)]
+    return found
+
+
+def half_vector_turns(pixels: Pixels) -> Array:
+    """(n, 3) degrees on the surface between the half vector and each of the scan's axes, 0 along to
+    90 across: what is brushed or woven reflects otherwise along than across. NaN where the half
+    vector or the axis stands upright."""
+    normal = pixels.normal.astype(np.float64)
+    flat, axes = tangential_half_vector(normal, pixels.light, pixels.view), tangential_axes(normal)
+    sizes = np.linalg.norm(flat, axis=1)[:, None], np.linalg.norm(axes, axis=2)
+    along = np.abs(np.einsum("nax,nx->na", axes, flat)) / np.maximum(sizes[0] * sizes[1], 1e-12)
+    there = (sizes[0] > np.sin(UPRIGHT)) & (sizes[1] > np.sin(UPRIGHT))
+    return np.where(there, np.degrees(np.arccos(np.clip(along, 0, 1))), np.nan)
+
+
+def trend(
+    coordinate: Coordinate, missed: Array, shown: Array, deviation: Array, block: NDArray[np.int32]
+) -> Trend:
+    """missed: (n, 3) photo − prediction; shown: (n, 3) prediction; deviation: (n, 3) of it."""
+    known = np.isfinite(coordinate.values) & np.isfinite(deviation).all(axis=1)
+    known &= shown.mean(axis=1) > 0
+    values = coordinate.values[known]
+    if not len(values):  # as a tangent direction on what is flat
+        return Trend(np.zeros(0), np.zeros(0), np.zeros(0))
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
+    which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
+    weight = np.sum(shown[known] ** 2 / deviation[known] ** 2, axis=1)
+    pull = np.sum(shown[known] * missed[known] / deviation[known] ** 2, axis=1)
+    # no pixel counts more than a hundred others: one that is off would be the trend
+    limit = 100 * np.median(weight)
+    pull, weight = pull * np.minimum(1, limit / weight), np.minimum(weight, limit)
+    at, mean, error = [], [], []
+    for k in range(max(len(edges) - 1, 1)):
+        rows = np.flatnonzero(which == k)
+        if len(rows) < FEWEST:
+            continue
+        total = weight[rows].sum()
+        middle = pull[rows].sum() / total
+        by_block = np.bincount(block[known][rows], pull[rows] - middle * weight[rows])
+        at.append(float(np.median(values[rows])))
+        mean.append(float(middle))
+        error.append(float(np.sqrt(np.sum(by_block**2)) / total))
+    return Trend(np.array(at), np.array(mean), np.array(error))

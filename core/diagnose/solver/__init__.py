@@ -1,0 +1,1 @@
+"""The joint fit of BRDFs and effects: model, Jacobian, block elimination, Gauss-Newton."""

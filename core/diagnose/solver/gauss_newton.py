@@ -1,0 +1,63 @@
+"""Fit BRDF coefficients and effect parameters together: Gauss–Newton with robust weights."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .block_elimination import Step, solve
+from .jacobian import jacobian_of
+from .model import Model
+from .model_fit import ModelFit
+from .normal_equations import NormalEquations
+
+Array = NDArray[np.floating]
+
+MAX_STEPS, MAX_HALVINGS = 25, 5
+CONVERGED = 1e-4  # relative decrease of the cost
+
+
+def fit(model: Model, deviation: Array, steps: int = MAX_STEPS) -> ModelFit:
+    """The optimum near the model as it is. deviation: (n, 3) standard deviation in units of
+    radiance, inf where a pixel does not count."""
+    now = ModelFit.of(model, deviation)
+    for _ in range(steps):
+        found = _stepped(now)
+        gained = now.total_cost - found.total_cost
+        now = found if gained > 0 else now
+        if gained < CONVERGED * max(now.cost, 1.0):
+            break
+    return now
+
+
+def _stepped(now: ModelFit) -> ModelFit:
+    """One Gauss–Newton step, halved until the cost decreases; parameters stay within bounds."""
+    everything = np.arange(len(now.residual))
+    step = solve(NormalEquations.of(now, jacobian_of(now), everything), now)
+    length = 1.0
+    best = now
+    for _ in range(MAX_HALVINGS):
+        best = ModelFit.of(_moved(now.model, step, length), now.deviation)
+        if best.total_cost < now.total_cost:
+            break
+        length /= 2
+    return best
+
+
+def _moved(model: Model, step: Step, length: float) -> Model:
+    """The model after a fraction of a step."""
+    coefficients = model.brdfs.coefficients + length * step.coefficients
+    brdfs = replace(model.brdfs, coefficients=coefficients)
+    parts, at = list(model.x), 0
+    for place in model.global_places:
+        parameters = model.effects[place].parameters
+        moved = parts[place] + length * step.x[at : at + len(parameters)]
+        parts[place] = np.clip(moved, parameters.low, parameters.high)
+        at += len(parameters)
+    if model.patch_place is not None:
+        parameters = model.effects[model.patch_place].parameters
+        moved = parts[model.patch_place] + length * step.local
+        parts[model.patch_place] = np.clip(moved, parameters.low, parameters.high)
+    return replace(model, brdfs=brdfs, x=tuple(parts))

@@ -1,0 +1,1 @@
+"""From a capture to checked data: scan, photos, masks and lights."""

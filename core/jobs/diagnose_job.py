@@ -1,0 +1,114 @@
+"""Fit a capture, then say what its photos show that the model does not."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from ..concurrency.background import steps_in_background
+from ..concurrency.job import Job, Step, finished
+from ..concurrency.steps import relayed
+from ..concurrency.thread_pool import thread_count, thread_pool
+from ..diagnose.effects import made_for
+from ..diagnose.forward.diagnosis_context import DiagnosisContext
+from ..diagnose.forward.material_brdfs import MaterialBRDFs
+from ..diagnose.pixels.pixel_selection import select_pixels
+from ..diagnose.selection.diagnosis import Diagnosis
+from ..diagnose.selection.search import search
+from ..diagnose.solver.model import Model
+from ..diagnose.solver.residual_scale import expected_deviation
+from ..fit.measured_result import MeasuredResult
+from .fit_job import CaptureResult, FitJob
+
+Result = TypeVar("Result")
+
+UNSAID = 1.0  # degrees: what a scan's normals are off by where the fit does not say it
+SHARE = 0.5  # of the job, the fit
+LOOKING, TRYING = "looking at the photos", "trying what may be wrong"
+
+
+class DiagnoseJob(Job):
+    """``result`` is the fit, ``context`` what was looked at, ``found`` what is wrong with it; they
+    are there when the job is done."""
+
+    def __init__(self, fit: FitJob) -> None:
+        super().__init__()
+        self.fit = fit
+        fit.keep = True
+        self.context: DiagnosisContext | None = None
+        self.found: Diagnosis | None = None
+
+    @property
+    def result(self) -> CaptureResult | None:
+        """The fit without any effect."""
+        return self.fit.result
+
+    def run(self) -> Iterator[Step]:
+        """The fit's steps, then those of the diagnosis."""
+        for step in self.fit.run():
+            yield Step(step.stage, SHARE * step.fraction)
+        result = finished(self.fit.result)
+        with thread_pool(thread_count(self.fit.threads)) as pool:
+            steps = context_of(result, pool)
+            self.context = yield from _stepped(steps, LOOKING, 0.0, 0.1)
+            yield Step(LOOKING, SHARE + 0.1 * (1 - SHARE))
+            self.found = yield from _stepped(self._search(pool), TRYING, 0.1, 1.0)
+
+    def _search(self, pool: ThreadPoolExecutor | None) -> Generator[float, None, Diagnosis]:
+        result, context = finished(self.result), finished(self.context)
+        deviation = expected_deviation(
+            context.pixels, context.brdfs, np.radians(normal_deviation(result))
+        )
+        model, effects = Model(context.pixels, context.brdfs), made_for(context)
+        return (yield from search(model, deviation, effects, context, pool))
+
+
+def context_of(
+    result: CaptureResult, pool: ThreadPoolExecutor | None = None
+) -> Generator[float, None, DiagnosisContext]:
+    """What a diagnosis looks at; yields the fraction done."""
+    capture = result.capture
+    brdfs = MaterialBRDFs.of([m.fit.brdf for m in result.materials])
+    rays = result.rays.close()
+    scale = np.array([material.scale for material in result.materials], np.float32)
+    pixels = yield from select_pixels(
+        capture, result.scan, rays, result.photos, result.lights, brdfs, scale, pool
+    )
+    level = float(np.median(pixels.irradiance))
+    pixels = replace(pixels, irradiance=pixels.irradiance / scale[pixels.material, None])
+    names = [light.name for light in capture.lights]
+    middle = pixels.point.mean(axis=0)
+    return DiagnosisContext(
+        pixels=pixels,
+        brdfs=brdfs,
+        rays=rays,
+        light=np.array([names.index(photo.light) for photo in capture.photos]),
+        lights=tuple(names),
+        distant=np.array([light.distant for light in capture.lights]),
+        centre=middle,
+        size=2 * float(np.percentile(np.linalg.norm(pixels.point - middle, axis=1), 99)),
+        level=level,
+        scale=scale,
+        materials=tuple(material.name for material in result.materials),
+    )
+
+
+def normal_deviation(result: CaptureResult) -> float:
+    """Degrees along each tangent that the scan's normals are off by, of the worst material."""
+    said = [m.fit.normal_deviation for m in result.materials if isinstance(m.fit, MeasuredResult)]
+    return max(said, default=UNSAID)
+
+
+def _stepped(
+    steps: Generator[float, None, Result], stage: str, begin: float, end: float
+) -> Generator[Step, None, Result]:
+    """Steps of a part of the diagnosis."""
+    span = (1 - SHARE) * (end - begin)
+    return relayed(
+        steps_in_background(steps),
+        lambda done: Step(stage, SHARE + (1 - SHARE) * begin + span * done),
+    )

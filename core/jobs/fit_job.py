@@ -1,0 +1,362 @@
+"""Capture → scan, photos, samples → a BRDF per material."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..appearance.lobe_fit import LobeStackFit
+from ..appearance.principled_fit import PrincipledFit
+from ..basis import Basis, default_basis
+from ..capture import Capture, LightEntry
+from ..concurrency.background import in_background
+from ..concurrency.job import Job, Step, finished
+from ..concurrency.steps import relayed
+from ..errors import FitError
+from ..fit import PaperFit
+from ..fit.held_out import HeldOut, Judge
+from ..fit.measured_result import MeasuredResult
+from ..fit.spread import Spread
+from ..geometry import RayScene
+from ..inputs import capture_data
+from ..inputs.lights import Lights, find_lights, refined
+from ..inputs.photos import LitPhotos
+from ..samples import MeasuredPoints, SampleSink, SampleTable
+from ..samples.face_votes import FaceVotes
+from ..samples.level import at_typical_level
+from ..scan import Scan
+from .applied_effects import AppliedEffect
+from .estimators import Estimate, estimate
+from .fit_warnings import black_photos, material_warnings, trust_warnings
+from .portable_materials import Portable, fit_portable
+from .sampling import Taken, take_samples
+
+LEAST_RHO, LARGEST_RHO = 1e-6, 1e4  # 1/sr: black velvet has 1e-3, mirrors' peaks 1e4
+
+
+@dataclass(frozen=True)
+class MaterialResult:
+    """One fitted material. fit: by the capture's method; samples: number taken from the photos;
+    used: those that the fit was given, all unless there are too many; per_photo: taken of every
+    photo; points: some of them, for charts; scale: what the photos' reflectance was multiplied by,
+    1 where the irradiance is known.
+    portable: as others show it, None until somebody asks.
+    """
+
+    name: str
+    fit: PaperFit | MeasuredResult
+    samples: int
+    used: int
+    per_photo: tuple[int, ...]
+    points: MeasuredPoints
+    held_out: HeldOut | None
+    spread: Spread
+    portable: Portable | None
+    scale: float
+    irradiance_known: bool
+    warnings: tuple[str, ...]
+
+    @property
+    def principled(self) -> PrincipledFit:
+        """The Principled BSDF nearest to it."""
+        return finished(self.portable).principled
+
+    @property
+    def lobes(self) -> LobeStackFit:
+        """The stack of lobes nearest to it."""
+        return finished(self.portable).lobes
+
+
+@dataclass(frozen=True)
+class CaptureResult:
+    """Everything a fit found. face_material: (f,) int, place of each face's material; notes: what
+    was read, assumed and left out, a sentence each; effects: that a diagnosis named, and that the
+    materials take into account."""
+
+    capture: Capture
+    scan: Scan
+    photos: LitPhotos
+    lights: Lights
+    notes: tuple[str, ...]
+    rays: RayScene
+    basis: Basis
+    materials: tuple[MaterialResult, ...]
+    face_material: NDArray[np.int32]
+    effects: tuple[AppliedEffect, ...] = ()
+
+
+def with_portable(
+    material: MaterialResult, start: float, threads: int | None
+) -> Generator[Step, None, MaterialResult]:
+    """With its portable form, unless it has it, ``start`` of the job done."""
+    if material.portable is not None:
+        return material
+    found = yield from fit_portable(material.fit.brdf, material.name, start, threads)
+    warnings = material.warnings
+    if found.principled.clipped:
+        warnings += ("brighter than any base colour: the Principled material is too dark",)
+    return replace(material, portable=found, warnings=warnings)
+
+
+def _way(entry: LightEntry) -> str:
+    """The key that says where a light is."""
+    ways = ("sphere", "sun", "position", "mounted")
+    return next((way for way in ways if getattr(entry, way) is not None), "direction")
+
+
+class FitJob(Job):
+    """Fit every material of a capture; ``result`` is there when the job is done.
+
+    basis: to fit in, or how to come by it, beside the job (None: the embedded one). prepare: what
+    is done to the scan once it is read (face attributes that no file has). threads: how many look
+    at the photos (None: one a core); the result does not depend on it. keep: whether ``samples``
+    holds those that each material was fitted to, by its name. portable: whether the materials'
+    portable forms are fitted too.
+    """
+
+    def __init__(
+        self,
+        capture: Capture,
+        basis: Basis | Callable[[], Basis] | None = None,
+        prepare: Callable[[Scan], Scan] | None = None,
+        threads: int | None = None,
+        keep: bool = False,
+        portable: bool = True,
+    ) -> None:
+        super().__init__()
+        self.threads = threads
+        self.keep = keep
+        self.portable = portable
+        self.samples: dict[str, SampleTable] = {}
+        self.capture = capture
+        self.basis = basis
+        self.prepare = prepare
+        self.result: CaptureResult | None = None
+
+    def run(self) -> Iterator[Step]:
+        """Scan, photos, then one material after the other."""
+        capture = self.capture
+        yield Step("reading the scan", 0.0)
+        if isinstance(self.basis, Basis) or self.basis is None:
+            basis = self.basis or (
+                yield from in_background(default_basis, Step("reading the scan", 0.0))
+            )
+        else:
+            basis = yield from in_background(self.basis, Step("computing the basis", 0.0))
+        scan = yield from in_background(
+            lambda: capture_data.open_scan(capture), Step("reading the scan", 0.0)
+        )
+        if self.prepare is not None:
+            scan = self.prepare(scan)
+        capture_data.check_face_attributes(capture, scan)
+        capture_data.check_photos(capture, scan)
+        yield Step("reading the scan", 0.03)
+        rays = yield from in_background(
+            lambda: RayScene.build(scan.mesh), Step("reading the scan", 0.03)
+        )
+        photos = LitPhotos.open(capture)
+        lights = find_lights(capture, scan, photos)
+        if any(entry.refine for entry in capture.lights):
+            lights = yield from relayed(
+                refined(lights, capture, scan, photos, rays, basis),
+                lambda done: Step("refining the lights", 0.03 + 0.02 * done),
+            )
+        taken = yield from self._take_samples(scan, rays, photos, lights)
+        results = []
+        known = lights.known and capture.fit.absolute
+        for index in range(len(capture.materials)):
+            results.append((yield from self._fit_material(index, taken, basis, known)))
+        yield Step("materials on the mesh", 0.97)
+        self.result = CaptureResult(
+            capture=capture,
+            scan=scan,
+            photos=photos,
+            lights=lights,
+            notes=(
+                *scan.notes,
+                *(f"{n} photo{'s' * (n > 1)}: {said}" for said, n in taken.notes.items()),
+                *photos.notes,
+                *lights.notes,
+                *capture_data.unused_settings(capture),
+                *capture_data.size_notes(capture, scan),
+            ),
+            rays=rays,
+            basis=basis,
+            materials=tuple(results),
+            face_material=self._face_material(scan, taken.votes),
+        )
+
+    def _take_samples(
+        self, scan: Scan, rays: RayScene, photos: LitPhotos, lights: Lights
+    ) -> Generator[Step, None, Taken]:
+        """Step through the photos; every material's sinks get its samples as they come."""
+        sinks = {material.name: self.sinks(material.name) for material in self.capture.materials}
+        taken = yield from relayed(
+            take_samples(self.capture, scan, rays, photos, lights, sinks, self.threads),
+            lambda done: Step("sampling the photos", 0.05 + 0.35 * done),
+        )
+        self._check_light(taken)
+        return taken
+
+    def given(self, index: int, table: SampleTable) -> SampleTable:
+        """What the fit of a material is given of its samples."""
+        return table
+
+    def sinks(self, material: str) -> Sequence[SampleSink]:
+        """Who wants all samples of a material, beside the reservoir that the paper's fit reads."""
+        return ()
+
+    def _fit_material(
+        self, index: int, taken: Taken, basis: Basis, known: bool
+    ) -> Generator[Step, None, MaterialResult]:
+        capture = self.capture
+        name = capture.materials[index].name
+        share = 0.55 / len(capture.materials)
+        start = 0.4 + share * index
+        yield Step(f"fitting {name}", start)
+        table = taken.kept.pop(name).table()
+        self._check_samples(index, table, taken.marked[name], known)
+        scale = 1.0
+        if not known:
+            table, scale = at_typical_level(table, basis)
+        if self.keep:
+            self.samples[name] = table
+        counts = taken.counts[name]
+        return (
+            yield from self._material(index, table, basis, (known, scale), counts, start, share)
+        )
+
+    def fitted_again(
+        self,
+        index: int,
+        table: SampleTable,
+        before: MaterialResult,
+        start: float,
+        share: float,
+        judge: Judge | None = None,
+    ) -> Generator[Step, None, MaterialResult]:
+        """A material from other samples, in the unit of those it was fitted to before. judge: how
+        photos that are held out are predicted, None: as the samples are."""
+        basis, counts = finished(self.result).basis, np.array(before.per_photo)
+        unit = before.irradiance_known, before.scale
+        return (yield from self._material(index, table, basis, unit, counts, start, share, judge))
+
+    def _material(
+        self,
+        index: int,
+        table: SampleTable,
+        basis: Basis,
+        unit: tuple[bool, float],
+        counts: NDArray[np.int64],
+        start: float,
+        share: float,
+        judge: Judge | None = None,
+    ) -> Generator[Step, None, MaterialResult]:
+        """unit: whether irradiance is known, and the samples' scale; counts: taken of every
+        photo."""
+        capture, name = self.capture, self.capture.materials[index].name
+        known, scale = unit
+        found = yield from self._estimate(index, table, basis, start, 0.8 * share, judge)
+        warnings = material_warnings(table, found.fit, known)
+        warnings += trust_warnings(found, capture)
+        warnings += black_photos(table, capture) + found.notes
+        material = MaterialResult(
+            name=name,
+            fit=found.fit,
+            samples=int(counts.sum()),
+            used=len(table),
+            per_photo=tuple(counts.tolist()),
+            points=MeasuredPoints.of(table),
+            held_out=found.held_out,
+            spread=found.spread,
+            portable=None,
+            scale=scale,
+            irradiance_known=known,
+            warnings=warnings,
+        )
+        if not self.portable:
+            return material
+        return (yield from with_portable(material, start + 0.8 * share, self.threads))
+
+    def _estimate(
+        self,
+        index: int,
+        table: SampleTable,
+        basis: Basis,
+        start: float,
+        share: float,
+        judge: Judge | None = None,
+    ) -> Generator[Step, None, Estimate]:
+        """The fit itself, which takes the part ``share`` of the job from ``start`` on."""
+        name = self.capture.materials[index].name
+        given = yield from in_background(
+            lambda: self.given(index, table), Step(f"fitting {name}", start)
+        )
+        steps = estimate(given, basis, self.capture, name, judge)
+        while True:
+            try:
+                stage, done = next(steps)
+            except StopIteration as end:
+                found: Estimate = end.value
+                return found
+            except FitError as error:
+                raise self.capture.error(str(error), *self._entry(index)) from error
+            yield Step(stage, start + share * done)
+
+    def _face_material(self, scan: Scan, votes: FaceVotes) -> NDArray[np.int32]:
+        """What masks say, and over it what the mesh says where a material is given by its faces."""
+        found = votes.winners(scan.mesh)
+        for index, material in enumerate(self.capture.materials):
+            attribute = capture_data.face_attribute(material)
+            if attribute is not None:
+                found[scan.mesh.face_attributes[attribute] == index] = index
+        return found
+
+    def _check_light(self, taken: Taken) -> None:
+        seen_by, lit_by = (Counter[str](), Counter[str]())
+        for place, photo in enumerate(self.capture.photos):
+            seen_by[photo.light] += int(taken.seen[place])
+            lit_by[photo.light] += int(taken.lit[place])
+        if not any(seen_by.values()):
+            raise self.capture.error("no lit photo shows any of the mesh", "scan", "mesh")
+        for place, light in enumerate(self.capture.lights):
+            if seen_by[light.name] and lit_by[light.name] == 0:
+                raise self.capture.error(
+                    f"the light {light.name!r} stands behind everything its photos see: no pixel "
+                    "is lit; "
+                    + (
+                        "direction points from the surface TO the light, in the scan's frame"
+                        if light.distant
+                        else "expected its place outside the object, in scan units"
+                    ),
+                    "light", place, _way(light),
+                )  # fmt: skip
+
+    def _check_samples(self, index: int, table: SampleTable, marked: int, known: bool) -> None:
+        name = self.capture.materials[index].name
+        if len(table):
+            level = float(np.median(table.rho.mean(axis=1)))
+            if level <= 0 or (known and not LEAST_RHO < level < LARGEST_RHO):
+                raise self.capture.error(
+                    f"the typical reflectance of {name!r} is {level:.3g} / sr, which no surface "
+                    "has: check that light directions point from the surface TO the light, that "
+                    "the photos are linear and not black, exposure and irradiance",
+                    *self._entry(index),
+                )
+            return
+        painted = self.capture.named_by_masks(name)
+        found = (
+            f"all pixels are masked out: no mask marks any surface as {name!r}"
+            if painted and marked == 0
+            else f"none of the {marked} pixels of {name!r} is lit and away from shadow edges"
+        )
+        raise self.capture.error(found, *self._entry(index))
+
+    def _entry(self, index: int) -> tuple[str | int, ...]:
+        """The key to speak of a material: its own, or the photos' where the file names none."""
+        own = ("material", index, "name")
+        return own if own in self.capture.lines else ("photo", 0, "file")

@@ -1,0 +1,183 @@
+"""All samples of all photos, a piece of a photo at a time.
+
+A photo is cut into bands of rows; each gives the samples of its materials to whoever wants them and
+is forgotten. Memory depends on the size of one photo, not on their number. Bands may be worked on
+by several threads; what comes out is handed on in their order, and is the same on any number.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..capture import Capture
+from ..concurrency.ordered_map import ordered_map
+from ..concurrency.thread_pool import thread_count, thread_pool
+from ..geometry import PixelRays, RayScene, Window, bands, view_window
+from ..inputs import capture_data
+from ..inputs.lights import Lights
+from ..inputs.photos import LitPhoto, LitPhotos
+from ..light import Light
+from ..samples import SampleReservoir, SampleSink, SampleTable, sample_photo
+from ..samples.face_votes import FaceVotes
+from ..samples.take import halo, inner_pixels, light_surface, trusted_pixels
+from ..scan import Scan
+
+MANY_CLIPPED = 1e-3  # of a photo's lit pixels
+
+
+@dataclass
+class Taken:
+    """What the photos gave. kept: a uniform part of each material's samples; counts: (photos,) how
+    many there were; marked: surface pixels that its masks mark; votes: of the faces, empty where
+    there is one material; notes: what was noted while reading, and of how many photos; seen, lit:
+    (photos,) pixels that see the surface, and those of them in the light."""
+
+    kept: dict[str, SampleReservoir]
+    counts: dict[str, NDArray[np.int64]]
+    marked: dict[str, int]
+    votes: FaceVotes
+    seen: NDArray[np.int64]
+    lit: NDArray[np.int64]
+    notes: Counter[str] = field(default_factory=Counter)
+
+
+@dataclass(frozen=True)
+class _Shot:
+    """One photo and everything that its bands need to know."""
+
+    capture: Capture
+    scan: Scan
+    rays: RayScene
+    light: Light
+    place: int
+    lines: PixelRays
+    photo: LitPhoto
+    masks: Mapping[str, NDArray[np.bool_]]
+
+
+@dataclass(frozen=True)
+class _Band:
+    """What one band gave; tables, faces: one a material. faces: of the pixels its masks mark."""
+
+    tables: list[SampleTable]
+    faces: list[NDArray[np.int32]]
+    seen: int
+    lit: int
+    trusted: int
+    clipped: int
+
+
+def take_samples(
+    capture: Capture,
+    scan: Scan,
+    rays: RayScene,
+    photos: LitPhotos,
+    lights: Lights,
+    sinks: Mapping[str, Sequence[SampleSink]] | None = None,
+    threads: int | None = None,
+) -> Generator[float, None, Taken]:
+    """Yields the fraction done. sinks: who wants the samples of each material beside the reservoir;
+    they are called from this thread only. Raises InputError."""
+    count, names = len(capture.photos), [m.name for m in capture.materials]
+    taken = Taken(
+        kept={name: SampleReservoir(count) for name in names},
+        counts={name: np.zeros(count, np.int64) for name in names},
+        marked=dict.fromkeys(names, 0),
+        votes=FaceVotes.empty(len(scan.mesh.faces), len(names)),
+        seen=np.zeros(count, np.int64),
+        lit=np.zeros(count, np.int64),
+    )
+    wanted = {name: (taken.kept[name], *((sinks or {}).get(name, ()))) for name in names}
+    workers = thread_count(threads)
+
+    def open_shot(place: int) -> _Shot:
+        camera = capture_data.camera_of(capture, scan, place)
+        masks = capture_data.photo_masks(capture, place)
+        photo = photos.read(place)
+        light = lights.of(capture, place)
+        return _Shot(capture, scan, rays, light, place, PixelRays.of(camera), photo, masks)
+
+    with thread_pool(workers) as pool:
+        shots = ordered_map(pool, open_shot, range(count), ahead=1)
+        for place in range(count):
+            yield place / count
+            yield from _take_photo(next(shots), taken, wanted, pool, workers)
+    return taken
+
+
+def _take_photo(
+    shot: _Shot,
+    taken: Taken,
+    wanted: Mapping[str, Iterable[SampleSink]],
+    pool: ThreadPoolExecutor | None,
+    workers: int,
+) -> Generator[float, None, None]:
+    """The bands of one photo."""
+    capture, place = shot.capture, shot.place
+    camera, count = shot.lines.camera, len(capture.photos)
+    trusted = clipped = 0
+    faces: dict[str, list[NDArray[np.int32]]] = {m.name: [] for m in capture.materials}
+    columns = shot.rays.cover.columns(camera)
+    cut = list(bands(camera, halo(capture.fit.margins), columns))
+    results = ordered_map(pool, lambda window: _band(shot, window), cut, ahead=workers)
+    for window, band in zip(cut, results, strict=True):
+        taken.seen[place] += band.seen
+        taken.lit[place] += band.lit
+        trusted += band.trusted
+        clipped += band.clipped
+        for material, table, shown in zip(capture.materials, band.tables, band.faces, strict=True):
+            name = material.name
+            taken.counts[name][place] += len(table)
+            taken.marked[name] += len(shown)
+            if len(faces) > 1:  # of one material every face is
+                faces[name].append(shown)
+            for sink in wanted[name]:
+                if len(table):
+                    sink.add(place, table)
+        yield (place + window.last / camera.height) / count
+    for index, shown_by_band in enumerate(faces.values()):
+        if shown_by_band:
+            taken.votes.add(index, np.concatenate(shown_by_band))
+    if clipped > MANY_CLIPPED * trusted:
+        taken.notes[
+            "lit pixels are clipped and left out: highlights are missing; expose less, or "
+            "take a bracket"
+        ] += 1
+    taken.notes.update(shot.photo.notes)
+
+
+def _band(shot: _Shot, window: Window) -> _Band:
+    """The samples of one band."""
+    capture, margins = shot.capture, shot.capture.fit.margins
+    view = view_window(shot.rays, shot.lines, window)
+    wanted = np.zeros(len(view.pixel), bool)
+    wanted[view.wanted] = True
+    lighting = light_surface(shot.rays, view, shot.light, shot.lines.camera)
+    where, in_shadow = capture_data.material_pixels(
+        capture, shot.scan, view, shot.place, shot.masks
+    )
+    trusted = trusted_pixels(view, lighting, margins) & ~in_shadow & wanted
+    usable = shot.photo.usable.ravel().take(view.pixel)
+    keep = trusted & usable
+    tables, faces = [], []
+    for material in capture.materials:
+        pixels = where[material.name]
+        inner = inner_pixels(view, pixels, margins)
+        tables.append(
+            sample_photo(view, lighting, shot.photo.radiance, keep & inner, photo=shot.place)
+        )
+        faces.append(view.face[pixels & wanted])
+    return _Band(
+        tables=tables,
+        faces=faces,
+        seen=int(wanted.sum()),
+        lit=int((wanted & ~lighting.shadowed).sum()),
+        trusted=int(trusted.sum()),
+        clipped=int((trusted & ~usable).sum()),
+    )

@@ -1,0 +1,1 @@
+"""Robust statistics shared by fit, maps, masks and diagnosis."""

@@ -1,0 +1,1 @@
+"""What is written from Blender: .blend, glTF, USD, renders."""

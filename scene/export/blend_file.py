@@ -1,0 +1,101 @@
+"""Write a capture, or a whole result, as a .blend of its own (headless)."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from pathlib import Path
+
+import bpy
+
+from ...core.capture import Capture
+from ...core.errors import PatinaError
+from ...core.inputs.lights import Lights
+from ...core.jobs import CaptureResult, Stage
+from ...core.scan import Reconstruction, Scan
+from ..material import material_nodes, osl_files
+from ..material.measured_materials import measured_materials
+from ..scan.apply_result import apply_result
+from ..scan.scan_collection import ScanCollection, create_reconstruction, create_scan_collection
+
+RECTIFIED = "rectified"  # folder beside the .blend for resampled photos of distorted lenses
+
+
+def write_import(path: Path, final: Path, capture: Capture, scan: Scan, lights: Lights) -> None:
+    """Mesh, cameras with photos, lights. final: where the file will be moved to, with all that
+    lies beside it."""
+    _imported(path, capture, scan, lights)
+    save(path, final)
+
+
+def write_reconstruction(
+    path: Path,
+    final: Path,
+    found: Reconstruction,
+    images: Path | None,
+) -> None:
+    """Cameras and sparse points of a reconstruction that has no mesh yet."""
+    scene = _new_file()
+    create_reconstruction(scene, final.stem, found, images, path.parent / RECTIFIED)
+    save(path, final)
+
+
+def write_blend(
+    path: Path, final: Path, result: CaptureResult, stages: Sequence[Stage]
+) -> list[str]:
+    """A capture with the fitted materials on its mesh; returns notes for the user."""
+    _imported(path, result.capture, result.scan, result.lights)
+    save(path, final)  # the shader's EXRs go beside a saved file
+    notes = apply_result(bpy.context.scene, result, stages)
+    for material in measured_materials():
+        osl_files.lead_to(material, final.parent)
+    save(path, final)
+    return notes
+
+
+def _imported(path: Path, capture: Capture, scan: Scan, lights: Lights) -> ScanCollection:
+    scene = _new_file()
+    made = create_scan_collection(scene, capture, scan, lights, path.parent / RECTIFIED)
+    scene.patina.capture = str(capture.file)
+    scene.patina.mesh = made.mesh
+    return made
+
+
+def _new_file() -> bpy.types.Scene:
+    """An empty file with a black world, Cycles, and the photos' own transfer curve."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True, load_ui=False)
+    scene = bpy.context.scene
+    scene.world = bpy.data.worlds.new("Black")
+    if hasattr(scene.world, "use_nodes"):
+        scene.world.use_nodes = True
+    background = scene.world.node_tree.nodes.get("Background")
+    if background is not None:
+        background.inputs["Strength"].default_value = 0.0
+    if hasattr(scene, "cycles"):
+        scene.render.engine = "CYCLES"
+        scene.cycles.samples = 64
+        if material_nodes.osl_missing() is None:
+            scene.cycles.shading_system = True
+    scene.view_settings.view_transform = "Standard"  # as the photos are shown
+    return scene
+
+
+def save(path: Path, final: Path) -> None:
+    """Save with pictures by paths relative to ``final`` and without a .blend1."""
+    here, there = path.absolute().parent, final.absolute().parent
+    for image in bpy.data.images:
+        if image.source != "FILE" or image.filepath.startswith("//"):
+            continue  # no file of its own, or done at an earlier save
+        picture = Path(image.filepath)
+        if picture.is_relative_to(here):
+            picture = there / picture.relative_to(here)
+        image.filepath = str(picture)
+        with contextlib.suppress(ValueError):  # on another drive: stays absolute
+            image.filepath = bpy.path.relpath(str(picture), start=str(there))
+    try:
+        bpy.ops.wm.save_as_mainfile(
+            filepath=str(path), check_existing=False, compress=True, relative_remap=False
+        )
+    except RuntimeError as error:
+        raise PatinaError(f"{final}: cannot be written ({error})") from error
+    path.with_suffix(".blend1").unlink(missing_ok=True)

@@ -1,0 +1,40 @@
+"""GLB through Blender's own exporter: the portable output of every material, KHR extensions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import bpy
+
+from ...core.errors import PatinaError
+from .export_scene import select_only
+
+ADD_ON = "io_scene_gltf2"
+
+
+def write_glb(path: Path, objects: Sequence[bpy.types.Object]) -> None:
+    """Write the objects as one binary glTF; y up, as the format wants it."""
+    import addon_utils
+
+    if not hasattr(bpy.ops.export_scene, "gltf") or ADD_ON not in bpy.context.preferences.addons:
+        addon_utils.enable(ADD_ON)
+    select_only(objects)
+    try:
+        bpy.ops.export_scene.gltf(
+            filepath=str(path),
+            export_format="GLB",
+            use_selection=True,
+            export_yup=True,
+            export_apply=False,
+            export_cameras=False,
+            export_lights=False,
+            export_animations=False,
+            export_extras=False,
+            export_image_format="AUTO",
+        )
+    except (RuntimeError, AttributeError) as error:
+        said = " ".join(str(error).split())
+        raise PatinaError(f"{path.name}: Blender's glTF exporter failed ({said})") from error
+    if not path.is_file():
+        raise PatinaError(f"{path.name}: Blender's glTF exporter wrote nothing")

@@ -1,0 +1,121 @@
+"""The .blend that an exporter writes from: the scan's own, or a preview sphere a material."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import bpy
+
+from ...core.appearance.principled_fit import PrincipledFit
+from ...core.errors import PatinaError
+from ...core.export.subject import Subject
+from ..material import material_nodes, osl_files
+from ..property_keys import MEASURED_NAME
+
+RINGS, SEGMENTS = 48, 96
+SPACING = 2.5  # between the centres of preview spheres of radius 1
+
+
+def open_scan(file: Path, names: Sequence[str]) -> bpy.types.Object | None:
+    """Open a result's scene.blend; its scanned mesh, or None where it has none that wears all of
+    the named materials."""
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(file), load_ui=False, use_scripts=False)
+    except RuntimeError as error:
+        said = " ".join(str(error).split())
+        raise PatinaError(f"{file}: cannot be opened as a .blend ({said})") from error
+    mesh = bpy.context.scene.patina.mesh
+    if mesh is None or mesh.type != "MESH" or mesh.name not in bpy.context.scene.objects:
+        return None
+    worn = {slot.material.get(MEASURED_NAME) for slot in mesh.material_slots if slot.material}
+    if not set(names) <= worn:
+        return None
+    _show(mesh)
+    return mesh
+
+
+def _show(thing: bpy.types.Object) -> None:
+    """Exporters take nothing that is hidden, and the artist may have hidden it."""
+    thing.hide_viewport = False
+    if thing.name not in bpy.context.view_layer.objects:  # its collection is switched off
+        bpy.context.scene.collection.objects.link(thing)
+        bpy.context.view_layer.update()
+    thing.hide_set(False)
+    if not thing.visible_get() and thing.name not in bpy.context.scene.collection.objects:
+        bpy.context.scene.collection.objects.link(thing)
+        bpy.context.view_layer.update()
+
+
+def new_stage() -> bpy.types.Scene:
+    """An empty file with what factory settings enable."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True, load_ui=False)
+    scene = bpy.context.scene
+    if hasattr(scene, "cycles"):
+        scene.render.engine = "CYCLES"
+        if material_nodes.osl_missing() is None:
+            scene.cycles.shading_system = True
+    return scene
+
+
+def create_materials(
+    subjects: Sequence[Subject], whole: bool, stack: bool = True
+) -> list[bpy.types.Material]:
+    """The materials: whole as a fit makes them, or what exporters take of them alone; stack: with
+    the lobe stack that EEVEE shows, which takes seconds to fit."""
+    made = []
+    for subject in subjects:
+        item = subject.material
+        fit = PrincipledFit(
+            principled=item.principled,
+            error=item.principled_error,
+            diffuse_error=item.lambertian_error,
+            errors={},
+            start="",
+            clipped=False,
+        )
+        files, lobes = None, None
+        if whole:
+            lobes = subject.lobes if stack else None
+            if material_nodes.osl_missing() is None:
+                files = osl_files.ensure_files(item.brdf)
+        material = material_nodes.create_material(item.name, item.brdf, fit, files, lobes)
+        material[MEASURED_NAME] = item.name
+        made.append(material)
+    return made
+
+
+def preview_spheres(made: Sequence[bpy.types.Material]) -> list[bpy.types.Object]:
+    """A unit sphere with UVs for each material, in a row along x."""
+    scene, found = bpy.context.scene, []
+    for place, material in enumerate(made):
+        mesh = bpy.data.meshes.new(material.name)
+        sphere = bpy.data.objects.new(material.name, mesh)
+        fill_sphere(mesh)
+        mesh.materials.append(material)
+        sphere.location.x = SPACING * place
+        scene.collection.objects.link(sphere)
+        found.append(sphere)
+    bpy.context.view_layer.update()
+    return found
+
+
+def select_only(objects: Sequence[bpy.types.Object]) -> None:
+    """Exporters take what is selected."""
+    for item in bpy.context.view_layer.objects:
+        item.select_set(item in objects)
+    bpy.context.view_layer.objects.active = objects[0]
+
+
+def fill_sphere(mesh: bpy.types.Mesh, rings: int = RINGS, segments: int = SEGMENTS) -> None:
+    """Make a mesh a smooth unit sphere with UVs."""
+    import bmesh
+
+    shape = bmesh.new()
+    shape.loops.layers.uv.new("UVMap")
+    bmesh.ops.create_uvsphere(
+        shape, u_segments=segments, v_segments=rings, radius=1.0, calc_uvs=True
+    )
+    shape.to_mesh(mesh)
+    shape.free()
+    mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))

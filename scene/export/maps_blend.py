@@ -1,0 +1,193 @@
+"""Maps on the measured materials of a .blend.
+
+The portable branch gets them as image textures. Where a mesh has several materials, all of them
+wear the same maps, blended by the painted masks: a face still has one material slot, but its base
+colour, roughness, metallic and specular fade into the neighbour's within the masks' soft border, so
+no edge of a face shows. Inputs are blended rather than shaders: a Mix Shader is what no exporter
+keeps (glTF and USD know one surface a face), and within the few texels of a border the two look
+alike.
+
+The OSL branch takes a colour, BODY_SCALE, and a level, BODY, where its shader has such inputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.errors import PatinaError
+from ...core.jobs import Stage
+from ...core.maps.maps_job import MapsResult
+from ...core.maps.write import BLEND, MapFile
+from ..material import osl_files
+from ..material.material_nodes import fill_principled
+from ..material.measured_materials import measured_materials
+from ..material.packed_exr import write_packed
+from ..property_keys import MAP_KIND, MEASURED_NAME
+from ..scan.meshes import UV_LAYER
+from .blend_file import save, write_blend
+
+BODY, BODY_SCALE = "body", "body_scale"  # inputs of the OSL shader: D (1/sr) and its factor
+NORMAL = "Normal"  # input of the OSL shader and of the Principled
+SOCKETS = {
+    "base_color": "Base Color",
+    "roughness": "Roughness",
+    "metallic": "Metallic",
+    "specular": "Specular IOR Level",
+}
+
+
+def write_mapped_blend(
+    path: Path,
+    final: Path,
+    result: MapsResult,
+    files: Sequence[MapFile],
+    source: Path | None,
+    stages: Sequence[Stage],
+) -> list[str]:
+    """A scene with the maps on its materials, saved as ``path``; the maps lie beside it and move
+    with it to ``final``. The scene is that of the fit without paint, where there was one, else
+    ``source``, which a fit left; None: nothing is written. Returns notes for the user."""
+    notes: list[str] = []
+    if result.refit is not None:
+        notes += write_blend(path, final, result.refit, stages)
+    elif source is not None:
+        _open(source)
+        _own_shader_files(path, final)
+    else:
+        return ["the result has no scene.blend: the maps are on no material"]
+    notes += apply_maps(bpy.context.scene, result, path.parent, files)
+    save(path, final)
+    return notes
+
+
+def _open(source: Path) -> None:
+    """Open a .blend; its pictures by absolute paths, so that it can be saved elsewhere."""
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(source.resolve()), load_ui=False)
+    except RuntimeError as error:
+        raise PatinaError(f"{source}: cannot be opened ({error})") from error
+    for image in bpy.data.images:
+        own_file = image.source == "FILE" and image.packed_file is None
+        if own_file and image.filepath.startswith("//"):
+            image.filepath = bpy.path.abspath(image.filepath)
+
+
+def apply_maps(
+    scene: bpy.types.Scene, result: MapsResult, folder: Path, files: Sequence[MapFile]
+) -> list[str]:
+    """Put the maps in ``folder`` on the measured materials and the scanned mesh of a scene. Returns
+    notes for the user."""
+    notes = []
+    mesh = scene.patina.mesh
+    if mesh is None or mesh.type != "MESH":
+        notes.append("the scanned mesh is not in this scene: its UVs were not set")
+    elif not _set_uv(mesh.data, result):
+        notes.append(f"{mesh.name} no longer has the scan's faces: its UVs were not set")
+    several = len(result.materials) > 1
+    by_name = {str(m[MEASURED_NAME]): m for m in measured_materials()}
+    for index, fitted in enumerate(result.materials):
+        material = by_name.get(fitted.name)
+        if material is None:
+            notes.append(f"{fitted.name}: no such material in this scene, its maps are not used")
+            continue
+        own = {f.kind: f for f in files if f.material == (BLEND if several else fitted.name)}
+        own |= {f.kind: f for f in files if f.kind == "normal"}
+        scale = next(f for f in files if f.material == fitted.name and f.kind == "scale")
+        for shader in _principled(material):
+            fill_principled(shader, fitted.principled)
+        _wear(material, own, scale, result.levels[index].split.body, folder)
+    return notes
+
+
+def _principled(material: bpy.types.Material) -> list[bpy.types.Node]:
+    return [n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED"]
+
+
+def _wear(
+    material: bpy.types.Material,
+    own: dict[str, MapFile],
+    scale: MapFile,
+    body: np.ndarray,
+    folder: Path,
+) -> None:
+    tree = material.node_tree
+    for node in [n for n in tree.nodes if MAP_KIND in n]:
+        tree.nodes.remove(node)
+    place = tree.nodes.new("ShaderNodeUVMap")
+    place.uv_map, place.location, place[MAP_KIND] = UV_LAYER, (-900, -420), "uv"
+    shaders = _principled(material)
+    for number, (kind, socket) in enumerate(SOCKETS.items()):
+        if kind not in own or not shaders:
+            continue
+        node = _image_node(tree, own[kind], folder, place, (-640, -420 - 300 * number))
+        for shader in shaders:
+            tree.links.new(node.outputs["Color"], shader.inputs[socket])
+    bump = own.get("normal")
+    if bump is not None:
+        node = _image_node(tree, bump, folder, place, (-640, -1700))
+        turn = tree.nodes.new("ShaderNodeNormalMap")
+        turn.uv_map, turn.location, turn[MAP_KIND] = UV_LAYER, (-320, -1700), "normal"
+        tree.links.new(node.outputs["Color"], turn.inputs["Color"])
+        for shader in shaders:
+            tree.links.new(turn.outputs["Normal"], shader.inputs[NORMAL])
+        for script in osl_files.script_nodes(material):
+            tree.links.new(turn.outputs["Normal"], script.inputs[NORMAL])
+    scripts = [
+        n for n in osl_files.script_nodes(material)
+        if {BODY, BODY_SCALE} <= {s.identifier for s in n.inputs}
+    ]  # fmt: skip
+    if scripts:
+        node = _image_node(tree, scale, folder, place, (-640, 420))
+        for script in scripts:
+            sockets = {s.identifier: s for s in script.inputs}
+            value = [float(v) for v in body]
+            sockets[BODY].default_value = (
+                value if len(sockets[BODY].default_value) == 3 else (*value, 1.0)
+            )
+            tree.links.new(node.outputs["Color"], sockets[BODY_SCALE])
+
+
+def _image_node(
+    tree: bpy.types.NodeTree,
+    file: MapFile,
+    folder: Path,
+    place: bpy.types.Node,
+    location: tuple[float, float],
+) -> bpy.types.Node:
+    image = bpy.data.images.load(str((folder / file.file).absolute()), check_existing=True)
+    linear = file.file.endswith(".exr")
+    image.colorspace_settings.name = (
+        "Non-Color" if not file.colour else "Linear Rec.709" if linear else "sRGB"
+    )
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image, node.label, node.location = image, file.kind.replace("_", " "), location
+    node[MAP_KIND] = file.kind
+    tree.links.new(place.outputs["UV"], node.inputs["Vector"])
+    return node
+
+
+def _set_uv(data: bpy.types.Mesh, result: MapsResult) -> bool:
+    """Write the texture coordinates that the maps are in; False where the faces are others."""
+    uv = result.scan.mesh.uv
+    if uv is None or len(data.polygons) != len(uv) or len(data.loops) != 3 * len(uv):
+        return False
+    layer = data.uv_layers.get(UV_LAYER) or data.uv_layers.new(name=UV_LAYER, do_init=False)
+    layer.uv.foreach_set("vector", uv.astype(np.float32).ravel())
+    layer.active = layer.active_render = True
+    data.update()
+    return True
+
+
+def _own_shader_files(path: Path, final: Path) -> None:
+    """Put the shader's EXRs, which travel packed, beside the new file; point its nodes there."""
+
+    def moved(file: Path) -> bool:
+        image = bpy.data.images.get(file.name)
+        return write_packed(image, path.parent / file.name)
+
+    for material in measured_materials():
+        osl_files.lead_to(material, final.parent, moved)

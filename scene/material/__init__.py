@@ -1,0 +1,1 @@
+"""Measured materials in Blender: nodes, shader files, traits, assets."""

@@ -1,0 +1,100 @@
+"""Where the measured shader cannot run, Cycles gets the portable material, visibly.
+
+Cycles renders a script node as black when Open Shading Language is off, and on a GPU. The output
+for Cycles is led from the portable branch then, and back again when the shader can run.
+"""
+
+from __future__ import annotations
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..session.handlers import attach, detach
+from .material_nodes import osl_missing
+from .osl_files import own_materials, script_nodes
+
+
+def osl_hindrance(scene: bpy.types.Scene) -> str | None:
+    """Why this scene's renders do not show the measured shader, for the user; or None."""
+    missing = osl_missing()
+    if missing is not None:
+        return missing
+    if scene.render.engine != "CYCLES":
+        return "Cycles alone shows the measurement: this scene renders with another engine"
+    if scene.cycles.device == "GPU" and _gpu_chosen():
+        return "Cycles renders on the GPU: the measurement needs the CPU (Render properties)"
+    if not scene.cycles.shading_system:
+        return "Open Shading Language is off: switch it on in the Render properties"
+    return None
+
+
+def update_fallback(scene: bpy.types.Scene) -> int:
+    """Lead each Patina material's output for Cycles from what can run; returns how many changed."""
+    if scene.render.engine != "CYCLES":
+        return 0  # other engines have outputs of their own
+    runs = osl_hindrance(scene) is None
+    return sum(
+        _lead(material, node, runs)
+        for material in own_materials()
+        for node in script_nodes(material)[:1]
+    )
+
+
+def _lead(material: bpy.types.Material, measured: bpy.types.Node, runs: bool) -> bool:
+    tree = material.node_tree
+    outputs = {n.target: n for n in tree.nodes if n.type == "OUTPUT_MATERIAL"}
+    portable = next(
+        (
+            outputs[target].inputs["Surface"].links[0].from_node
+            for target in ("EEVEE", "ALL")
+            if target in outputs and outputs[target].inputs["Surface"].links
+        ),
+        None,
+    )
+    links = outputs["CYCLES"].inputs["Surface"].links if "CYCLES" in outputs else ()
+    if portable is None or not links:
+        return False
+    now, wanted = links[0].from_node, measured if runs else portable
+    if now not in (measured, portable) or now == wanted:  # the artist's own wiring stays
+        return False
+    tree.links.new(wanted.outputs["BSDF"], outputs["CYCLES"].inputs["Surface"])
+    return True
+
+
+def _gpu_chosen() -> bool:
+    """True where the preferences name a device that "GPU" would mean."""
+    cycles = bpy.context.preferences.addons.get("cycles")
+    return cycles is not None and cycles.preferences.compute_device_type != "NONE"
+
+
+@persistent
+def _after_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if any(isinstance(update.id, bpy.types.Scene) for update in depsgraph.updates):
+        update_fallback(scene)
+
+
+@persistent
+def _after_load(*_: object) -> None:
+    update_fallback(bpy.context.scene)
+
+
+@persistent
+def _before_render(scene: bpy.types.Scene, *_: object) -> None:
+    update_fallback(scene)
+
+
+HANDLERS = (
+    ("depsgraph_update_post", _after_update),
+    ("load_post", _after_load),
+    ("render_pre", _before_render),
+)
+
+
+def register() -> None:
+    """Follow the scene's render settings from now on."""
+    attach(HANDLERS)
+
+
+def unregister() -> None:
+    """Leave nothing behind."""
+    detach(HANDLERS)

@@ -1,0 +1,279 @@
+"""The lobe stack as a node group of stock nodes: Cycles renders what core's LobeStack computes.
+
+A lobe is a Principled BSDF that is all metal: its Fresnel is Schlick's from the base colour f0/f90
+to white, and what weights it by f90 is the tint of a coat that reflects nothing (IOR 1), seen under
+the thickness 1/cosθ that Blender gives it and therefore raised to cosθ first. What lies below is
+mixed in by 1 − albedo, the formula of lobe_stack.albedo_fit node by node. EEVEE has the same nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...core.appearance.lobe_stack import ALBEDO_FIT, MOST_LOBES, Lobe, LobeStack
+from ..property_keys import LOBE_GROUP_LAYOUT
+
+NAME = "Patina Lobe Stack"
+LOBE_NAME = "Patina Lobe"
+LAYOUT = 1
+COLOURS = ("", " Mid", " Edge")  # facing the viewer, midway, at the silhouette
+
+
+def add_lobe_stack(
+    tree: bpy.types.NodeTree, stack: LobeStack, location: tuple[float, float] = (0, 0)
+) -> bpy.types.Node:
+    """A node of the group in ``tree``, its inputs set to the stack; output 'BSDF'."""
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = stack_group()
+    node.width, node.location = 240, location
+    fill_lobe_stack(node, stack)
+    return node
+
+
+def fill_lobe_stack(node: bpy.types.Node, stack: LobeStack) -> None:
+    """Set the inputs of the group's node; lobes that the stack has not get black."""
+    for name, color in (
+        ("", stack.diffuse),
+        (" Mid", stack.diffuse_mid),
+        (" Edge", stack.diffuse_edge),
+    ):
+        value = stack.diffuse if color is None else color
+        node.inputs[f"Diffuse Color{name}"].default_value = _rgba(value)
+    node.inputs["Diffuse Roughness"].default_value = float(stack.diffuse_roughness)
+    black = Lobe(np.zeros(3), np.zeros(3), 0.5)
+    lobes = (*stack.lobes, *(black for _ in range(MOST_LOBES - len(stack.lobes))))
+    for place, lobe in enumerate(lobes, 1):
+        for name, color in (("", lobe.f0), (" Mid", lobe.f0_mid), (" Edge", lobe.f0_edge)):
+            value = lobe.f0 if color is None else color
+            node.inputs[f"Lobe {place} F0{name}"].default_value = _rgba(value)
+        node.inputs[f"Lobe {place} F90"].default_value = _rgba(lobe.f90)
+        node.inputs[f"Lobe {place} Roughness"].default_value = float(lobe.roughness)
+
+
+def stack_group() -> bpy.types.NodeTree:
+    """The group of the whole stack; made once a .blend."""
+    return _existing(NAME) or _make_stack()
+
+
+def _existing(name: str) -> bpy.types.NodeTree | None:
+    for group in bpy.data.node_groups:
+        if group.get(LOBE_GROUP_LAYOUT) == LAYOUT and group.name.split(".")[0] == name:
+            return group
+    return None
+
+
+def _new_group(name: str) -> bpy.types.NodeTree:
+    group = bpy.data.node_groups.new(name, "ShaderNodeTree")
+    group[LOBE_GROUP_LAYOUT] = LAYOUT
+    return group
+
+
+def _make_stack() -> bpy.types.NodeTree:
+    group = _new_group(NAME)
+    _socket(group, "BSDF", "NodeSocketShader", output=True)
+    for name in COLOURS:
+        _color(group, f"Diffuse Color{name}", 0.5)
+    _fraction(group, "Diffuse Roughness", 0.0)
+    for place in range(1, MOST_LOBES + 1):
+        for name in COLOURS:
+            _color(group, f"Lobe {place} F0{name}", 0.0)
+        _color(group, f"Lobe {place} F90", 0.0)
+        _fraction(group, f"Lobe {place} Roughness", 0.5)
+    _normal(group)
+    wiring = _Wiring(group)
+    normal = wiring.normal()
+    colours = [wiring.given(f"Diffuse Color{name}") for name in COLOURS]
+    below = wiring.node(
+        "ShaderNodeBsdfDiffuse",
+        Color=_blended(wiring, wiring.cosine(normal), colours),
+        Roughness=wiring.given("Diffuse Roughness"),
+        Normal=normal,
+    ).outputs[0]
+    for place in range(MOST_LOBES, 0, -1):
+        lobe = wiring.node("ShaderNodeGroup", tree=_existing(LOBE_NAME) or _make_lobe())
+        for name in ("F0", "F0 Mid", "F0 Edge", "F90", "Roughness"):
+            wiring.link(wiring.given(f"Lobe {place} {name}"), lobe.inputs[name])
+        wiring.link(normal, lobe.inputs["Normal"])
+        wiring.link(below, lobe.inputs["Below"])
+        below = lobe.outputs["BSDF"]
+    wiring.finish(below)
+    return group
+
+
+def _make_lobe() -> bpy.types.NodeTree:
+    group = _new_group(LOBE_NAME)
+    _socket(group, "BSDF", "NodeSocketShader", output=True)
+    _socket(group, "Below", "NodeSocketShader")
+    for name in COLOURS:
+        _color(group, f"F0{name}", 0.04)
+    _color(group, "F90", 1.0)
+    _fraction(group, "Roughness", 0.5)
+    _normal(group)
+    w = _Wiring(group)
+    normal, f90 = w.normal(), w.given("F90")
+    cosine = w.cosine(normal)
+    f0 = _blended(w, cosine, [w.given(f"F0{name}") for name in COLOURS])
+    at_0, at_90 = _albedo(w, cosine, w.math("MULTIPLY", w.given("Roughness"), w.given("Roughness")))
+    albedo = w.vector("ADD", w.vector("SCALE", f0, scale=at_0), w.vector("SCALE", f90, scale=at_90))
+    red, green, blue = w.node("ShaderNodeSeparateXYZ", Vector=albedo).outputs
+    brightest = w.math("MAXIMUM", w.math("MAXIMUM", red, green), blue)
+    passed = w.math("SUBTRACT", 1.0, brightest, clamp=True)
+    # Mix Shader: the first shader stays unlinked, so the second one is scaled
+    below = w.node("ShaderNodeMixShader")
+    w.link(passed, below.inputs[0])
+    w.link(w.given("Below"), below.inputs[2])
+    tint = w.node("ShaderNodeCombineXYZ")
+    for channel, part in enumerate(w.node("ShaderNodeSeparateXYZ", Vector=f90).outputs):
+        w.link(w.math("POWER", part, cosine), tint.inputs[channel])
+    lobe = w.node(
+        "ShaderNodeBsdfPrincipled",
+        Base_Color=w.vector("DIVIDE", f0, f90),
+        Roughness=w.given("Roughness"),
+        Normal=normal,
+        Coat_Tint=tint.outputs[0],
+        Coat_Normal=normal,
+    )
+    lobe.distribution = "GGX"
+    for name, value in (("Metallic", 1.0), ("Coat Weight", 1.0), ("Coat IOR", 1.0),
+                        ("Coat Roughness", 1.0)):  # fmt: skip
+        lobe.inputs[name].default_value = value
+    both = w.node("ShaderNodeAddShader")
+    w.link(lobe.outputs[0], both.inputs[0])
+    w.link(below.outputs[0], both.inputs[1])
+    w.finish(both.outputs[0])
+    return group
+
+
+def _blended(
+    w: _Wiring, cosine: bpy.types.NodeSocket, colours: Sequence[bpy.types.NodeSocket]
+) -> bpy.types.NodeSocket:
+    """lobe_stack.blended: the colour towards a viewer at this cosine."""
+    x = w.math("SUBTRACT", 1.0, cosine)
+    y = w.math("MULTIPLY", x, x)
+    rest = w.math("SUBTRACT", 1.0, y)
+    shares = (
+        w.math("MULTIPLY", rest, rest),
+        w.math("MULTIPLY", w.math("MULTIPLY", 2.0, y), rest),
+        w.math("MULTIPLY", y, y),
+    )
+    a, b, c = (w.vector("SCALE", v, scale=s) for v, s in zip(colours, shares, strict=True))
+    return w.vector("ADD", w.vector("ADD", a, b), c)
+
+
+def _albedo(w: _Wiring, x: bpy.types.NodeSocket, y: bpy.types.NodeSocket) -> tuple:
+    """What multiplies f0 and f90 in the directional albedo; x: cosθ, y: α."""
+    x2, y2 = w.math("MULTIPLY", x, x), w.math("MULTIPLY", y, y)
+    terms = [
+        x, y, w.math("MULTIPLY", x, y), x2, y2,
+        w.math("MULTIPLY", x2, y), w.math("MULTIPLY", x, y2), w.math("MULTIPLY", x2, y2),
+    ]  # fmt: skip
+    sums: list[bpy.types.NodeSocket | float] = list(ALBEDO_FIT[0])
+    for row, term in zip(ALBEDO_FIT[1:], terms, strict=True):
+        sums = [w.math("MULTIPLY_ADD", term, c, s) for c, s in zip(row, sums, strict=True)]
+    a, b, c, d = sums
+    return w.math("DIVIDE", a, c, clamp=True), w.math("DIVIDE", b, d, clamp=True)
+
+
+@dataclass
+class _Wiring:
+    """Adds nodes to a group in the order of the calls, from left to right."""
+
+    group: bpy.types.NodeTree
+    count: int = 0
+
+    def __post_init__(self) -> None:
+        self.entry = self.group.nodes.new("NodeGroupInput")
+        self.entry.location = (-300, 0)
+
+    def given(self, name: str) -> bpy.types.NodeSocket:
+        return self.entry.outputs[name]
+
+    def link(self, source: bpy.types.NodeSocket, target: bpy.types.NodeSocket) -> None:
+        self.group.links.new(source, target)
+
+    def node(
+        self, kind: str, tree: bpy.types.NodeTree | None = None, **links: bpy.types.NodeSocket
+    ) -> bpy.types.Node:
+        """A node; links: what goes into its inputs, by their names with _ for a blank."""
+        node = self.group.nodes.new(kind)
+        node.location = (40 * self.count, -60 * (self.count % 12))
+        self.count += 1
+        if tree is not None:
+            node.node_tree = tree
+        for name, source in links.items():
+            self.link(source, node.inputs[name.replace("_", " ")])
+        return node
+
+    def math(
+        self, operation: str, *values: bpy.types.NodeSocket | float, clamp: bool = False
+    ) -> bpy.types.NodeSocket:
+        node = self.node("ShaderNodeMath")
+        node.operation, node.use_clamp, node.hide = operation, clamp, True
+        self._enter(node, values)
+        return node.outputs[0]
+
+    def vector(
+        self, operation: str, *values: bpy.types.NodeSocket,
+        scale: bpy.types.NodeSocket | None = None,
+    ) -> bpy.types.NodeSocket:  # fmt: skip
+        node = self.node("ShaderNodeVectorMath")
+        node.operation, node.hide = operation, True
+        self._enter(node, values)
+        if scale is not None:
+            self.link(scale, node.inputs["Scale"])
+        return node.outputs["Value" if operation in ("DOT_PRODUCT", "LENGTH") else "Vector"]
+
+    def normal(self) -> bpy.types.NodeSocket:
+        """The input Normal, or the surface's own where nothing is plugged in (length 0)."""
+        given = self.given("Normal")
+        absent = self.math("LESS_THAN", self.vector("LENGTH", given), 1e-3)
+        own = self.node("ShaderNodeNewGeometry").outputs["Normal"]
+        return self.vector("ADD", given, self.vector("SCALE", own, scale=absent))
+
+    def cosine(self, normal: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+        """Of the view against the normal, never quite 0."""
+        incoming = self.node("ShaderNodeNewGeometry").outputs["Incoming"]
+        cosine = self.vector("DOT_PRODUCT", incoming, normal)
+        return self.math("MINIMUM", self.math("MAXIMUM", cosine, 1e-4), 1.0)
+
+    def finish(self, shader: bpy.types.NodeSocket) -> None:
+        end = self.node("NodeGroupOutput")
+        self.link(shader, end.inputs["BSDF"])
+
+    def _enter(self, node: bpy.types.Node, values: Sequence[bpy.types.NodeSocket | float]) -> None:
+        for socket, value in zip(node.inputs, values, strict=False):
+            if isinstance(value, bpy.types.NodeSocket):
+                self.link(value, socket)
+            else:
+                socket.default_value = value
+
+
+def _socket(
+    group: bpy.types.NodeTree, name: str, kind: str, output: bool = False
+) -> bpy.types.NodeTreeInterfaceSocket:
+    return group.interface.new_socket(
+        name, in_out="OUTPUT" if output else "INPUT", socket_type=kind
+    )
+
+
+def _color(group: bpy.types.NodeTree, name: str, grey: float) -> None:
+    _socket(group, name, "NodeSocketColor").default_value = (grey, grey, grey, 1.0)
+
+
+def _fraction(group: bpy.types.NodeTree, name: str, value: float) -> None:
+    socket = _socket(group, name, "NodeSocketFloat")
+    socket.subtype, socket.min_value, socket.max_value = "FACTOR", 0.0, 1.0
+    socket.default_value = value
+
+
+def _normal(group: bpy.types.NodeTree) -> None:
+    _socket(group, "Normal", "NodeSocketVector").hide_value = True
+
+
+def _rgba(color: np.ndarray) -> tuple[float, float, float, float]:
+    red, green, blue = (float(c) for c in color)
+    return red, green, blue, 1.0

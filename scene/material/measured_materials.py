@@ -1,0 +1,17 @@
+"""The materials of this .blend that a fit made."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..property_keys import CAPTURE, MEASURED_NAME
+
+
+def measured_materials() -> list[bpy.types.Material]:
+    """The materials that a fit made, by name."""
+    return sorted((m for m in bpy.data.materials if MEASURED_NAME in m), key=lambda m: m.name)
+
+
+def measured_of(capture: str) -> dict[str, bpy.types.Material]:
+    """Name in the capture → material, of one capture."""
+    return {m[MEASURED_NAME]: m for m in measured_materials() if m.get(CAPTURE) == capture}

@@ -1,0 +1,253 @@
+"""The shader's EXRs: where they lie, and how they come back when the .blend has moved.
+
+OSL reads pictures by their path, so the files must exist on disk: beside a saved .blend, else in
+the extension's own folder. Packed copies travel inside the .blend (Image data-blocks that a fake
+user keeps) and are written out again on load where the path no longer leads to them.
+
+A .blend may come from anybody: its names and packed bytes are checked before anything is written.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+from numpy.typing import NDArray
+
+from ...core.appearance import osl_atlas, sampling_table
+from ...core.appearance.closure_split import ClosureSplit, split
+from ...core.appearance.osl_source import COMPONENTS, REMAINDER, SAMPLING
+from ...core.basis import PrincipalBRDF
+from ...core.concurrency.steps import drained
+from ..property_keys import COMPONENTS_FILE, MEASURED_SAMPLING_FILE, REMAINDER_FILE, SAMPLING_FILE
+from ..session.folders import blend_folder
+from ..session.handlers import attach, detach
+from .packed_exr import is_regular_file, write_packed
+
+log = logging.getLogger(__name__)
+
+SOCKET = COMPONENTS
+PROPERTIES = {
+    COMPONENTS: COMPONENTS_FILE,
+    REMAINDER: REMAINDER_FILE,
+    SAMPLING: SAMPLING_FILE,
+}
+"""Socket → property of the material that names its file."""
+OWN_PREFIXES = (osl_atlas.REMAINDER_PREFIX, osl_atlas.SAMPLING_PREFIX)
+
+
+@dataclass(frozen=True)
+class ShaderFiles:
+    """paths: socket → EXR; alphas: of the GGX lobes that Cycles samples."""
+
+    paths: dict[str, Path]
+    alphas: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class ShaderTables:
+    """parts: the split into closures; texels: the sampling table as its picture has it."""
+
+    parts: ClosureSplit
+    texels: NDArray[np.float32]
+
+
+def shader_tables(brdf: PrincipalBRDF) -> ShaderTables:
+    """A second's work. Knows nothing of Blender: other threads may ask."""
+    parts = split(brdf.evaluate)
+    table = sampling_table.sampling_table(brdf.evaluate, parts)
+    return ShaderTables(parts, sampling_table.texels(parts, table))
+
+
+def ensure_files(brdf: PrincipalBRDF, tables: ShaderTables | None = None) -> ShaderFiles:
+    """A BRDF's EXRs: on disk where this .blend expects them, and packed into it. tables: where they
+    were made before."""
+    return drained(ensuring_files(brdf, tables))
+
+
+def ensuring_files(
+    brdf: PrincipalBRDF, tables: ShaderTables | None = None
+) -> Generator[None, None, ShaderFiles]:
+    """``ensure_files``, a file at a time."""
+    made = tables or shader_tables(brdf)
+    basis = brdf.basis
+    wanted = (
+        (COMPONENTS, osl_atlas.components_name(basis),
+         lambda path: osl_atlas.write_components(path, basis)),
+        (REMAINDER, osl_atlas.remainder_name(brdf),
+         lambda path: osl_atlas.write_remainder(path, brdf)),
+        (SAMPLING, osl_atlas.sampling_name(brdf),
+         lambda path: osl_atlas.write_picture(path, made.texels)),
+    )  # fmt: skip
+    paths = {}
+    for socket, name, write in wanted:
+        paths[socket] = _ensure(name, write)
+        yield
+    first, second, third = (float(a) for a in made.parts.alpha)
+    return ShaderFiles(paths, (first, second, third))
+
+
+def _ensure(name: str, write: Callable[[Path], object]) -> Path:
+    path = blend_folder() / name
+    if not is_regular_file(path) and not write_packed(bpy.data.images.get(name), path):
+        write(path)
+    pack(path)
+    return path
+
+
+def file_sockets(node: bpy.types.Node) -> list[bpy.types.NodeSocket]:
+    """The inputs of a Patina shader that name a file."""
+    return [socket for socket in node.inputs if socket.identifier in PROPERTIES]
+
+
+def drop_unused() -> None:
+    """Forget the packed files of materials that are gone; files on disk stay."""
+    named = [m.get(key) for m in bpy.data.materials for key in _kept_names()]
+    needed = {name for name in named if osl_atlas.is_own_name(name)}
+    for image in [i for i in bpy.data.images if i.name.startswith(OWN_PREFIXES)]:
+        if image.name not in needed and image.users <= int(image.use_fake_user):
+            bpy.data.images.remove(image)
+
+
+def _kept_names() -> tuple[str, ...]:
+    """The properties of a material that name files."""
+    return *PROPERTIES.values(), MEASURED_SAMPLING_FILE
+
+
+def pack(path: Path) -> bpy.types.Image:
+    """The file's bytes as a packed Image of its name; packed once."""
+    image = bpy.data.images.get(path.name)
+    if image is None:
+        image = bpy.data.images.load(str(path))
+        image.name = path.name
+        image.colorspace_settings.name = "Non-Color"
+    if image.packed_file is None:
+        with open(path, "rb") as file:
+            data = file.read()
+        image.pack(data=data, data_len=len(data))
+    image.use_fake_user = True
+    return image
+
+
+def restore() -> list[str]:
+    """Point every Patina material at its files, writing packed ones out where they are missing.
+
+    Returns the names of materials with a file that is neither on disk nor in the .blend.
+    """
+    missing = []
+    for material in own_materials():
+        found = [
+            read_again(socket, material.get(PROPERTIES[socket.identifier]))
+            for node in script_nodes(material)
+            for socket in file_sockets(node)
+        ]
+        if not all(found):
+            missing.append(material.name)
+    for name in missing:
+        log.warning("%s: an EXR of its shader is gone; make the material again", name)
+    return missing
+
+
+def read_again(socket: bpy.types.NodeSocket, name: object) -> bool:
+    """Lead a socket whose file is gone to the packed one of that name; True where it names a file
+    that is there, now or again. Names that are not Patina's own are refused."""
+    if is_trusted_path(socket.default_value):
+        return True
+    if not name:
+        return False
+    if not osl_atlas.is_own_name(name):
+        _warn_of_name(name)
+        return False
+    path = blend_folder() / name
+    if is_regular_file(path) or write_packed(bpy.data.images.get(name), path):
+        socket.default_value = path.as_posix()
+        return True
+    return False
+
+
+def is_trusted_path(path: str) -> bool:
+    """Whether a path from a .blend leads to one of Patina's EXRs. A network path is not even looked
+    at: on Windows that would send the user's credentials to the server it names."""
+    if path.startswith(("//", "\\\\")) or not osl_atlas.is_own_name(re.split(r"[\\/]", path)[-1]):
+        return False
+    return is_regular_file(Path(path))
+
+
+def _warn_of_name(name: object) -> None:
+    log.warning(
+        "the .blend names %.200r as a file of a Patina shader, which Patina never does: nothing is "
+        "written; if you trust the .blend, fit the material again",
+        name,
+    )
+
+
+def script_nodes(material: bpy.types.Material) -> list[bpy.types.Node]:
+    """The material's Patina shaders."""
+    if material.node_tree is None:
+        return []
+    return [
+        node
+        for node in material.node_tree.nodes
+        if node.bl_idname == "ShaderNodeScript" and SOCKET in node.inputs
+    ]
+
+
+def own_materials() -> list[bpy.types.Material]:
+    """The materials of this .blend that have a Patina shader."""
+    return [m for m in bpy.data.materials if COMPONENTS_FILE in m and m.library is None]
+
+
+def own_shaders() -> list[bpy.types.Node]:
+    """The shaders of all of them."""
+    return [node for material in own_materials() for node in script_nodes(material)]
+
+
+def lead_to(
+    material: bpy.types.Material, folder: Path, moved: Callable[[Path], bool] = lambda file: True
+) -> list[Path]:
+    """Make the material's shaders read those of their EXRs that are ``moved`` from the folder;
+    returns where they read them from until now."""
+    sockets = [s for node in script_nodes(material) for s in file_sockets(node)]
+    old = [Path(socket.default_value) for socket in sockets]
+    for socket, file in zip(sockets, old, strict=True):
+        if moved(file):
+            socket.default_value = (folder.absolute() / file.name).as_posix()
+    return old
+
+
+@persistent
+def _after_load(*_: object) -> None:
+    restore()
+
+
+@persistent
+def _after_save(*_: object) -> None:
+    """A first save gives the .blend a folder: the files follow it there."""
+    for material in bpy.data.materials:
+        for key in _kept_names():
+            name = material.get(key)
+            if not name:
+                continue
+            if not osl_atlas.is_own_name(name):
+                _warn_of_name(name)
+            elif not is_regular_file(blend_folder() / name):
+                write_packed(bpy.data.images.get(name), blend_folder() / name)
+
+
+HANDLERS = (("load_post", _after_load), ("save_post", _after_save))
+
+
+def register() -> None:
+    """Watch for loading and saving."""
+    attach(HANDLERS)
+
+
+def unregister() -> None:
+    """Leave nothing behind."""
+    detach(HANDLERS)

@@ -1,0 +1,1 @@
+"""Masks and materials painted on the mesh and on photos."""

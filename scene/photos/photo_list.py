@@ -1,0 +1,201 @@
+"""The lit photos of a scene as a list: which camera, which light, and what is shown of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import bpy
+
+from ...core.capture.entries import PhotoEntry
+from ..property_keys import CAPTURE, LIGHT_NAME, LIT_PHOTO, LIT_PHOTO_INDEX
+from ..session.handlers import attach, detach
+from ..session.scene_properties import capture_path
+from . import cameras, lamps
+from .exposed_photo import exposed
+
+
+class PatinaPhoto(bpy.types.PropertyGroup):
+    """A lit photo; ``name`` is its file's. Several may share a camera, each under its own light."""
+
+    place: bpy.props.IntProperty(name="Place", description="In the capture")  # type: ignore[valid-type]
+    camera: bpy.props.PointerProperty(  # type: ignore[valid-type]
+        name="Camera", description="Where it was taken from", type=bpy.types.Object
+    )
+    image: bpy.props.PointerProperty(  # type: ignore[valid-type]
+        name="Photo", description="As it is shown behind the mesh", type=bpy.types.Image
+    )
+    light: bpy.props.StringProperty(name="Light", description="Which lamp was on")  # type: ignore[valid-type]
+    exposure: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Exposure",
+        description="What the capture says that the photo's pixels are divided by; 0: the file's "
+        "own data say it",
+    )
+
+
+def _look(state: PatinaPhotos, context: bpy.types.Context) -> None:
+    if 0 <= state.active < len(state.photos):
+        look_at(state.id_data, state.photos[state.active])
+
+
+def _expose(state: PatinaPhotos, context: bpy.types.Context) -> None:
+    photo = looked_at(state.id_data)
+    if photo is not None:
+        _put_behind(photo, state)
+
+
+def _mix(state: PatinaPhotos, context: bpy.types.Context) -> None:
+    _blend(state.id_data)
+
+
+class PatinaPhotos(bpy.types.PropertyGroup):
+    """Scene.patina_photos."""
+
+    photos: bpy.props.CollectionProperty(type=PatinaPhoto)  # type: ignore[valid-type]
+    active: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Lit Photo",
+        description="Look through the camera of this photo, its lamp switched on",
+        min=0,
+        update=_look,
+    )
+    mesh_over: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Mesh over Photo",
+        description="How much of the mesh is seen over the photo behind it: 0 shows the photo "
+        "alone, 1 the mesh alone where it is",
+        subtype="FACTOR",
+        min=0.0,
+        max=1.0,
+        default=1.0,
+        update=_mix,
+    )
+    view_exposure: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Exposure for Looking",
+        description="How much brighter the photo behind the mesh is shown, in stops; nothing that "
+        "is measured sees it",
+        min=-10.0,
+        max=10.0,
+        soft_min=-5.0,
+        soft_max=5.0,
+        step=10,
+        precision=1,
+        options=set(),
+        update=_expose,
+    )
+
+
+@dataclass(frozen=True)
+class LitPhoto:
+    """One line of the list to be."""
+
+    camera: bpy.types.Object
+    image: bpy.types.Image
+    entry: PhotoEntry
+
+
+def list_photos(scene: bpy.types.Scene, photos: Sequence[LitPhoto]) -> None:
+    """Fill the list, in the capture's order; the first photo is looked at."""
+    state = scene.patina_photos
+    state.photos.clear()
+    for place, photo in enumerate(photos):
+        line = state.photos.add()
+        line.name, line.place = photo.entry.file.name, place
+        line.camera, line.image, line.light = photo.camera, photo.image, photo.entry.light
+        line.exposure = photo.entry.exposures[0] if photo.entry.exposures else 0.0
+        _with_thumbnail(photo.image)
+    state.active = 0  # which looks at it
+
+
+def lit_photos(scene: bpy.types.Scene) -> list[PatinaPhoto]:
+    """Those whose camera is still in the scene."""
+    return [photo for photo in scene.patina_photos.photos if has_camera(scene, photo)]
+
+
+def has_camera(scene: bpy.types.Scene, photo: PatinaPhoto) -> bool:
+    """Whether it can be looked at."""
+    return photo.camera is not None and photo.camera.name in scene.objects
+
+
+def looked_at(scene: bpy.types.Scene) -> PatinaPhoto | None:
+    """The photo that is looked at, None where the scene's camera is no photo's."""
+    photos, line = scene.patina_photos.photos, scene.patina_photos.active
+    if not 0 <= line < len(photos) or scene.camera is None:
+        return None
+    return photos[line] if photos[line].camera == scene.camera else None
+
+
+def look_at(scene: bpy.types.Scene, photo: PatinaPhoto) -> None:
+    """Through its camera, the photo behind the mesh, its lamp alone switched on."""
+    camera = photo.camera
+    if not has_camera(scene, photo):
+        return
+    _put_behind(photo, scene.patina_photos)
+    mark_lit(camera, photo.name, photo.place, photo.light)
+    cameras.look_through(scene, camera)
+    lamps.shine_only(scene, camera)
+    _blend(scene)
+
+
+def _put_behind(photo: PatinaPhoto, state: PatinaPhotos) -> None:
+    """Behind its camera's view, as bright as is asked for."""
+    behind = photo.camera.data.background_images
+    if len(behind) and photo.image is not None:
+        behind[-1].image = exposed(photo.image, state.view_exposure)
+
+
+def _blend(scene: bpy.types.Scene) -> None:
+    """The photo of the scene's camera before or behind the mesh, as much as is asked for."""
+    camera = scene.camera
+    if camera is None or camera.type != "CAMERA" or not len(camera.data.background_images):
+        return
+    photo, share = camera.data.background_images[-1], scene.patina_photos.mesh_over
+    photo.display_depth = "BACK" if share >= 1.0 else "FRONT"
+    photo.alpha = 1.0 if share >= 1.0 else 1.0 - share
+
+
+def mark_lit(camera: bpy.types.Object, name: str, place: int, light: str) -> None:
+    """Say on a camera which lit photo is behind it."""
+    camera[LIT_PHOTO], camera[LIT_PHOTO_INDEX], camera[LIGHT_NAME] = name, place, light
+
+
+def _with_thumbnail(image: bpy.types.Image | None) -> None:
+    """A list shows what is there: Blender draws it in the background."""
+    if image is not None and not bpy.app.background:
+        image.preview_ensure()
+
+
+@bpy.app.handlers.persistent
+def _fill_old_files(*_: object) -> None:
+    """Files of versions that had no list: their cameras say which photo is behind each."""
+    for scene in bpy.data.scenes:
+        state, capture = scene.patina_photos, capture_path(scene)
+        if len(state.photos) or not capture:
+            continue
+        mine = [o for o in scene.objects if o.type == "CAMERA" and o.get(CAPTURE) == capture]
+        for camera in sorted(mine, key=lambda o: o.get(LIT_PHOTO_INDEX, 0)):
+            line, behind = state.photos.add(), camera.data.background_images
+            line.name, line.place = camera.get(LIT_PHOTO, ""), camera.get(LIT_PHOTO_INDEX, 0)
+            line.camera, line.light = camera, camera.get(LIGHT_NAME, "")
+            line.image = behind[-1].image if len(behind) else None
+            _with_thumbnail(line.image)
+            if camera == scene.camera:
+                state.active = len(state.photos) - 1
+
+
+CLASSES = (PatinaPhoto, PatinaPhotos)
+HANDLERS = (("load_post", _fill_old_files),)
+
+
+def register() -> None:
+    """The list, on the scene."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.Scene.patina_photos = bpy.props.PointerProperty(type=PatinaPhotos)
+    attach(HANDLERS)
+
+
+def unregister() -> None:
+    """Nothing is left."""
+    detach(HANDLERS)
+    del bpy.types.Scene.patina_photos
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,44 @@
+"""Keys of the custom properties and attributes that Patina writes into a .blend."""
+
+from __future__ import annotations
+
+MEASURED_DATE = "patina_date"  # on the material: the day it was measured, ISO 8601
+AS_MEASURED = "patina_as_measured"  # on the material: its node inputs as measured, JSON
+SAMPLE_POINTS = "patina_samples"  # on the material: rows of MeasuredPoints
+INTERVAL_BAND = "patina_interval"  # on the material: values of a Band
+EARLIER_COEFFICIENTS = "patina_earlier_coefficients"  # on the material: of the fit before the last
+EARLIER_BASIS = "patina_earlier_basis"  # on the material: the basis of these
+SHOWN_SLOTS = "patina_shown"  # face attribute: the slots whose colours were shown last
+LOBE_GROUP_LAYOUT = "patina_lobe_group"  # on a node group: the layout it has
+LIGHT_NAME = "patina_light"  # on a lamp or a camera: the light's name in its capture
+LAMP_KIND = "patina_kind"  # on a lamp: distant, near or mounted
+INTENSITY_KNOWN = "patina_known"  # on a lamp: whether its intensity was measured
+HOLDING_CAMERA = "patina_holder"  # on a lamp: label of the camera that a flash is fixed to
+LAMP_AS_IMPORTED = "patina_made"  # on a lamp: where it stood when it was imported
+MAP_KIND = "patina_map"  # on a node: which map it shows
+PROVENANCE = "patina_provenance"  # on the material: where it comes from, in words
+CAPTURE = "patina_capture"  # on whatever a capture made: the capture file, absolute
+EXPOSED_PHOTO = "patina_exposed"  # on the one image that shows photos at another exposure
+VIEW_KIND = "patina_view"  # on the image: which view it shows
+CANVAS_PHOTO = "patina_canvas"  # on the image: index of its photo in the capture
+FIT_SLOTS = "patina_slots"  # face attribute of the scan while a fit runs
+PROPOSED_SLOTS = "patina_materials"  # face attribute of the mesh: what was proposed last
+PROPOSAL_CONFIDENCE = "patina_confidence"  # face attribute of the mesh: of the same
+PLACEHOLDER = "patina_proposed"  # on coloured materials that stand for proposed ones
+COMPONENTS_FILE = "patina_components"  # on the material: name of its components' EXR
+MEASURED_SAMPLING_FILE = "patina_measured_sampling"  # the same as measured, while traits differ
+SHOWN_TRAITS = "patina_traits_shown"  # on the material: what each part of it shows
+NO_OSL_REASON = "patina_without_osl"  # on the material: why it has no OSL branch
+MEASURED_NAME = "patina_measured"  # on the material: the name it has in its capture
+COEFFICIENTS = "patina_coefficients"  # on the material: all of them, red, then green, then blue
+BASIS_VERSION = "patina_basis"  # on the material: version of the basis they are in
+MASK_PHOTO_INDEX = "patina_shadow_of"  # on the image: index of its photo in the capture
+MASK_PHOTO_NAME = "patina_photo"  # on the image: name of its photo
+MASK_KIND = "patina_mask"  # on the image: what it masks, one of LEFT_OUT
+ORIGIN = "patina_origin"  # on the collection of a scan: offset of its frame, scan units
+RESOLUTION = "patina_resolution"  # on a camera: (width, height) of its photos, pixels
+CAMERA_LABEL = "patina_label"  # on a camera: its label in the scan
+LIT_PHOTO = "patina_lit"  # on a camera: name of the lit photo behind it
+LIT_PHOTO_INDEX = "patina_place"  # on a camera: index of that photo in the capture
+REMAINDER_FILE = "patina_remainder"  # on the material: name of the EXR of its remaining components
+SAMPLING_FILE = "patina_sampling"  # on the material: name of its sampling EXR

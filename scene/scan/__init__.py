@@ -1,0 +1,1 @@
+"""The scan in Blender: mesh, origin, faces of each material, rays."""

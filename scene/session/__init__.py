@@ -1,0 +1,1 @@
+"""State, folders, preferences and handlers of one Blender session."""

@@ -1,0 +1,1 @@
+"""Charts, photo comparisons and evidence shown in Blender's editors."""
