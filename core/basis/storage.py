@@ -7,7 +7,6 @@ twice that: 0.003 log-relative RMS for all hundred, far below the interpolation 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UNREADABLE_NPZ, InputError
+from ..files import atomic_path
 from .basis import Basis
 from .grid import AngleGrid
 
@@ -30,7 +30,6 @@ Steps = Sequence[float] | NDArray[np.floating]
 
 def save(path: Path, basis: Basis) -> None:
     """Write a basis as .npz; the file appears whole or not at all."""
-    partial = path.with_name(path.name + ".part")
     steps = np.where(np.arange(basis.count) < FINE, COMPONENT_STEP, FAINT_STEP)
     arrays: dict[str, NDArray[Any]] = {
         "format": np.array(FORMAT, np.int32),
@@ -46,9 +45,8 @@ def save(path: Path, basis: Basis) -> None:
     if basis.training is not None:
         fixed = np.round(basis.training / TRAINING_STEP).astype(np.int32)
         arrays["training"] = fixed
-    with open(partial, "wb") as file:
+    with atomic_path(path) as partial, open(partial, "wb") as file:
         np.savez_compressed(file, **arrays)
-    os.replace(partial, path)
 
 
 def load(path: Path) -> Basis:

@@ -7,7 +7,6 @@ the MERL cells once; mean and components at the nodes need L at the nodes and no
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..angles import Angles
 from ..errors import UNREADABLE_NPZ, InputError, PatinaError
+from ..files import atomic_path
 from . import components, mapping
 from .basis import Basis, Progress
 from .grid import AngleGrid
@@ -122,8 +122,7 @@ class TrainingSet:
 
     def save(self, path: Path) -> None:
         """Write the set (about 140 MB for MERL's 300 columns); it appears whole or not at all."""
-        partial = path.with_name(path.name + ".part")
-        with open(partial, "wb") as file:
+        with atomic_path(path) as partial, open(partial, "wb") as file:
             np.savez(
                 file,
                 format=np.int32(FORMAT),
@@ -133,7 +132,6 @@ class TrainingSet:
                 products=self.products,
                 provenance=np.array(self.provenance),
             )
-        os.replace(partial, path)
 
     @staticmethod
     def load(path: Path) -> TrainingSet:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..angles import merl_grid
 from ..errors import InputError
+from ..files import atomic_path
 from .table import TabulatedBRDF
 
 SCALE = np.array([1.0, 1.15, 1.66]) / 1500.0
@@ -54,8 +55,6 @@ def write(path: Path, table: TabulatedBRDF) -> None:
     """Write a table; invalid cells become -1. The file appears whole or not at all."""
     values = table.values.astype(np.float64)
     raw = np.where(values < 0, -1.0, values / SCALE[:, None, None, None])
-    partial = path.with_name(path.name + ".part")
-    with open(partial, "wb") as file:
+    with atomic_path(path) as partial, open(partial, "wb") as file:
         file.write(np.array(merl_grid.SHAPE, HEADER).tobytes())
         file.write(raw.astype(VALUES).tobytes())
-    os.replace(partial, path)

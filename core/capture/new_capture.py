@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
+from ..files import atomic_path
 from ..photo.container import KIND_OF, RAW
 from ..scan.formats import BY_SUFFIX, read_reconstruction
 from ..scan.mesh import READERS
@@ -137,16 +138,12 @@ def write_new_capture(
 
 
 def _write(out: Path, text: str) -> None:
-    partial = out.with_name(f"{out.name}.part")
     try:
-        partial.write_text(text, "utf-8")
-        read_capture(partial)
-        os.replace(partial, out)
+        with atomic_path(out) as partial:
+            partial.write_text(text, "utf-8")
+            read_capture(partial)
     except OSError as error:
         raise InputError(f"cannot be written ({error.strerror or error})", file=out) from error
-    finally:
-        with contextlib.suppress(OSError):
-            partial.unlink(missing_ok=True)
 
 
 def _path(path: Path, out: Path) -> str:

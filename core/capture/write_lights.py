@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -12,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, PatinaError
+from ..files import atomic_path
 from .entries import LightEntry
 from .model import Capture
 from .reader import read_capture
@@ -33,16 +32,12 @@ def write_lights(capture: Capture, lights: Sequence[LightEntry], out: Path) -> N
         text = capture.file.read_bytes().decode("utf-8")
     except (OSError, ValueError) as error:
         raise InputError(f"cannot be read ({error})", file=capture.file) from error
-    partial = out.with_name(f"{out.name}.part")
     try:
-        partial.write_bytes(with_lights(text, capture, lights).encode("utf-8"))
-        _check(partial, capture, lights, out)
-        os.replace(partial, out)
+        with atomic_path(out) as partial:
+            partial.write_bytes(with_lights(text, capture, lights).encode("utf-8"))
+            _check(partial, capture, lights, out)
     except OSError as error:
         raise InputError(f"cannot be written ({error.strerror or error})", file=out) from error
-    finally:
-        with contextlib.suppress(OSError):
-            partial.unlink(missing_ok=True)
 
 
 def with_lights(text: str, capture: Capture, lights: Sequence[LightEntry]) -> str:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from ..basis import Basis
+from ..files import write_text_atomic
 from .table_files import EXR_README, NPZ_README
 
 ANGLES = """Directions
@@ -97,9 +97,7 @@ def write_readme(folder: Path, kind: str, basis: Basis) -> str:
     name, text = (
         (EXR_README, exr_readme(basis)) if kind == "exr" else (NPZ_README, npz_readme(basis))
     )
-    partial = folder / f"{name}.part"
-    partial.write_text(text, "utf-8")
-    os.replace(partial, folder / name)
+    write_text_atomic(folder / name, text)
     return name
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..angles import Angles, cosines
 from ..appearance.cube_root import quadrature
+from ..files import write_text_atomic
 
 Array = NDArray[np.floating]
 Evaluate = Callable[[Angles], Array]
@@ -80,12 +80,7 @@ def write_losses(folder: Path, losses: Sequence[Loss], source: str) -> list[str]
     for loss in losses:
         lines += [*loss.lines(), ""]
     told = {"format": FORMAT, "measure": MEASURE, "losses": [vars(loss) for loss in losses]}
-    _write(folder / "losses.txt", "\n".join(lines))
-    _write(folder / "losses.json", json.dumps(told, indent=1, allow_nan=False) + "\n")
+    write_text_atomic(folder / "losses.txt", "\n".join(lines))
+    text = json.dumps(told, indent=1, allow_nan=False) + "\n"
+    write_text_atomic(folder / "losses.json", text)
     return lines
-
-
-def _write(path: Path, text: str) -> None:
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(text, "utf-8")
-    os.replace(partial, path)

@@ -8,7 +8,6 @@ OpenPBR 1.1 as MaterialX 1.39 has them. No MaterialX package is needed to write.
 
 from __future__ import annotations
 
-import os
 import xml.etree.ElementTree as ET  # written, never read
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 
 from ..appearance.lobe_stack import Lobe, LobeStack
 from ..appearance.principled import Principled
+from ..files import atomic_path
 
 VERSION = "1.39"
 COLORSPACE = "lin_rec709"
@@ -134,9 +134,8 @@ def add_open_pbr(root: ET.Element, name: str, principled: Principled) -> str:
 def write(path: Path, root: ET.Element) -> None:
     """Write the document; the file appears whole or not at all."""
     ET.indent(root, "  ")
-    partial = path.with_name(path.name + ".part")
-    ET.ElementTree(root).write(partial, encoding="utf-8", xml_declaration=True)
-    os.replace(partial, path)
+    with atomic_path(path) as partial:
+        ET.ElementTree(root).write(partial, encoding="utf-8", xml_declaration=True)
 
 
 def _add_material(root: ET.Element, name: str, surface: str) -> str:

@@ -6,13 +6,13 @@ NAME.xml uses the plugin (RGB variants); NAME_spectral.xml needs no Python and u
 
 from __future__ import annotations
 
-import os
 import shutil
 import xml.etree.ElementTree as ET  # written, never read
 from pathlib import Path
 
 import numpy as np
 
+from ..files import atomic_path
 from ..result import FittedMaterial
 from ..views.sphere import KEY
 from .file_names import identifier
@@ -74,9 +74,8 @@ def write_scene(path: Path, plugin: str, file: str) -> None:
     bsdf = ET.SubElement(sphere, "bsdf", type=plugin)
     ET.SubElement(bsdf, "string", name="filename", value=file)
     ET.indent(root, "  ")
-    partial = path.with_name(path.name + ".part")
-    ET.ElementTree(root).write(partial, encoding="utf-8", xml_declaration=True)
-    os.replace(partial, path)
+    with atomic_path(path) as partial:
+        ET.ElementTree(root).write(partial, encoding="utf-8", xml_declaration=True)
 
 
 def _numbers(values: object) -> str:

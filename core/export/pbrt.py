@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 
+from ..files import write_text_atomic
 from ..views.sphere import KEY
 from .mitsuba import IRRADIANCE
 
@@ -36,6 +36,4 @@ def write_scene(path: Path, name: str, title: str) -> None:
     light = " ".join(f"{v:.8g}" for v in KEY / np.linalg.norm(KEY))
     shown = " ".join(title.split()).encode("ascii", "replace").decode()
     text = SCENE.format(name=name, title=shown, light=light, power=f"{IRRADIANCE:.8g}")
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(text, "utf-8")
-    os.replace(partial, path)
+    write_text_atomic(path, text)

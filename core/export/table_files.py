@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from ..angles import merl_grid
 from ..basis import AngleGrid, Basis, PrincipalBRDF
 from ..basis.mapping import EPSILON
 from ..brdf import TabulatedBRDF
+from ..files import atomic_path
 from ..photo import write_exr
 from ..result import FittedMaterial
 from .file_names import identifier
@@ -116,7 +116,5 @@ def write_npz_basis(folder: Path, basis: Basis) -> str:
 
 def write_npz(path: Path, **arrays: NDArray[Any]) -> None:
     """Write a compressed .npz; the file appears whole or not at all."""
-    partial = path.with_name(path.name + ".part")
-    with open(partial, "wb") as file:
+    with atomic_path(path) as partial, open(partial, "wb") as file:
         np.savez_compressed(file, **arrays)
-    os.replace(partial, path)

@@ -7,7 +7,6 @@ of its data from the file's start (uint64), shape (uint64 each). Little endian.
 
 from __future__ import annotations
 
-import os
 import struct
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +14,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..files import atomic_path
 
 MAGIC = b"tensor_file\0"
 TYPES = {"uint8": 1, "float32": 10}
@@ -38,13 +39,11 @@ def write(path: Path, fields: Mapping[str, NDArray[Any]]) -> None:
         index.append(struct.pack("<HBQ", value.ndim, TYPES[value.dtype.name], place))
         index.append(struct.pack(f"<{value.ndim}Q", *value.shape))
         place = _aligned(place + value.nbytes)
-    partial = path.with_name(path.name + ".part")
-    with open(partial, "wb") as file:
+    with atomic_path(path) as partial, open(partial, "wb") as file:
         file.write(b"".join(index))
         for value in arrays.values():
             file.write(bytes(_aligned(file.tell()) - file.tell()))
             file.write(value.astype(value.dtype.newbyteorder("<")).tobytes())
-    os.replace(partial, path)
 
 
 def _aligned(place: int) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..files import write_text_atomic
 from ..photo import write_png
 from ..photo.image import write_exr
 from .dilate import dilated, margin_of
@@ -159,10 +159,8 @@ def _srgb(linear: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _write_json(path: Path, result: MapsResult, files: list[MapFile]) -> None:
-    partial = path.with_name(path.name + ".part")
     text = json.dumps(describe(result, files), indent=1, allow_nan=False)
-    partial.write_text(text + "\n", "utf-8")
-    os.replace(partial, path)
+    write_text_atomic(path, text + "\n")
 
 
 def describe(result: MapsResult, files: list[MapFile]) -> dict[str, Any]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..errors import InputError
-from .jpeg_check import check_jpeg
-from .png_check import SIGNATURE, check_png
+from .jpeg_check import check_jpeg, check_jpeg_header
+from .per_file import once_per_file
+from .png_check import SIGNATURE, check_png, check_png_header
 from .radiance_header import check_hdr
 from .tiff_check import check_tiff
 
@@ -42,16 +44,29 @@ HEADS = {
 @dataclass(frozen=True)
 class Container:
     """kind: 'openexr', 'tiff' … or '' where it is unknown; chunks: a PNG's declarations; scale:
-    what the pixels of a .hdr are to be divided by; notes: what was odd about the file."""
+    what the pixels of a .hdr are to be divided by."""
 
     kind: str
-    chunks: dict[str, bytes] = field(default_factory=dict)
+    chunks: Mapping[str, bytes] = field(default_factory=dict)
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
+@once_per_file
 def check_container(path: Path) -> Container:
-    """Look at a file before a library does. Raises InputError for one that is missing, named as
-    another kind than it is, truncated or damaged as far as that can be seen, or CMYK."""
+    """Check a whole file before its pixels are read. Raises InputError for one that is missing,
+    named as another kind than it is, truncated or damaged as far as that can be seen, or CMYK.
+
+    A file that stays the same is read once, however often this is called."""
+    return _check(path, whole=True)
+
+
+def check_header(path: Path) -> Container:
+    """Check a file's header, before its size is asked for: the same as check_container but for
+    what lies after the header of a PNG or JPEG. Raises InputError."""
+    return _check(path, whole=False)
+
+
+def _check(path: Path, whole: bool) -> Container:
     if not path.is_file():
         raise InputError("is not a file" if path.exists() else "no such file", file=path)
     try:
@@ -67,9 +82,9 @@ def check_container(path: Path) -> Container:
                 )
             raise InputError(f"is named {suffix}, but is no {expected.upper()} image", file=path)
         if kind == "png":
-            return Container(kind, check_png(path))
+            return Container(kind, check_png(path) if whole else check_png_header(path))
         if kind == "jpeg":
-            check_jpeg(path)
+            (check_jpeg if whole else check_jpeg_header)(path)
         elif kind == "tiff":
             check_tiff(path)
         elif kind == "hdr":

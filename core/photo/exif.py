@@ -11,6 +11,7 @@ from pathlib import Path
 from ..errors import InputError
 from .exif_place import find_tags
 from .image import attributes
+from .per_file import once_per_file
 from .tiff_tags import Value
 
 Tags = dict[int, Value]
@@ -75,9 +76,11 @@ class Exif:
         return self.gps_utc
 
 
+@once_per_file
 def read_exif(path: Path) -> Exif:
     """Exif of a JPEG, TIFF, PNG, EXR or camera RAW file; all None where it has none.
 
+    Read once of a file that stays the same.
     Raises InputError only where there is no such file: a damaged field is a missing one.
     """
     if not path.is_file():

@@ -7,7 +7,7 @@ import struct
 from pathlib import Path
 from typing import BinaryIO
 
-from .jpeg_check import APP1, EXIF, segments
+from .jpeg_check import APP1, EXIF, header_segments
 from .tiff_tags import HEADS, TiffTags, read_tiff_tags
 
 FUJI = b"FUJIFILMCCD-RAW"
@@ -43,8 +43,7 @@ def _block(data: bytes) -> TiffTags:
 
 
 def _in_jpeg(file: BinaryIO, start: int) -> TiffTags:
-    file.seek(start)
-    for marker, body in segments(file.read(MOST)):
+    for marker, body in header_segments(file, start):
         if marker == APP1 and body.startswith(EXIF):
             return _block(body[len(EXIF) :])
     return NOTHING

@@ -6,7 +6,6 @@ library, and writing crashes.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -18,8 +17,10 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from ..errors import InputError, PatinaError
+from ..files import atomic_path
 from . import raw
-from .container import RAW, Container, check_container, check_size
+from .container import RAW, Container, check_container, check_header, check_size
+from .per_file import once_per_file
 
 FIXED_DATE = "2000:01:01 00:00:00"  # else the clock is written: same pixels, other bytes
 ROWS = 256  # read at a time: whole chunks of every EXR compression
@@ -89,9 +90,10 @@ class OpenImage:
 
 
 @contextmanager
-def open_image(path: Path) -> Iterator[OpenImage]:
-    """Open an image that OpenImageIO reads. Raises InputError."""
-    container = check_container(path)
+def open_image(path: Path, pixels: bool = True) -> Iterator[OpenImage]:
+    """Open an image that OpenImageIO reads. pixels: False where only its header is wanted; then
+    the rest of the file is not checked. Raises InputError."""
+    container = check_container(path) if pixels else check_header(path)
     hints = oiio.ImageSpec()
     hints.attribute("oiio:UnassociatedAlpha", 1)  # else colours come multiplied by their alpha
     file = oiio.ImageInput.open(str(path), hints)
@@ -146,18 +148,22 @@ def read_mask(path: Path) -> NDArray[np.bool_]:
     return (white > 0.5) & (alpha < 0 or pixels[:, :, alpha] > 0.5)
 
 
+@once_per_file
 def image_size(path: Path) -> tuple[int, int]:
-    """(width, height) of an image, camera RAW included, as stored. Raises InputError."""
+    """(width, height) of an image, camera RAW included, as stored. Raises InputError.
+
+    Reads the header only, and that once of a file that stays the same: a file that ends in its
+    pixels has a size, it is refused where they are read."""
     if path.suffix.lower() in RAW:
         return raw.raw_size(path)
-    with open_image(path) as image:
+    with open_image(path, pixels=False) as image:
         spec = image.file.spec()
         return spec.width, spec.height
 
 
 def attributes(path: Path) -> dict[str, object]:
     """{name: value} of an image's header. Raises InputError."""
-    with open_image(path) as image:
+    with open_image(path, pixels=False) as image:
         found: dict[str, object] = {}
         for entry in image.file.spec().extra_attribs:
             with suppress(UnicodeDecodeError):
@@ -174,10 +180,9 @@ def write_exr(
 ) -> None:
     """Write (h, w, c), row 0 on top: linear RGB, or the named channels; the file appears whole or
     not at all. Raises PatinaError."""
-    partial = path.with_name(path.stem + ".part.exr")
     kind = "half" if half else "float"
-    _write(partial, np.asarray(pixels, np.float32), kind, channels, description)
-    os.replace(partial, path)
+    with atomic_path(path, ".part.exr") as partial:
+        _write(partial, np.asarray(pixels, np.float32), kind, channels, description)
 
 
 def write_png(path: Path, pixels: NDArray[np.uint8]) -> None:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 from ..errors import InputError
 
@@ -14,44 +13,68 @@ SOI, EOI, SOS, APP1 = 0xD8, 0xD9, 0xDA, 0xE1
 FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # SOF0..SOF15 without DHT, JPG, DAC
 MARKER = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")  # in a scan: not stuffing, restart or fill
 MAX_BYTES = 1 << 30
+MAX_HEADER = 1 << 22  # profiles and previews of cameras stay below
 EXIF = b"Exif\0\0"
 
 
-@dataclass(frozen=True)
-class JpegHead:
-    """Size in pixels, number of colour components, and the Exif block (a TIFF structure)."""
-
-    width: int
-    height: int
-    components: int
-    exif: bytes | None
-
-
-def check_jpeg(path: Path) -> JpegHead:
+def check_jpeg(path: Path) -> None:
     """Walk the markers (ITU-T T.81, annex B). Raise InputError for a file that is no JPEG, is
     truncated, or is CMYK."""
     if path.stat().st_size > MAX_BYTES:
         raise InputError("is larger than a JPEG can sensibly be (1 GiB)", file=path)
     data = path.read_bytes()
-    frame: tuple[int, int, int] | None = None
-    exif, scans = None, 0
+    components, scans = 0, 0
     for marker, body in segments(data):
-        if marker in FRAMES and len(body) >= 6 and frame is None:
-            height, width, components = struct.unpack_from(">HHB", body, 1)
-            frame = width, height, components
-        elif marker == APP1 and body.startswith(EXIF) and exif is None:
-            exif = body[len(EXIF) :]
+        if marker in FRAMES and len(body) >= 6 and not components:
+            components = body[5]
         elif marker == SOS:
             scans += 1
-        elif marker == EOI and frame and scans:
-            if frame[2] == 4:
-                raise InputError(
-                    "is a CMYK JPEG, made for printing; expected RGB or grey; "
-                    "export it again as RGB",
-                    file=path,
-                )
-            return JpegHead(*frame, exif)
+        elif marker == EOI and components and scans:
+            _check_components(path, components)
+            return
     raise InputError("is truncated or damaged (the end of the JPEG is missing)", file=path)
+
+
+def check_jpeg_header(path: Path) -> None:
+    """The same for the segments before the first scan; not more than MAX_HEADER bytes are read.
+    Raises InputError."""
+    with path.open("rb") as file:
+        for marker, body in header_segments(file):
+            if marker in FRAMES and len(body) >= 6:
+                _check_components(path, body[5])
+                return
+    raise InputError("is truncated or damaged (the head of the JPEG is incomplete)", file=path)
+
+
+def _check_components(path: Path, components: int) -> None:
+    if components == 4:
+        raise InputError(
+            "is a CMYK JPEG, made for printing; expected RGB or grey; export it again as RGB",
+            file=path,
+        )
+
+
+def header_segments(file: BinaryIO, start: int = 0) -> Iterator[tuple[int, bytes]]:
+    """(marker, body) of the segments before the first scan of the JPEG that begins at byte
+    ``start``; one segment is read at a time, MAX_HEADER bytes in all."""
+    file.seek(start + 2)
+    left = MAX_HEADER
+    while left > 0 and file.read(1) == b"\xff":
+        code = file.read(1)
+        while code == b"\xff" and left > 0:  # fill bytes
+            code, left = file.read(1), left - 1
+        if not code or code[0] in (EOI, SOS):
+            return
+        left -= 2
+        marker = code[0]
+        if marker == 0x01 or 0xD0 <= marker <= SOI:  # no body follows
+            continue
+        length = int.from_bytes(file.read(2), "big") - 2
+        body = file.read(max(length, 0))
+        if length < 0 or len(body) < length:
+            return
+        left -= 2 + length
+        yield marker, body
 
 
 def segments(data: bytes) -> Iterator[tuple[int, bytes]]:

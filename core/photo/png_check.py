@@ -1,4 +1,4 @@
-"""Is a PNG whole? Its checksums say so before any reader is asked; and its small chunks."""
+"""Is a PNG whole? Its checksums tell before any reader opens it; and its small chunks."""
 
 from __future__ import annotations
 
@@ -19,6 +19,16 @@ def check_png(path: Path) -> dict[str, bytes]:
     Returns the chunks that say what the numbers mean (cICP, iCCP, sRGB, gAMA, eXIf: the first of
     each, PNG specification, third edition, section 11.3), as far as the file has them.
     """
+    return _check(path, whole=True)
+
+
+def check_png_header(path: Path) -> dict[str, bytes]:
+    """The same for what stands before the pixels: no byte after the first IDAT chunk's head is
+    read, and of larger chunks than SMALL the head only."""
+    return _check(path, whole=False)
+
+
+def _check(path: Path, whole: bool) -> dict[str, bytes]:
     size, place = path.stat().st_size, len(SIGNATURE)
     found: dict[str, bytes] = {}
     with path.open("rb") as file:
@@ -26,8 +36,14 @@ def check_png(path: Path) -> dict[str, bytes]:
             raise InputError("is named .png, but is no PNG image", file=path)
         while place + 12 <= size:
             length, kind = struct.unpack(">I4s", file.read(8))
+            if not whole and kind == b"IDAT":
+                return found
             if place + 12 + length > size:
                 break
+            if not whole and length > SMALL:
+                place += 12 + length
+                file.seek(place)
+                continue
             data = file.read(length)
             if zlib.crc32(data, zlib.crc32(kind)) != struct.unpack(">I", file.read(4))[0]:
                 raise InputError(f"is damaged (its {kind.decode('latin-1')!r} chunk)", file=path)

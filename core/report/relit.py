@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from urllib.parse import quote
+
+from ..files import write_text_atomic
 
 STYLE = Path(__file__).parents[2] / "assets" / "report" / "style.css"
 SHOWN = 8  # pictures of a turn
@@ -43,9 +44,7 @@ def add_to_report(page: Path, pictures: Sequence[Picture], folder: str) -> None:
     if not text.endswith(END) or not pictures:
         return
     part = f"<h2>Under other light</h2>{section(pictures, folder)}"
-    partial = page.with_name(page.name + ".part")
-    partial.write_text(text[: -len(END)] + part + END, "utf-8")
-    os.replace(partial, page)
+    write_text_atomic(page, text[: -len(END)] + part + END)
 
 
 def section(pictures: Sequence[Picture], folder: str = "") -> str:

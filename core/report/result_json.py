@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import tomllib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..appearance.lobe_stack import LobeStack
+from ..files import write_text_atomic
 from ..fit import PaperFit
 from ..fit.measured_result import MeasuredResult
 from ..fit.spread import Spread
@@ -42,9 +42,7 @@ def write(path: Path, result: CaptureResult, stages: Sequence[Stage], notes: Seq
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
     """Write a file of this content; it appears whole or not at all."""
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", "utf-8")
-    os.replace(partial, path)
+    write_text_atomic(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
 def describe(
