@@ -1,9 +1,61 @@
-"""Patina: measured materials from photo scans. This file only registers."""
+"""Patina: measured materials from photo scans.
+
+Blender calls ``register``; Python programs find the functions of ``api.py`` here. Neither is
+imported before it is used.
+"""
 
 from __future__ import annotations
 
 import importlib
 from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .api import (
+        DEMO_CAPTURE,
+        FORMATS,
+        Angles,
+        Capture,
+        DiagnosisResult,
+        Finding,
+        FitResult,
+        InputError,
+        MaterialResult,
+        PatinaError,
+        PhotoErrors,
+        PhotoPrediction,
+        Step,
+        diagnose,
+        export,
+        fit,
+        half_difference,
+        load_capture,
+        predict,
+        select_photos,
+    )
+
+__all__ = [
+    "DEMO_CAPTURE",
+    "FORMATS",
+    "Angles",
+    "Capture",
+    "DiagnosisResult",
+    "Finding",
+    "FitResult",
+    "InputError",
+    "MaterialResult",
+    "PatinaError",
+    "PhotoErrors",
+    "PhotoPrediction",
+    "Step",
+    "diagnose",
+    "export",
+    "fit",
+    "half_difference",
+    "load_capture",
+    "predict",
+    "select_photos",
+]
 
 # Every module that has something to register, in order; unregistered the other way round
 MODULES: tuple[str, ...] = (
@@ -45,6 +97,22 @@ MODULES: tuple[str, ...] = (
     "panels.traits_box",
     "panels.export_box",
 )
+
+
+def __getattr__(name: str) -> Any:
+    """A name of the Python API, imported on first use; ``__version__`` is the manifest's."""
+    if name == "__version__":
+        result_json = importlib.import_module(".core.report.result_json", __package__)
+        return result_json.program_version()
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module(".api", __package__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__, "__version__"})
 
 
 def _modules() -> list[ModuleType]:

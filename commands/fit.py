@@ -16,10 +16,12 @@ from ..core.jobs import CaptureResult, FitJob, Stage, finished
 from ..core.report import result_json, write_report
 from ..core.report.figures import reach
 from . import capture_arguments
+from .needs_blender import has_blender
 from .progress import Progress
 from .solve import check_threads
 from .staging import check_out, staged_folder
 
+NO_SCENE = "no scene.blend was written, which needs Blender; everything else is complete"
 HELP = "fit every material of a capture and write them"
 
 
@@ -33,7 +35,8 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def fit_to_folder(capture_file: Path, out: Path, threads: int | None = None) -> CaptureResult:
-    """Fit a capture and leave result.json, NAME.binary, scene.blend and report/ in ``out``."""
+    """Fit a capture and leave result.json, NAME.binary, report/ and, with Blender, scene.blend in
+    ``out``."""
     out = check_out(out)
     progress = Progress(share=0.85)
     job = FitJob(read_capture(capture_file), threads=threads)
@@ -54,7 +57,8 @@ def write_results(
     progress: Progress,
     report: str = "report",
 ) -> None:
-    """Tables, report, scene.blend and result.json into a staged folder that moves to ``out``."""
+    """Tables, report, result.json and, with Blender, scene.blend into a staged folder that moves
+    to ``out``."""
     stages = [*stages]
     with timed(stages, "tables", progress, 0.9):
         for material in result.materials:
@@ -62,10 +66,12 @@ def write_results(
     with timed(stages, "report", progress, 0.92):
         for _ in write_report(folder / report, result):
             pass
-    with timed(stages, "scene.blend", progress, 0.97):
-        from ..scene.export.blend_file import write_blend  # needs bpy
+    notes: Sequence[str] = ()
+    if has_blender():
+        with timed(stages, "scene.blend", progress, 0.97):
+            from ..scene.export.blend_file import write_blend  # needs bpy
 
-        notes = write_blend(folder / "scene.blend", out / "scene.blend", result, stages)
+            notes = write_blend(folder / "scene.blend", out / "scene.blend", result, stages)
     result_json.write(folder / "result.json", result, stages, notes)
 
 
@@ -100,5 +106,8 @@ def tell(out: Path, result: CaptureResult) -> None:
     print(f"wrote {out / 'result.json'}")
     for material in result.materials:
         print(f"      {out / (material.name + '.binary')}")
-    print(f"      {out / 'scene.blend'}")
+    if has_blender():
+        print(f"      {out / 'scene.blend'}")
     print(f"      {out / 'report' / 'index.html'}")
+    if not has_blender():
+        print(f"note: {NO_SCENE}")

@@ -15,6 +15,7 @@ from ..core.inputs import capture_data
 from ..core.inputs.lights import find_lights
 from ..core.inputs.photos import LitPhotos
 from ..core.scan.formats import read_reconstruction
+from .needs_blender import check_blender
 from .staging import staged_folder
 
 HELP = "mesh, cameras with their photos and lights of a capture, as a .blend"
@@ -34,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
+    check_blender("`import`", "import")
     out: Path = arguments.out
     if out.suffix != ".blend":
         raise InputError("expected a file name that ends in .blend", file=out, key="--out")

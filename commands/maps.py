@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..core.brdf import merl_file
@@ -14,7 +15,8 @@ from ..core.maps.texels import check_size
 from ..core.maps.write import write_maps
 from ..core.report import result_json
 from ..core.result import read_result
-from .fit import timed
+from .fit import NO_SCENE, timed
+from .needs_blender import has_blender
 from .progress import Progress
 from .staging import check_out, staged_folder
 
@@ -47,10 +49,12 @@ def run(arguments: argparse.Namespace) -> None:
     check_size(arguments.size)
     out = check_out(arguments.out)
     capture, fitted = read_capture(arguments.capture), read_result(arguments.result)
-    from ..scene.scan.unwrap import unwrapped  # needs bpy
+    blender = has_blender()
+    if blender:
+        from ..scene.scan.unwrap import unwrapped  # needs bpy
 
     settings = MapsSettings(arguments.size, 0 if arguments.keep_fit else REFITS, arguments.normal)
-    job = MapsJob(capture, fitted, settings, unwrapped)
+    job = MapsJob(capture, fitted, settings, unwrapped if blender else None)
     progress = Progress(share=0.9)
     job.drain(progress)
     result = finished(job.result)
@@ -59,11 +63,14 @@ def run(arguments: argparse.Namespace) -> None:
         stages = [*job.stages]
         with timed(stages, "maps", progress, 0.92):
             files = write_maps(folder, result, arguments.format)
-        with timed(stages, "scene.blend", progress, 0.96):
-            from ..scene.export.maps_blend import write_mapped_blend
+        scene = folder / "scene.blend"
+        notes: Sequence[str] = (NO_SCENE,)
+        if blender:
+            with timed(stages, scene.name, progress, 0.96):
+                from ..scene.export.maps_blend import write_mapped_blend
 
-            scene = folder / "scene.blend"
-            notes = write_mapped_blend(scene, out / scene.name, result, files, fitted.scene, stages)
+                final = out / scene.name
+                notes = write_mapped_blend(scene, final, result, files, fitted.scene, stages)
         written = scene.is_file()
         if result.refit is not None:
             for material in result.refit.materials:

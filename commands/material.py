@@ -14,6 +14,7 @@ from ..core.export import Loss, renderer_formats, table_formats, write_losses
 from ..core.export.file_names import check_distinct
 from ..core.export.subject import Subject
 from ..core.result import FittedMaterial, FittedResult, read_result
+from .needs_blender import check_blender
 from .progress import Progress
 from .staging import check_out, staged_folder
 
@@ -70,6 +71,9 @@ def export(
     """
     chosen = _chosen(result, names)
     check_distinct([material.name for material in chosen])
+    for name in BLENDER:
+        if name in formats:
+            check_blender(f"the format {name}", f"material RESULT --to {name}")
     _check_not_itself(out, result, formats)
     formats = list(dict.fromkeys(formats))
     subjects = [Subject(material) for material in chosen]
@@ -81,14 +85,15 @@ def export(
             if name in PLAIN:
                 losses += yield from in_background(partial(PLAIN[name], folder, subjects), step)
             else:
-                losses += _write_by_blender(name, folder, out, result, subjects)
+                losses += write_by_blender(name, folder, out, result, subjects)
         lines = write_losses(folder, losses, ", ".join(s.name for s in subjects))
     return losses, lines
 
 
-def _write_by_blender(
+def write_by_blender(
     name: str, folder: Path, out: Path, result: FittedResult, subjects: Sequence[Subject]
 ) -> list[Loss]:
+    """Write one of BLENDER's formats into ``folder``, whose files will move to ``out``."""
     from ..scene.export import export_formats  # needs bpy
 
     write = {

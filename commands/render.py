@@ -10,6 +10,7 @@ from ..core.errors import InputError
 from ..core.export.subject import Subject
 from ..core.report.relit import Picture, write_page
 from ..core.result import read_result
+from .needs_blender import check_blender
 from .progress import Progress
 from .staging import check_out, staged_folder
 
@@ -64,6 +65,7 @@ def render_to_folder(
     denoise: bool = True,
 ) -> list[Picture]:
     """Render a result under worlds into ``out``, with a page that shows all; returns them."""
+    check_blender("`render`", "render")
     from ..scene.export.relight import Quality, relight, worlds_named  # needs bpy
 
     result = read_result(result_file)

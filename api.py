@@ -1,0 +1,374 @@
+"""Patina as a Python library: capture → fit → prediction, diagnosis, files. Needs no Blender.
+
+    import patina
+
+    capture = patina.load_capture("my.capture.toml")
+    fitted = patina.fit(capture)
+    patina.export(fitted, "results", ["json", "report", "binary", "mtlx"])
+
+Every function raises ``PatinaError`` for what a user can mend (its subclass ``InputError`` where a
+file or a value is wrong), with a message of one line: what was found, what was expected.
+
+Frames and units are those of the whole program: directions are unit vectors that point away from
+the surface, in the frame of the scan; the BRDF ρ is in 1/sr; angles are in radians; radiance is in
+the linear unit of the photos (pixel value / exposure), irradiance in that unit × sr.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .commands.material import BLENDER, PLAIN, write_by_blender
+from .commands.needs_blender import check_blender
+from .commands.staging import check_out, staged_folder
+from .core.angles import Angles, half_difference
+from .core.basis import Basis
+from .core.capture import Capture, read_capture
+from .core.concurrency.job import Step
+from .core.concurrency.steps import drained
+from .core.diagnose.effects import EFFECTS
+from .core.errors import InputError, PatinaError
+from .core.export import Loss, write_losses
+from .core.export.file_names import check_distinct
+from .core.export.subject import Subject
+from .core.jobs import CaptureResult, FitJob, Job, MaterialResult, Stage, finished
+from .core.jobs.check_job import CheckJob
+from .core.jobs.exported_result import exported_result
+from .core.jobs.photo_prediction import PhotoPrediction, predict_one, prediction_inputs
+from .core.jobs.select_photos import places_of, select_photos
+from .core.predict.errors import PhotoErrors
+from .core.report import diagnosis_json, result_json, write_report
+from .core.samples import SampleTable
+
+__all__ = [
+    "DEMO_CAPTURE",
+    "FORMATS",
+    "Angles",
+    "Capture",
+    "DiagnosisResult",
+    "Finding",
+    "FitResult",
+    "InputError",
+    "MaterialResult",
+    "PatinaError",
+    "PhotoErrors",
+    "PhotoPrediction",
+    "Step",
+    "diagnose",
+    "export",
+    "fit",
+    "half_difference",
+    "load_capture",
+    "predict",
+    "select_photos",
+]
+
+DEMO_CAPTURE = Path(__file__).parent / "assets" / "demo" / "demo.capture.toml"
+"""The capture that comes with Patina: a jar of two materials, 8 photos under 4 lamps."""
+
+RECORD, REPORT = "json", "report"
+FORMATS: tuple[str, ...] = (RECORD, REPORT, *PLAIN, *BLENDER)
+"""What ``export`` writes. "json": result.json, which the command line reads; "report": report/ with
+its index.html; "blend", "gltf" and "usd" need Blender; the others as of `patina material --to`."""
+
+Progress = Callable[[Step], None]
+"""Called before each step of the work. A step has ``stage`` (what is being done) and ``fraction``
+(how much of the whole is done, 0..1)."""
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """The materials of a capture.
+
+    details: everything the fit found (scan, lights, basis, material of each face). samples: the
+    reflectance samples of each material that it was fitted to, by name; ``diagnose`` needs them.
+    stages: time and memory of each stage of the work.
+    """
+
+    details: CaptureResult
+    samples: Mapping[str, SampleTable]
+    stages: tuple[Stage, ...]
+
+    @property
+    def capture(self) -> Capture:
+        """The capture that was fitted."""
+        return self.details.capture
+
+    @property
+    def materials(self) -> tuple[MaterialResult, ...]:
+        """Every material, in the order of the capture. ``material.fit.brdf`` is its BRDF, with
+        ``coefficients`` (3, k) and ``evaluate(angles)`` → (n, 3) float32 ρ in 1/sr;
+        ``material.held_out`` its error on held-out photos; ``material.warnings`` sentences."""
+        return self.details.materials
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was read, assumed and left out, a sentence each."""
+        return self.details.notes
+
+    def material(self, name: str) -> MaterialResult:
+        """The material of a name. Raises InputError where there is none."""
+        for material in self.materials:
+            if material.name == name:
+                return material
+        names = ", ".join(material.name for material in self.materials)
+        raise InputError(f"no material is called {name!r}; there are {names}", key="material")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One cause that was tried. cause: a word of the vocabulary (docs/diagnosis.md); sentence: what
+    it means; accepted: whether it predicts held-out regions of the photos significantly better;
+    doubted: what speaks against it, else None. gain: of the log likelihood of held-out regions,
+    nats, with its standard error; p_value: of a gain by chance. parameters: name → (value, standard
+    error, unit)."""
+
+    cause: str
+    sentence: str
+    accepted: bool
+    doubted: str | None
+    gain: float
+    standard_error: float
+    p_value: float
+    parameters: Mapping[str, tuple[float, float, str]]
+
+
+@dataclass(frozen=True)
+class DiagnosisResult:
+    """What the photos show that light, scan and materials do not explain.
+
+    named: the accepted causes by the words of the vocabulary, "unknown" among them where structure
+    is left that no cause explains, ("none",) where nothing is wrong. findings: every cause that was
+    tried, the accepted ones first. before: the fit without them; after: the fit that takes them
+    into account. details: the content of diagnosis.json.
+    """
+
+    named: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    unexplained: bool
+    before: FitResult
+    after: FitResult
+    details: Mapping[str, Any]
+
+
+def load_capture(path: str | os.PathLike[str]) -> Capture:
+    """Read and check a capture file (docs/capture-file.md).
+
+    Raises InputError naming the file, the line and the key that is wrong. The photos themselves are
+    opened by ``fit``.
+
+    >>> import patina
+    >>> capture = patina.load_capture(patina.DEMO_CAPTURE)
+    >>> len(capture.photos), [material.name for material in capture.materials]
+    (8, ['glaze', 'clay'])
+    """
+    return read_capture(Path(path))
+
+
+def fit(
+    capture: Capture,
+    *,
+    basis: Basis | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> FitResult:
+    """Fit the BRDF of every material of a capture.
+
+    basis: principal components to fit in, None for the embedded ones. threads: how many read the
+    photos, None for one a core, at most four; the result does not depend on it. progress: called
+    before each step. Raises InputError for photos, masks or lights that are wrong or missing, and
+    where no lit pixel of a material is left.
+
+    >>> import numpy as np
+    >>> import patina
+    >>> fitted = patina.fit(patina.load_capture(patina.DEMO_CAPTURE))
+    >>> clay = fitted.material("clay")
+    >>> clay.held_out.typical < 0.1  # a held-out photo is predicted to some per cent
+    True
+    >>> angles = patina.half_difference(  # normal, light and view as (n, 3)
+    ...     np.array([[0.0, 0.0, 1.0]]), np.array([[0.6, 0.0, 0.8]]), np.array([[0.0, 0.0, 1.0]])
+    ... )
+    >>> rho = clay.fit.brdf.evaluate(angles)  # 1/sr; terracotta reflects red most
+    >>> rho.shape, bool(rho[0, 0] > rho[0, 1] > rho[0, 2] > 0)
+    ((1, 3), True)
+    """
+    _check_threads(threads)
+    job = FitJob(capture, basis=basis, threads=threads, keep=True)
+    _drain(job, progress)
+    return FitResult(finished(job.result), dict(job.samples), tuple(job.stages))
+
+
+def diagnose(
+    capture: Capture | FitResult,
+    *,
+    without: Collection[str] = (),
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> DiagnosisResult:
+    """Find what is wrong with a capture, and fit it again with that taken into account.
+
+    capture: a capture, or what ``fit`` returned for it, which is then not fitted once more.
+    without: causes that the second fit leaves out even where they are accepted. threads, progress:
+    as of ``fit``. Takes a minute or two. Raises InputError as ``fit`` does, and for an unknown
+    cause.
+
+    >>> import patina
+    >>> fitted = patina.fit(patina.load_capture(patina.DEMO_CAPTURE))  # doctest: +SKIP
+    >>> found = patina.diagnose(fitted)  # doctest: +SKIP
+    >>> for finding in found.findings:  # doctest: +SKIP
+    ...     print(finding.cause, finding.accepted, finding.sentence)
+    """
+    _check_threads(threads)
+    known = [kind.cause for kind in EFFECTS]
+    for cause in without:
+        if cause not in known:
+            raise InputError(f"found {cause!r}, expected of {', '.join(known)}", key="without")
+    if isinstance(capture, FitResult):
+        fit_job: FitJob = _FinishedFit(capture, threads)
+    else:
+        fit_job = FitJob(capture, threads=threads)
+    job = CheckJob(fit_job, without=without)
+    _drain(job, progress)
+    checked = job.checked
+    found, before, after = finished(checked.found), finished(checked.result), finished(job.result)
+    details = diagnosis_json.describe(found, before, after)
+    stages = tuple(job.stages)
+    return DiagnosisResult(
+        named=tuple(details["named"]),
+        findings=tuple(_finding(cause) for cause in details["causes"]),
+        unexplained=bool(details["unexplained"]),
+        before=FitResult(before, dict(fit_job.samples), stages),
+        after=FitResult(after, dict(fit_job.samples), stages),
+        details=details,
+    )
+
+
+def predict(
+    capture: Capture,
+    result: FitResult,
+    *,
+    photos: Sequence[str | int] | None = None,
+    progress: Progress | None = None,
+) -> tuple[PhotoPrediction, ...]:
+    """Predict what photos show, and compare with what they do show.
+
+    capture: the fitted one, or another of the same mesh with other photos; photos: those to
+    predict, by name or place from 0, None for all of them. For photos that the fit has not seen,
+    nothing is estimated from the photo itself: no exposure, pose or colour, and no light is
+    refined. The material of a pixel is that of the face it shows, as the fit found it. Light is
+    direct, with cast shadows; effects of a diagnosis are not part of the prediction.
+
+    Each prediction has ``radiance``, ``encoded`` and ``measured``, (h, w, 3) float32, and
+    ``errors``: typical, relative RMS and RMSE in the photo's own encoding, over the pixels that see
+    the mesh and are not beside outlines. Raises InputError where photos or lights do not belong to
+    the fit, or for a photo that is not there.
+
+    >>> import patina
+    >>> capture = patina.load_capture(patina.DEMO_CAPTURE)
+    >>> fitted = patina.fit(patina.select_photos(capture, range(1, 8)))  # without the first
+    >>> (held_out,) = patina.predict(capture, fitted, photos=["lit/view_03.exr"])
+    >>> held_out.encoded.shape, held_out.errors.typical < 0.15
+    ((430, 384, 3), True)
+    """
+    inputs = prediction_inputs(capture, result.details)
+    places = range(len(capture.photos)) if photos is None else places_of(capture, photos)
+    found = []
+    for done, place in enumerate(places):
+        if progress is not None:
+            progress(Step(f"predicting {capture.photo_name(place)}", done / len(places)))
+        found.append(drained(predict_one(inputs, place)))
+    return tuple(found)
+
+
+def export(
+    result: FitResult,
+    folder: str | os.PathLike[str],
+    formats: Sequence[str] = (RECORD, REPORT, "binary"),
+) -> tuple[Loss, ...]:
+    """Write the materials for other programs into a folder, all of it or nothing.
+
+    formats: of ``FORMATS``. Returns what each format keeps of each material, which losses.txt and
+    losses.json say as well. Files of the same names are replaced. Raises InputError for an unknown
+    format and a folder that cannot be written, PatinaError where a format needs Blender.
+
+    >>> import tempfile
+    >>> import patina
+    >>> fitted = patina.fit(patina.load_capture(patina.DEMO_CAPTURE))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     losses = patina.export(fitted, folder, ["json", "binary", "mtlx"])
+    >>> sorted({file for loss in losses for file in loss.files if file.endswith(".binary")})
+    ['clay.binary', 'glaze.binary']
+    """
+    chosen = list(dict.fromkeys(formats))
+    for name in chosen:
+        if name not in FORMATS:
+            raise InputError(f"found {name!r}, expected of {', '.join(FORMATS)}", key="formats")
+        if name in BLENDER:
+            check_blender(f"the format {name}", f"material RESULT --to {name}")
+    out = check_out(Path(folder))
+    check_distinct([material.name for material in result.materials])
+    version = result_json.program_version()
+    fitted = exported_result(result.details, out / "result.json", version)
+    subjects = [Subject(material) for material in fitted.materials]
+    losses: list[Loss] = []
+    with staged_folder(out) as staging:
+        for name in chosen:
+            if name == RECORD:
+                result_json.write(staging / "result.json", result.details, result.stages, ())
+            elif name == REPORT:
+                for _ in write_report(staging / "report", result.details):
+                    pass
+            elif name in PLAIN:
+                losses += PLAIN[name](staging, subjects)
+            else:
+                losses += write_by_blender(name, staging, out, fitted, subjects)
+        if losses:
+            write_losses(staging, losses, ", ".join(subject.name for subject in subjects))
+    return tuple(losses)
+
+
+class _FinishedFit(FitJob):
+    """A fit that is already done, for jobs that begin with one."""
+
+    def __init__(self, fitted: FitResult, threads: int | None) -> None:
+        super().__init__(fitted.capture, basis=fitted.details.basis, threads=threads, keep=True)
+        self.result = fitted.details
+        self.samples = dict(fitted.samples)
+
+    def run(self) -> Iterator[Step]:
+        """Nothing is left to do."""
+        return iter(())
+
+
+def _drain(job: Job, progress: Progress | None) -> None:
+    """All of a job; it lets go of its threads also where it fails or is interrupted."""
+    try:
+        job.drain((lambda step: None) if progress is None else progress)
+    finally:
+        job.close()
+
+
+def _finding(cause: Mapping[str, Any]) -> Finding:
+    """One entry of diagnosis.json."""
+    return Finding(
+        cause=cause["cause"],
+        sentence=cause["sentence"],
+        accepted=cause["accepted"],
+        doubted=cause["doubted"],
+        gain=cause["held_out_gain"],
+        standard_error=cause["standard_error"],
+        p_value=cause["p_value"],
+        parameters={
+            name: (entry["value"], entry["standard_error"], entry["unit"])
+            for name, entry in cause["parameters"].items()
+        },
+    )
+
+
+def _check_threads(threads: int | None) -> None:
+    if threads is not None and threads < 1:
+        raise InputError(f"found {threads}, expected 1 or more", key="threads")

@@ -1,0 +1,200 @@
+"""What a fit predicts of the photos of a capture, which may be photos it was not fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..capture import Capture
+from ..capture.model import IGNORE_MASK
+from ..geometry import PixelRays, RayScene, SurfaceView, bands, edges, view_window
+from ..inputs import capture_data
+from ..inputs.lights import Lights, find_lights
+from ..inputs.photos import LitPhotos
+from ..light import DistantLight, Light, MountedLight, NearLight
+from ..photo.encoding import Encoding
+from ..predict.compose import predict_photo
+from ..predict.errors import PhotoErrors
+from ..samples.take import halo, light_surface
+from ..scan import Scan
+from .fit_job import CaptureResult
+
+BAND_PIXELS = 1 << 17  # of a photo at a time: some tens of MB
+
+
+@dataclass(frozen=True)
+class PhotoPrediction:
+    """The prediction of one photo of h × w pixels.
+
+    place: of the photo in its capture, from 0; name: its file. radiance: (h, w, 3) predicted
+    linear radiance in the unit of the fitted photos (pixel value / exposure), 0 in shadow, NaN
+    where no surface is seen. encoded: (h, w, 3) the same in the photo's own encoding, measured:
+    (h, w, 3) the photo in that encoding, both with Rec.709 primaries and 0..1 for integer formats.
+    compared: (h, w) the pixels that the errors are of: those that see the mesh, are not beside
+    outlines and not in the mask "ignore".
+    """
+
+    place: int
+    name: str
+    radiance: NDArray[np.float32]
+    encoded: NDArray[np.float32]
+    measured: NDArray[np.float32]
+    compared: NDArray[np.bool_]
+    errors: PhotoErrors
+
+
+@dataclass(frozen=True)
+class PredictionInputs:
+    """What the photos of a capture are predicted with; see ``prediction_inputs``."""
+
+    capture: Capture
+    fitted: CaptureResult
+    scan: Scan
+    rays: RayScene
+    photos: LitPhotos
+    lights: Lights
+
+
+def prediction_inputs(capture: Capture, fitted: CaptureResult) -> PredictionInputs:
+    """Open a capture for prediction. Nothing is estimated from its photos: lights that the fit
+    knows by the same entry are the fit's, also those that it refined; other lights are where their
+    entries say. Raises InputError where the capture has another mesh, or light or exposures whose
+    unit is not that of the fit.
+    """
+    if capture is fitted.capture:
+        return PredictionInputs(
+            capture, fitted, fitted.scan, fitted.rays, fitted.photos, fitted.lights
+        )
+    scan, rays = fitted.scan, fitted.rays
+    if not same(capture.scan, fitted.capture.scan):
+        scan = capture_data.open_scan(capture)
+        if not (
+            np.array_equal(scan.mesh.faces, fitted.scan.mesh.faces)
+            and np.array_equal(scan.mesh.vertices, fitted.scan.mesh.vertices)
+        ):
+            raise capture.error(
+                "this is another mesh than the fit's; expected the same one, whose faces the "
+                "fitted materials belong to",
+                "scan", "mesh",
+            )  # fmt: skip
+    capture_data.check_photos(capture, scan)
+    photos, unit = _photos_in_unit_of(capture, fitted)
+    return PredictionInputs(
+        capture, fitted, scan, rays, photos, _lights(capture, fitted, scan, photos, unit)
+    )
+
+
+def predict_one(given: PredictionInputs, place: int) -> Generator[float, None, PhotoPrediction]:
+    """Predict one photo, a band of rows at a time; yields the fraction done. Raises InputError."""
+    capture, fitted = given.capture, given.fitted
+    camera = capture_data.camera_of(capture, given.scan, place)
+    light = given.lights.of(capture, place)
+    shape = camera.height, camera.width
+    radiance = np.full((shape[0] * shape[1], 3), np.nan, np.float32)
+    inner = np.zeros(shape[0] * shape[1], bool)
+    margins = fitted.capture.fit.margins
+    lines = PixelRays.of(camera)
+    columns = given.rays.cover.columns(camera)
+    windows = list(bands(camera, halo(margins), columns, BAND_PIXELS))
+    for done, window in enumerate(windows):
+        yield done / (1 + len(windows))
+        view = view_window(given.rays, lines, window)
+        lighting = light_surface(given.rays, view, light, camera)
+        material = fitted.face_material[view.face]
+        parts = [
+            (material == index, found.fit.brdf, found.scale)
+            for index, found in enumerate(fitted.materials)
+        ]
+        wanted = view.pixel[view.wanted]
+        radiance[wanted] = predict_photo(view, lighting, parts)[view.wanted]
+        inner[wanted] = ~_beside_outline(view, margins.silhouette)[view.wanted]
+    yield len(windows) / (1 + len(windows))
+    compared = inner & np.isfinite(radiance[:, 0])
+    if IGNORE_MASK in capture.photos[place].masks:
+        compared &= ~capture_data.photo_masks(capture, place)[IGNORE_MASK].ravel()
+    photo = capture.photos[place]
+    exposure = np.float32(given.photos.exposures[place][0])
+    encoding = Encoding.of_file(photo.file, given.photos.curve(place))
+    encoded = encoding.encode(radiance * exposure)
+    measured = encoding.encode(given.photos.read(place).radiance * exposure)
+    return PhotoPrediction(
+        place=place,
+        name=capture.photo_name(place),
+        radiance=radiance.reshape(*shape, 3),
+        encoded=encoded.reshape(*shape, 3),
+        measured=measured,
+        compared=compared.reshape(shape),
+        errors=PhotoErrors.of(encoded[compared], measured.reshape(-1, 3)[compared]),
+    )
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two entries of capture files hold the same, arrays included."""
+    if is_dataclass(one) and not isinstance(one, type):
+        return type(one) is type(other) and all(
+            same(getattr(one, f.name), getattr(other, f.name)) for f in fields(one)
+        )
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        return one is not None and other is not None and np.array_equal(one, other)
+    return bool(one == other)
+
+
+def _beside_outline(view: SurfaceView, margin: int) -> NDArray[np.bool_]:
+    """(n,) pixels of a view within ``margin`` pixels of an outline."""
+    if margin <= 0:
+        return np.zeros(len(view.pixel), bool)
+    return view.at(edges.widen(view.silhouette, margin - 1))
+
+
+def _photos_in_unit_of(capture: Capture, fitted: CaptureResult) -> tuple[LitPhotos, float]:
+    """(the photos with exposures in the fit's unit, what radiance in the capture's own unit is to
+    be multiplied with)."""
+    own = LitPhotos.open(capture)
+    first = fitted.photos.first
+    if (own.first is None) != (first is None):
+        raise capture.error(
+            "the exposures of these photos and of the fitted ones are in different units: one has "
+            "EXIF's, the other's are given in the capture file; give exposure in both",
+            "photo", 0, "exposure",
+        )  # fmt: skip
+    if own.first is None or first is None or own.first == first:
+        return own, 1.0
+    ratio = own.first / first
+    exposures = tuple(tuple(e * ratio for e in photo) for photo in own.exposures)
+    return replace(own, exposures=exposures, first=first), 1.0 / ratio
+
+
+def _lights(
+    capture: Capture, fitted: CaptureResult, scan: Scan, photos: LitPhotos, unit: float
+) -> Lights:
+    """The lights in the fit's unit of radiance."""
+    known: Sequence[Any] = fitted.capture.lights
+    entries = {entry.name: entry for entry in known}
+    shared = [e for e in capture.lights if e.name in entries and same(e, entries[e.name])]
+    found = {entry.name: fitted.lights.by_name[entry.name] for entry in shared}
+    others = tuple(entry for entry in capture.lights if entry.name not in found)
+    if others:
+        more = find_lights(replace(capture, lights=others), scan, photos)
+        for entry in others:
+            light = more.by_name[entry.name]
+            if not (light.known and fitted.lights.known and fitted.capture.fit.absolute):
+                raise capture.error(
+                    f"the light {entry.name!r} is not one of the fitted capture, and how strong it "
+                    "is against those is not known: give irradiance or intensity in both captures",
+                    "light", capture.lights.index(entry), "name",
+                )  # fmt: skip
+            found[entry.name] = light if entry.strength is None else _scaled(light, unit)
+    return Lights(found)
+
+
+def _scaled(light: Light, factor: float) -> Light:
+    """The light, so many times as strong."""
+    if isinstance(light, DistantLight):
+        return replace(light, irradiance=light.effective_irradiance * factor)
+    if isinstance(light, (NearLight, MountedLight)) and light.intensity is not None:
+        return replace(light, intensity=light.intensity * factor)
+    return light
