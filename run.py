@@ -18,7 +18,7 @@ COMMANDS = {
     "test": ("tools.checks:main", "ruff, mypy and pytest; with --blender also in Blender"),
     "build": ("tools.build:main", "the extension's zips, one per platform, into dist/"),
     "pictures": ("tools.make_pictures", "the pictures of docs/images, made anew"),
-    "experiments": ("tools.experiments", "the paper's experiment, docs/experiments.md anew"),
+    "experiments": ("tools.experiments", "the paper's experiment, for docs/method/experiments.md"),
     "hunt": ("tools.hunt.table", "captures with a hidden effect, and whether it is found"),
     "bench": ("tools.bench_main", "the measurements behind the figures in docs/"),
 }

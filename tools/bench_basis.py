@@ -18,7 +18,7 @@ NIELSEN_5 = (
 
 
 def run(data: Path) -> None:
-    """Print the tables of docs/measurements.md, section "The basis"."""
+    """Print the tables of docs/method/measurements.md, section "The basis"."""
     from patina.core.angles import Angles, cosines, merl_grid
     from patina.core.basis import PrincipalBRDF, default_basis
     from patina.core.basis.build_default import NeuralObservations

@@ -25,8 +25,8 @@ def run(data: Path) -> None:
             "demo": DEMO,
         }
         print(
-            "| capture | named | left-out parts, before → after | left-out photos | error ÷ floor "
-            "| seconds, all and search |\n|---|---|---|---|---|---|"
+            "| capture | named | error on held-out regions, before → after | on held-out photos | "
+            "error ÷ noise floor | seconds: total, search |\n|---|---|---|---|---|---|"
         )
         said = []
         for label, path in captures.items():

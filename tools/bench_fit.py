@@ -12,7 +12,7 @@ SEEDS = 5
 
 
 def run(data: Path) -> None:
-    """Print the table of docs/measurements.md, section "The paper's fit"."""
+    """Print the table of docs/method/measurements.md, section "The paper's fit"."""
     from patina.commands.compare import read_truth
     from patina.core.angles import Angles, merl_grid
     from patina.core.basis import PrincipalBRDF, default_basis

@@ -9,7 +9,7 @@ import numpy as np
 
 
 def run(data: Path) -> None:
-    """Print the tables of docs/lights.md."""
+    """Print the tables of docs/guide/lights.md."""
     _rendered()
     _photos(data / "real/psbox_spheres")
 

@@ -1,4 +1,4 @@
-"""`run.py bench [NAME ...]`: what docs/measurements.md states, measured again."""
+"""`run.py bench [NAME ...]`: what docs/method/measurements.md states, measured again."""
 
 from __future__ import annotations
 

@@ -17,12 +17,12 @@ WORLDS = ("forest", "interior", "sunset")
 
 
 def run(data: Path) -> None:
-    """Print the table of docs/measurements.md, section "Noise"."""
+    """Print the table of docs/method/measurements.md, section "Noise"."""
     from patina.core.appearance.closure_split import split
     from patina.core.appearance.principled_fit import fit_principled
 
     print(f"## noise ({SIZE} x {SIZE} pixels, {SAMPLES} samples, {SEEDS} seeds)\n")
-    print("| material | by the portal | world | ours | Cycles' own | which | ratio |")
+    print("| material | by the portal | world | Patina | Cycles' own | which | ratio |")
     print("|---|---|---|---|---|---|---|")
     ratios: dict[str, list[float]] = {"diffuse": [], "glossy": []}
     for name, kind in MATERIALS:

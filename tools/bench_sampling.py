@@ -8,7 +8,7 @@ import numpy as np
 
 
 def run(data: Path) -> None:
-    """Print the table of docs/measurements.md, section "Samples"."""
+    """Print the table of docs/method/measurements.md, section "Samples"."""
     from patina.commands.compare import truth_weights
     from patina.core.brdf import nbrdf
     from patina.core.capture import read_capture

@@ -16,7 +16,7 @@ VIEWS = 24
 
 
 def run(data: Path) -> None:
-    """Print the tables of docs/solve.md."""
+    """Print the tables of docs/guide/solve.md."""
     print("## solve\n")
     _rendered()
     _real(data / "real" / "rodin_bronze")

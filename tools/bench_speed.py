@@ -30,7 +30,7 @@ WITHOUT = ("Principled", "materials on")  # and those that come after the coeffi
 
 
 def run(data: Path) -> None:
-    """Print the tables of docs/measurements.md, section "Speed and memory"."""
+    """Print the tables of docs/method/measurements.md, section "Speed and memory"."""
     with tempfile.TemporaryDirectory() as folder:
         _jobs(Path(folder))
     _selections()
@@ -38,7 +38,7 @@ def run(data: Path) -> None:
 
 def _jobs(folder: Path) -> None:
     print("## speed (half-float EXR, 2 threads, the default estimator)\n")
-    print("| photos | triangles | samples | used | scan, rays ready | samples taken | fit "
+    print("| photos | triangles | samples | used | scan and ray casting ready | sampling | fit "
           "| to coefficients | processor time | peak memory, sampling | all | report "
           "| with it |")  # fmt: skip
     print("|---|---|---|---|---|---|---|---|---|---|---|---|---|")
@@ -75,23 +75,23 @@ def _plain_way(where: Path) -> str:
     ours, plain = _case("job", where, 2, "paper"), _case("plain", where)
     seconds = sum(ours["seconds"].values())
     return (
-        f"- the paper's fit, {SMALL[0]} MP and {SMALL[1]:,} triangles: the plain way "
-        f"{plain['seconds']:.1f} s, {plain['peak_mb']:.0f} MB; ours {seconds:.1f} s, "
-        f"{ours['peak_mb']:.0f} MB: {plain['seconds'] / seconds:.1f} times; processor time "
+        f"- the paper's fit, {SMALL[0]} MP and {SMALL[1]:,} triangles: simple implementation "
+        f"{plain['seconds']:.1f} s, {plain['peak_mb']:.0f} MB; Patina {seconds:.1f} s, "
+        f"{ours['peak_mb']:.0f} MB: {plain['seconds'] / seconds:.1f} times faster; processor time "
         f"{plain['processor']:.1f} s to {ours['processor']:.1f} s: "
         f"{plain['processor'] / ours['processor']:.1f} times"
     )
 
 
 def _selections() -> None:
-    print("| candidates | n | condition number | of Nielsen's search | selection | peak memory |")
+    print("| candidates | n | condition number | by Nielsen's search | selection | peak memory |")
     print("|---|---|---|---|---|---|")
     for candidates, count in SELECTIONS:
         found = _case("select", candidates, count)
         nielsen = _case("nielsen", candidates, count)
         print(
             f"| {candidates:,} | {count} | {found['condition']:.2f} | {nielsen['condition']:.2f} "
-            f"(by our bounds in {nielsen['seconds']:.0f} s) | {found['seconds']:.1f} s | "
+            f"(with Patina's bounds in {nielsen['seconds']:.0f} s) | {found['seconds']:.1f} s | "
             f"{found['peak_mb']:.0f} MB |",
             flush=True,
         )
@@ -99,9 +99,9 @@ def _selections() -> None:
     for candidates, count in PLAIN_SELECTIONS:
         found = _case("compare", candidates, count)
         print(
-            f"- {candidates:,} candidates, n = {count}: plain {found['plain']:.2f} s (condition "
-            f"number {found['plain_condition']:.3f}), ours {found['ours']:.3f} s "
-            f"({found['condition']:.3f}): {found['plain'] / found['ours']:.0f} times",
+            f"- {candidates:,} candidates, n = {count}: simple search {found['plain']:.2f} s "
+            f"(condition number {found['plain_condition']:.3f}), Patina {found['ours']:.3f} s "
+            f"({found['condition']:.3f}): {found['plain'] / found['ours']:.0f} times faster",
             flush=True,
         )
     print()

@@ -19,7 +19,7 @@ PROPERTIES = {"count": 0, "replace": True}
 
 
 def run(data: Path) -> None:
-    """Print the table of docs/sidebar.md. data: not looked at."""
+    """Print the table of docs/guide/sidebar.md. data: not looked at."""
     import bpy
 
     from .package import load_patina
@@ -30,8 +30,8 @@ def run(data: Path) -> None:
     try:
         bpy.ops.patina.import_demo()
         print(
-            "| operator | took | beginning | a tick while it goes on: half below, 99 of 100 below, "
-            "longest | taking over: ticks, longest |\n|---|---|---|---|---|"
+            "| operator | duration | start | a tick during the job: median, 99th percentile, "
+            "longest | writing the result: ticks, longest |\n|---|---|---|---|---|"
         )
         for name in OPERATORS:
             print(_row(name), flush=True)

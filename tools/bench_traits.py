@@ -1,4 +1,4 @@
-"""What each slider of a measured material does: the table of docs/traits.md, written anew."""
+"""What each slider of a measured material does: the table of docs/guide/traits.md, written anew."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .common import ROOT
 if TYPE_CHECKING:
     from patina.core.basis import Basis, default_basis
 
-DOCUMENT = ROOT / "docs" / "traits.md"
+DOCUMENT = ROOT / "docs" / "guide" / "traits.md"
 
 
 def run(data: Path) -> None:
@@ -60,7 +60,8 @@ def table(basis: Basis) -> str:
 
     found = effects(basis)
     lines = [
-        "| component | variance | up by one deviation | body | peak | width | at grazing angles |",
+        "| component | variance | up by one standard deviation | body | peak | width "
+        "| at grazing angles |",
         "|---|---|---|---|---|---|---|",
     ]
     for i, (effect, word) in enumerate(zip(found, words(found), strict=True)):

@@ -21,7 +21,7 @@ REPEATS = 7
 
 
 def run(data: Path) -> None:
-    """Print the table of docs/measurements.md, section "Edits"."""
+    """Print the table of docs/method/measurements.md, section "Edits"."""
     import bpy
 
     from patina.core.appearance.principled_fit import fit_principled

@@ -123,7 +123,7 @@ def starter_capture(images: str) -> str:
 
 [scan]
 cameras = "{MODEL}"
-mesh = "model.ply"                 # dense reconstruction makes it: docs/solve.md says how
+mesh = "model.ply"                 # dense reconstruction makes it: docs/guide/solve.md says how
 images = {json.dumps(images, ensure_ascii=False)}
 
 # One lamp, and which way it is from the surface:

@@ -89,9 +89,20 @@ def test_manifest_says_what_blender_asks_for(manifest: dict) -> None:
     assert manifest["license"] == ["SPDX:GPL-3.0-or-later"]
     assert set(manifest["tags"]) <= TAGS
     assert re.fullmatch(r"\d+\.\d+\.\d+", manifest["version"])
+    assert manifest["website"].startswith("https://")
+    assert all(re.fullmatch(r"\d{4}(-\d{4})? \S.*", one) for one in manifest["copyright"])
     for sentence in (manifest["tagline"], *manifest["permissions"].values()):
-        assert len(sentence) <= 64
+        assert len(sentence) < 64
         assert not sentence.endswith(".")
+
+
+def test_citation_and_manifest_agree(manifest: dict) -> None:
+    """The version and the licence in CITATION.cff, and the works that the method builds on."""
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {manifest['version']}\n" in text
+    assert f"\nlicense: {manifest['license'][0].removeprefix('SPDX:')}\n" in text
+    for title in ("reliable geometric regions", "minimal BRDF sampling", "Neural BRDF"):
+        assert title in text
 
 
 def test_manifest_lists_exactly_the_pinned_wheels(manifest: dict) -> None:

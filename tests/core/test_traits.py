@@ -173,9 +173,9 @@ def test_a_component_does_what_its_words_say() -> None:
 
 
 def test_the_table_of_the_documents_is_the_basis_own(root: Path) -> None:
-    """docs/traits.md, written by `run.py bench traits`."""
+    """docs/guide/traits.md, written by `run.py bench traits`."""
     from tools.bench_traits import table
 
-    text = (root / "docs" / "traits.md").read_text(encoding="utf-8")
+    text = (root / "docs" / "guide" / "traits.md").read_text(encoding="utf-8")
     written = re.search(r"<!-- begin traits -->\n(.*?)\n<!-- end traits -->", text, re.S)
     assert written is not None and written.group(1) == table(default_basis())

@@ -321,5 +321,5 @@ def test_colours_are_told_apart_by_all_eyes() -> None:
 
 
 def test_the_guide_explains_every_criterion(root: Path) -> None:
-    told = (root / "docs" / "report.md").read_text("utf-8")
+    told = (root / "docs" / "guide" / "report.md").read_text("utf-8")
     assert all(look.word in told for look in LOOKS.values())

@@ -54,5 +54,5 @@ def test_a_table_says_what_was_right():
     said = table.table(rows)
     assert "| right cause first, at 1 % | 1 of 3 | 1 |" in said
     assert "**near_light**" in said and "**none**" in said
-    assert "| numbers within their 95 % interval | 3 of 3 | |" in said
+    assert "| parameters within their 95 % interval | 3 of 3 | |" in said
     assert "| rows of the present state" in said and "| 0 of 3 | |" in said

@@ -1,4 +1,4 @@
-"""The picture and the figures of docs/maps.md, made anew (needs the bpy wheel, some minutes):
+"""The picture and the figures of docs/guide/maps.md, made anew (needs the bpy wheel, some minutes):
 
 python -m tests.wheel.maps_picture docs/images/maps.jpg
 """
@@ -53,7 +53,7 @@ def panels(folder, result):
 
 
 def figures(folder, result):
-    """What docs/maps.md says."""
+    """What docs/guide/maps.md says."""
     expected, found = truth.truth(result.texels), base_color(result, 0)
     cosine, shaded, points = truth.looked_at(result.scan, result.texels)
     plain = truth.plain_way(folder, points, cosine)

@@ -1,4 +1,4 @@
 """The paper's experiment, rebuilt: simulated captures with known truth, estimators side by side.
 
-Run as `python3 run.py experiments`; docs/experiments.md says what is done and what came out.
+Run as `python3 run.py experiments`; docs/method/experiments.md describes it and its results.
 """

@@ -1,4 +1,4 @@
-"""`run.py experiments [NAME ...]`: what docs/experiments.md and docs/appearance.md state, measured
+"""`run.py experiments [NAME ...]`: tables of docs/method/experiments.md and appearance.md, measured
 and drawn again."""
 
 from __future__ import annotations

@@ -131,7 +131,7 @@ def worst(records: list[Record]) -> str:
         parts.append(
             f"**{name}**: lobe stack {_level(r, 'lobes'):.1f} dB, Principled "
             f"{_level(r, 'principled'):.1f} dB\n\n![{name}: table, lobe stack, Principled under "
-            f"{', '.join(SHOWN)}]({IMAGES}/{name}.png)"
+            f"{', '.join(SHOWN)}](../{IMAGES}/{name}.png)"
         )
     return "\n\n".join(parts)
 

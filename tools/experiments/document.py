@@ -1,4 +1,4 @@
-"""docs/experiments.md: what stands between its markers is written anew from the results."""
+"""docs/method/experiments.md: what stands between its markers is written anew from the results."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from . import appearance, figures, goal_table, store, tables
 from .ablation import SCENES
 from .records import Record, distinct, where
 
-DOCUMENT = ROOT / "docs" / "experiments.md"
-APPEARANCE = ROOT / "docs" / "appearance.md"
-IMAGES = "images/experiments"
+DOCUMENT = ROOT / "docs" / "method" / "experiments.md"
+APPEARANCE = ROOT / "docs" / "method" / "appearance.md"
+IMAGES = "../images/experiments"
 ESTIMATORS = (
     "paper", "all samples k=20", "ours", "ours, true mesh", "all samples k=40, true mesh",
     "floor k=20", "floor k=40", "floor k=100",
@@ -48,7 +48,7 @@ def sections() -> dict[str, tuple[str, Section]]:
 
 
 def appearance_sections() -> dict[str, tuple[str, Section]]:
-    """The same of docs/appearance.md."""
+    """The same of docs/method/appearance.md."""
     return {
         "models": ("appearance", appearance.summary),
         "models by material": ("appearance", appearance.by_material),

@@ -1,4 +1,4 @@
-"""The figures of docs/experiments.md, drawn from records."""
+"""The figures of docs/method/experiments.md, drawn from records."""
 
 from __future__ import annotations
 

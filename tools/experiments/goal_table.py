@@ -31,7 +31,7 @@ def goals(records: list[Record]) -> str:
         _picture_row(ours, paper, oracle, records),
         _band_row(ours),
     ]
-    return table(["goal", "wanted", "found", "reached", "what the oracle reaches"], rows)
+    return table(["goal", "target", "result", "reached", "bound"], rows)
 
 
 def by_material(records: list[Record], estimators: list[str]) -> str:
@@ -230,9 +230,10 @@ def _band_row(ours: list[Record]) -> list[str]:
     seen, unseen = values(ours, "band_seen"), values(ours, "band_unseen")
     said = NOT
     if seen:
-        said = f"{np.median(seen):.0%} where photos looked, {np.median(unseen):.0%} elsewhere"
+        shown, others = np.median(seen), np.median(unseen)
+        said = f"{shown:.0%} in directions that photos show, {others:.0%} elsewhere"
     return [
-        "truth inside ours' 90 % bands, median over cases",
+        "truth inside the 90 % interval, ours, median over cases",
         "85 … 95 %",
         said,
         _reached(seen and [float(np.median(seen))], lambda x: 0.85 <= x[0] <= 0.95),

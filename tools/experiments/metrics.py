@@ -1,4 +1,4 @@
-"""How far a fitted BRDF is from the truth, by every figure that docs/experiments.md speaks of."""
+"""Errors of a fitted BRDF against the truth: every measure that docs/method/experiments.md uses."""
 
 from __future__ import annotations
 

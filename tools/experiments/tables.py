@@ -18,8 +18,8 @@ def check(records: list[Record]) -> str:
         ]
         for r in records
     ]  # fmt: skip
-    head = ["mesh of", "material", "pixels", "median of ln(ours / theirs)", "robust scatter"]
-    return table([*head, "relative L2", "of it, the 20 worst pixels"], rows)
+    head = ["mesh of", "material", "pixels", "median of ln(Patina / reference)", "robust scatter"]
+    return table([*head, "relative L2", "share of the 20 worst pixels"], rows)
 
 
 def ablation(records: list[Record], key: str) -> str:

@@ -1,4 +1,4 @@
-"""`run.py hunt`: captures with a hidden effect, diagnosed; the table of docs/diagnosis.md.
+"""`run.py hunt`: diagnose captures with a hidden effect (docs/notebook/hidden-effects.md).
 
 Rows are kept in a file as they are found, so that the table can be made in pieces.
 """
@@ -130,27 +130,27 @@ def _sums(rows: Sequence[Row]) -> list[str]:
         if row.cause == "none":
             group = "none: nothing named"
         elif row.hidden == {"unknown"}:
-            group = "beyond the vocabulary: `unknown`"
+            group = "unlisted effects: `unknown`"
         elif "+" in row.cause:
-            group = "pairs: both and no third"
+            group = "pairs: both causes and no third"
         else:
             group = f"right cause first, at {100 * row.wanted:.0f} %"
         groups[group].append(row)
-    lines = ["| | right | another name |", "|---|---|---|"]
+    lines = ["| captures | right | wrong cause named |", "|---|---|---|"]
     for group, mine in sorted(groups.items()):
         right, wrong = sum(r.right for r in mine), sum(r.wrong_name for r in mine)
         lines.append(f"| {group} | {right} of {len(mine)} | {wrong} |")
     told = sum(len(row.off) for row in rows)
     if told:
         inside = sum(row.inside for row in rows)
-        lines.append(f"| numbers within their 95 % interval | {inside} of {told} | |")
+        lines.append(f"| parameters within their 95 % interval | {inside} of {told} | |")
     ratios = sorted(row.brdf for row in rows if row.brdf is not None and row.right)
     if ratios:
         within = sum(ratio <= 1.2 for ratio in ratios)
         said = f"{within} of {len(ratios)} (median {ratios[len(ratios) // 2]:.2f})"
         lines.append(f"| BRDF error ÷ without the effect ≤ 1.2, where right | {said} | |")
     within = sum(row.over_floor <= 1.1 for row in rows)
-    lines.append(f"| error of left-out parts ÷ floor ≤ 1.1 | {within} of {len(rows)} | |")
+    lines.append(f"| error of held-out regions ÷ noise floor ≤ 1.1 | {within} of {len(rows)} | |")
     present = state()
     mine = sum(row.state == present for row in rows)
     lines.append(f"| rows of the present state, {present} | {mine} of {len(rows)} | |")
