@@ -132,14 +132,10 @@ class PATINA_OT_show_evidence(bpy.types.Operator):
 
 
 CLASSES = (PATINA_OT_check, PATINA_OT_refit, PATINA_OT_show_evidence)
-
-
-def register() -> None:
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
+register, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
 
 
 def unregister() -> None:
+    """Remove the classes and the status line."""
     tell(None)
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    _unregister_classes()

@@ -136,13 +136,4 @@ class PATINA_FH_photos(OverViewport, bpy.types.FileHandler):
 
 
 CLASSES = (PATINA_OT_drop_photos, PATINA_FH_capture, PATINA_FH_cameras, PATINA_FH_photos)
-
-
-def register() -> None:
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -30,9 +30,4 @@ class PATINA_OT_empty_cache(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def register() -> None:
-    bpy.utils.register_class(PATINA_OT_empty_cache)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(PATINA_OT_empty_cache)
+register, unregister = bpy.utils.register_classes_factory((PATINA_OT_empty_cache,))

@@ -103,10 +103,10 @@ def _usual(scene: bpy.types.Scene) -> str:
     return f"{Path(capture_path(scene)).name.split('.')[0]} export"
 
 
-def register() -> None:
-    bpy.utils.register_class(PATINA_OT_export)
+register, _unregister_classes = bpy.utils.register_classes_factory((PATINA_OT_export,))
 
 
 def unregister() -> None:
+    """Remove the classes and the status line."""
     tell(None)
-    bpy.utils.unregister_class(PATINA_OT_export)
+    _unregister_classes()

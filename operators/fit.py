@@ -93,10 +93,10 @@ class PATINA_OT_fit(Stepped, bpy.types.Operator):
         self.report({"INFO"}, f"{len(result.materials)} materials measured")
 
 
-def register() -> None:
-    bpy.utils.register_class(PATINA_OT_fit)
+register, _unregister_classes = bpy.utils.register_classes_factory((PATINA_OT_fit,))
 
 
 def unregister() -> None:
+    """Remove the classes and the status line."""
     tell(None)
-    bpy.utils.unregister_class(PATINA_OT_fit)
+    _unregister_classes()

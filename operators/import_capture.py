@@ -92,13 +92,4 @@ def bring_in(operator: bpy.types.Operator, context: bpy.types.Context, path: Pat
 
 
 CLASSES = (PATINA_OT_import_capture, PATINA_OT_import_demo)
-
-
-def register() -> None:
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -45,9 +45,4 @@ class PATINA_OT_next_photo(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def register() -> None:
-    bpy.utils.register_class(PATINA_OT_next_photo)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(PATINA_OT_next_photo)
+register, unregister = bpy.utils.register_classes_factory((PATINA_OT_next_photo,))

@@ -38,9 +38,4 @@ saved in a file of an asset library they are found from everywhere"""
         return {"FINISHED"}
 
 
-def register() -> None:
-    bpy.utils.register_class(PATINA_OT_mark_assets)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(PATINA_OT_mark_assets)
+register, unregister = bpy.utils.register_classes_factory((PATINA_OT_mark_assets,))

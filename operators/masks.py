@@ -136,14 +136,10 @@ class PATINA_OT_shadow_masks(_OfCapture, bpy.types.Operator):
 
 
 CLASSES = (PATINA_OT_propose_materials, PATINA_OT_shadow_masks)
-
-
-def register() -> None:
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
+register, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
 
 
 def unregister() -> None:
+    """Remove the classes and the status line."""
     tell(None)
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    _unregister_classes()

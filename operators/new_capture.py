@@ -181,9 +181,4 @@ def _path(text: str) -> Path:
     return Path(bpy.path.abspath(text))
 
 
-def register() -> None:
-    bpy.utils.register_class(PATINA_OT_new_capture)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(PATINA_OT_new_capture)
+register, unregister = bpy.utils.register_classes_factory((PATINA_OT_new_capture,))

@@ -217,13 +217,4 @@ CLASSES = (
     PATINA_OT_slots_from_face_sets,
     PATINA_OT_export_masks,
 )
-
-
-def register() -> None:
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -35,9 +35,4 @@ class PATINA_OT_reset_traits(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def register() -> None:
-    bpy.utils.register_class(PATINA_OT_reset_traits)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(PATINA_OT_reset_traits)
+register, unregister = bpy.utils.register_classes_factory((PATINA_OT_reset_traits,))

@@ -67,9 +67,4 @@ class PATINA_OT_save_lights(bpy.types.Operator):
         return names, out
 
 
-def register() -> None:
-    bpy.utils.register_class(PATINA_OT_save_lights)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(PATINA_OT_save_lights)
+register, unregister = bpy.utils.register_classes_factory((PATINA_OT_save_lights,))

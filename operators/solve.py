@@ -101,9 +101,4 @@ class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
         create_reconstruction(scene, self._photos.name, found, None, rectified_folder(capture))
 
 
-def register() -> None:
-    bpy.utils.register_class(PATINA_OT_solve_photos)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(PATINA_OT_solve_photos)
+register, unregister = bpy.utils.register_classes_factory((PATINA_OT_solve_photos,))

@@ -105,13 +105,4 @@ came from"""
 
 
 CLASSES = (PATINA_OT_show_chart, PATINA_OT_look_at_photo)
-
-
-def register() -> None:
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

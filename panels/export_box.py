@@ -59,13 +59,4 @@ class PATINA_PT_export(bpy.types.Panel):
 
 
 CLASSES = (PATINA_OT_add_export_preset, PATINA_PT_export_presets, PATINA_PT_export)
-
-
-def register() -> None:
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

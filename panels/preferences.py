@@ -108,9 +108,4 @@ class PatinaPreferences(bpy.types.AddonPreferences):
             column.label(text=str(place), icon="FILE_FOLDER")
 
 
-def register() -> None:
-    bpy.utils.register_class(PatinaPreferences)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(PatinaPreferences)
+register, unregister = bpy.utils.register_classes_factory((PatinaPreferences,))

@@ -105,9 +105,4 @@ def notes(material: bpy.types.Material) -> list[tuple[str, str]]:
     return said
 
 
-def register() -> None:
-    bpy.utils.register_class(PATINA_PT_traits)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(PATINA_PT_traits)
+register, unregister = bpy.utils.register_classes_factory((PATINA_PT_traits,))

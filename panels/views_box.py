@@ -66,9 +66,4 @@ class PATINA_PT_views(bpy.types.Panel):
         row.prop(views, ANGLES[views.shown])
 
 
-def register() -> None:
-    bpy.utils.register_class(PATINA_PT_views)
-
-
-def unregister() -> None:
-    bpy.utils.unregister_class(PATINA_PT_views)
+register, unregister = bpy.utils.register_classes_factory((PATINA_PT_views,))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..session.handlers import register_property_factory
 from ..session.last_fit import kept_fit
 from ..session.scene_properties import capture_path, stored_result
 
@@ -72,13 +73,4 @@ class PatinaExport(bpy.types.PropertyGroup):
     )
 
 
-def register() -> None:
-    """The scene's choice."""
-    bpy.utils.register_class(PatinaExport)
-    bpy.types.Scene.patina_export = bpy.props.PointerProperty(type=PatinaExport)
-
-
-def unregister() -> None:
-    """Take it away."""
-    del bpy.types.Scene.patina_export
-    bpy.utils.unregister_class(PatinaExport)
+register, unregister = register_property_factory(bpy.types.Scene, "patina_export", PatinaExport)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import bpy
 from bpy.app.handlers import persistent
 
-from ..session.handlers import attach, detach
+from ..session.handlers import register_handlers_factory
 from .material_nodes import osl_missing
 from .osl_files import own_materials, script_nodes
 
@@ -88,13 +88,4 @@ HANDLERS = (
     ("load_post", _after_load),
     ("render_pre", _before_render),
 )
-
-
-def register() -> None:
-    """Follow the scene's render settings from now on."""
-    attach(HANDLERS)
-
-
-def unregister() -> None:
-    """Leave nothing behind."""
-    detach(HANDLERS)
+register, unregister = register_handlers_factory(HANDLERS)

@@ -14,7 +14,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...core.appearance import osl_source
-from ..session.handlers import attach, detach
+from ..session.handlers import register_handlers_factory
 from .osl_files import own_shaders
 
 log = logging.getLogger(__name__)
@@ -151,13 +151,4 @@ def _before_render(scene: bpy.types.Scene, *_: object) -> None:
 
 
 HANDLERS = (("depsgraph_update_post", _after_update), ("render_pre", _before_render))
-
-
-def register() -> None:
-    """Follow the lamps from now on."""
-    attach(HANDLERS)
-
-
-def unregister() -> None:
-    """Leave nothing behind."""
-    detach(HANDLERS)
+register, unregister = register_handlers_factory(HANDLERS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..session.handlers import register_property_factory
 from .measured_materials import measured_materials
 from .trait_offsets import SLIDERS, movable
 from .trait_update import follow
@@ -85,15 +86,6 @@ def reset(material: bpy.types.Material) -> None:
     follow(material, wholly=True)
 
 
-def register() -> None:
-    """Give every material its sliders."""
-    bpy.utils.register_class(PatinaShifts)
-    bpy.utils.register_class(PatinaTraits)
-    bpy.types.Material.patina_traits = bpy.props.PointerProperty(type=PatinaTraits)
-
-
-def unregister() -> None:
-    """Leave nothing behind."""
-    del bpy.types.Material.patina_traits
-    bpy.utils.unregister_class(PatinaTraits)
-    bpy.utils.unregister_class(PatinaShifts)
+register, unregister = register_property_factory(
+    bpy.types.Material, "patina_traits", PatinaShifts, PatinaTraits
+)

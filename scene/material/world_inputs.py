@@ -19,7 +19,7 @@ from mathutils import Matrix
 from ...core.appearance import osl_atlas, osl_source
 from ...core.appearance.world_table import world_texels
 from ...core.errors import PatinaError
-from ..session.handlers import attach, detach
+from ..session.handlers import register_handlers_factory
 from .osl_files import own_shaders
 
 log = logging.getLogger(__name__)
@@ -158,13 +158,4 @@ HANDLERS = (
     ("load_post", _after_load),
     ("render_pre", _before_render),
 )
-
-
-def register() -> None:
-    """Follow the world from now on."""
-    attach(HANDLERS)
-
-
-def unregister() -> None:
-    """Leave nothing behind."""
-    detach(HANDLERS)
+register, unregister = register_handlers_factory(HANDLERS)

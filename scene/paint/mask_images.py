@@ -18,7 +18,7 @@ from ...core.errors import PatinaError
 from ...core.photo.image import write_png
 from ..property_keys import CAPTURE, LIT_PHOTO_INDEX, MASK_KIND, MASK_PHOTO_INDEX, MASK_PHOTO_NAME
 from ..session.folders import blend_folder
-from ..session.handlers import attach, detach
+from ..session.handlers import register_handlers_factory
 
 WORDS = {"shadow": "Shadow", "highlight": "Highlight", "ignore": "Ignore"}
 
@@ -175,13 +175,4 @@ def _pack(*_: object) -> None:
 
 
 HANDLERS = (("save_pre", _pack),)
-
-
-def register() -> None:
-    """Pack masks whenever the file is saved."""
-    attach(HANDLERS)
-
-
-def unregister() -> None:
-    """No more."""
-    detach(HANDLERS)
+register, unregister = register_handlers_factory(HANDLERS)

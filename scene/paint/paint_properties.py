@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ...core.errors import PatinaError
+from ..session.handlers import register_property_factory
 from ..session.scene_properties import capture_path
 from .canvas import take_strokes
 
@@ -34,13 +35,4 @@ class PatinaPaint(bpy.types.PropertyGroup):
     )
 
 
-def register() -> None:
-    """On the scene."""
-    bpy.utils.register_class(PatinaPaint)
-    bpy.types.Scene.patina_paint = bpy.props.PointerProperty(type=PatinaPaint)
-
-
-def unregister() -> None:
-    """Nothing is left."""
-    del bpy.types.Scene.patina_paint
-    bpy.utils.unregister_class(PatinaPaint)
+register, unregister = register_property_factory(bpy.types.Scene, "patina_paint", PatinaPaint)

@@ -9,7 +9,7 @@ import bpy
 
 from ...core.capture.entries import PhotoEntry
 from ..property_keys import CAPTURE, LIGHT_NAME, LIT_PHOTO, LIT_PHOTO_INDEX
-from ..session.handlers import attach, detach
+from ..session.handlers import attach, detach, register_property_factory
 from ..session.scene_properties import capture_path
 from . import cameras, lamps
 from .exposed_photo import exposed
@@ -181,21 +181,19 @@ def _fill_old_files(*_: object) -> None:
                 state.active = len(state.photos) - 1
 
 
-CLASSES = (PatinaPhoto, PatinaPhotos)
 HANDLERS = (("load_post", _fill_old_files),)
+_register_property, _unregister_property = register_property_factory(
+    bpy.types.Scene, "patina_photos", PatinaPhoto, PatinaPhotos
+)
 
 
 def register() -> None:
-    """The list, on the scene."""
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
-    bpy.types.Scene.patina_photos = bpy.props.PointerProperty(type=PatinaPhotos)
+    """Add the list of photos to every scene."""
+    _register_property()
     attach(HANDLERS)
 
 
 def unregister() -> None:
-    """Nothing is left."""
+    """Remove the list of photos and its handlers."""
     detach(HANDLERS)
-    del bpy.types.Scene.patina_photos
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    _unregister_property()

@@ -10,6 +10,7 @@ from typing import Any
 import bpy
 
 from ..property_keys import CAPTURE
+from .handlers import register_property_factory
 
 RESULT, DIAGNOSIS = "Patina result", "Patina diagnosis"  # names of texts
 
@@ -83,13 +84,6 @@ def _text(capture: str, kind: str) -> bpy.types.Text | None:
     return next((t for t in mine if t.name.startswith(kind)), None)
 
 
-def register() -> None:
-    bpy.utils.register_class(PatinaCause)
-    bpy.utils.register_class(PatinaScene)
-    bpy.types.Scene.patina = bpy.props.PointerProperty(type=PatinaScene)
-
-
-def unregister() -> None:
-    del bpy.types.Scene.patina
-    bpy.utils.unregister_class(PatinaScene)
-    bpy.utils.unregister_class(PatinaCause)
+register, unregister = register_property_factory(
+    bpy.types.Scene, "patina", PatinaCause, PatinaScene
+)

@@ -18,6 +18,7 @@ from ..material.material_evidence import earlier_subject, subject_of
 from ..material.trait_offsets import moved_brdf
 from ..material.trait_properties import shown_material
 from ..property_keys import MEASURED_NAME
+from ..session.handlers import register_property_factory
 from .photo_comparison import show_again
 from .view_image import put_view, view_image
 
@@ -218,13 +219,4 @@ def _other(views: PatinaViews, material: bpy.types.Material) -> Subject | None:
     return None
 
 
-def register() -> None:
-    """Give every scene its views."""
-    bpy.utils.register_class(PatinaViews)
-    bpy.types.Scene.patina_views = bpy.props.PointerProperty(type=PatinaViews)
-
-
-def unregister() -> None:
-    """Leave nothing behind."""
-    del bpy.types.Scene.patina_views
-    bpy.utils.unregister_class(PatinaViews)
+register, unregister = register_property_factory(bpy.types.Scene, "patina_views", PatinaViews)

@@ -18,8 +18,8 @@ from patina.core.capture import read_capture
 from patina.core.capture.section import Section
 from patina.core.diagnose import effects
 from patina.core.errors import InputError
-from patina.core.job import FitJob
-from patina.core.job.check_job import CheckJob
+from patina.core.jobs import FitJob
+from patina.core.jobs.check_job import CheckJob
 from patina.core.report import diagnosis_json, result_json
 from tests import make_capture as made
 
