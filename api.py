@@ -4,7 +4,7 @@
 
     capture = patina.load_capture("my.capture.toml")
     fitted = patina.fit(capture)
-    patina.export(fitted, "results", ["json", "report", "binary", "mtlx"])
+    patina.export(fitted, "results", ["json", "report", "binary", "pbrt"])
 
 Every function raises ``PatinaError`` for what a user can mend (its subclass ``InputError`` where a
 file or a value is wrong), with a message of one line: what was found, what was expected.
@@ -22,9 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .commands.material import BLENDER, PLAIN, write_by_blender
 from .commands.needs_blender import check_blender
-from .commands.staging import check_out, staged_folder
 from .core.angles import Angles, half_difference
 from .core.basis import Basis
 from .core.capture import Capture, read_capture
@@ -34,12 +32,14 @@ from .core.diagnose.effects import EFFECTS
 from .core.errors import InputError, PatinaError
 from .core.export import Loss, write_losses
 from .core.export.file_names import check_distinct
+from .core.export.material_formats import BLENDER, PLAIN
 from .core.export.subject import Subject
 from .core.jobs import CaptureResult, FitJob, Job, MaterialResult, Stage, finished
 from .core.jobs.check_job import CheckJob
 from .core.jobs.exported_result import exported_result
 from .core.jobs.photo_prediction import PhotoPrediction, predict_one, prediction_inputs
 from .core.jobs.select_photos import places_of, select_photos
+from .core.output_folder import check_out, staged_folder
 from .core.predict.errors import PhotoErrors
 from .core.report import diagnosis_json, result_json, write_report
 from .core.samples import SampleTable
@@ -297,9 +297,10 @@ def export(
 
     >>> import tempfile
     >>> import patina
-    >>> fitted = patina.fit(patina.load_capture(patina.DEMO_CAPTURE))
+    >>> capture = patina.load_capture(patina.DEMO_CAPTURE)
+    >>> fitted = patina.fit(patina.select_photos(capture, [0, 2, 4, 6]))
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     losses = patina.export(fitted, folder, ["json", "binary", "mtlx"])
+    ...     losses = patina.export(fitted, folder, ["json", "binary", "pbrt"])
     >>> sorted({file for loss in losses for file in loss.files if file.endswith(".binary")})
     ['clay.binary', 'glaze.binary']
     """
@@ -325,10 +326,16 @@ def export(
             elif name in PLAIN:
                 losses += PLAIN[name](staging, subjects)
             else:
-                losses += write_by_blender(name, staging, out, fitted, subjects)
+                losses += _by_blender(name, staging, out, fitted, subjects)
         if losses:
             write_losses(staging, losses, ", ".join(subject.name for subject in subjects))
     return tuple(losses)
+
+
+def _by_blender(*arguments: Any) -> list[Loss]:
+    from .scene.export.export_formats import write_format  # needs bpy
+
+    return write_format(*arguments)
 
 
 class _FinishedFit(FitJob):

@@ -8,8 +8,8 @@ from pathlib import Path
 from ..core.basis import storage
 from ..core.basis.merl_folder import cached_basis
 from ..core.concurrency.job import Step
+from ..core.output_folder import staged_folder
 from .progress import Progress
-from .staging import staged_folder
 
 HELP = "principal components of your own copy of the MERL database"
 

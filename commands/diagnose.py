@@ -11,12 +11,12 @@ from ..core.diagnose.effects import EFFECTS
 from ..core.diagnose.selection.diagnosis import Diagnosis
 from ..core.jobs import FitJob, finished
 from ..core.jobs.check_job import CheckJob
+from ..core.output_folder import check_out, staged_folder
 from ..core.report import diagnosis, diagnosis_json
 from . import capture_arguments
 from .fit import tell, write_results
 from .progress import Progress
 from .solve import check_threads
-from .staging import check_out, staged_folder
 
 MATERIALS = "report/materials"  # the second fit's own report
 HELP = "fit a capture, say what is wrong with it, and fit it again with that in the model"

@@ -13,13 +13,13 @@ from ..core.capture import read_capture
 from ..core.concurrency.job import Step, peak_memory
 from ..core.fit.measured_result import MeasuredResult
 from ..core.jobs import CaptureResult, FitJob, Stage, finished
+from ..core.output_folder import check_out, staged_folder
 from ..core.report import result_json, write_report
 from ..core.report.figures import reach
 from . import capture_arguments
 from .needs_blender import has_blender
 from .progress import Progress
 from .solve import check_threads
-from .staging import check_out, staged_folder
 
 NO_SCENE = "no scene.blend was written, which needs Blender; everything else is complete"
 HELP = "fit every material of a capture and write them"

@@ -14,9 +14,9 @@ from ..core.errors import InputError
 from ..core.inputs import capture_data
 from ..core.inputs.lights import find_lights
 from ..core.inputs.photos import LitPhotos
+from ..core.output_folder import staged_folder
 from ..core.scan.formats import read_reconstruction
 from .needs_blender import check_blender
-from .staging import staged_folder
 
 HELP = "mesh, cameras with their photos and lights of a capture, as a .blend"
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..core.capture.reader import read_scan_entry
 from ..core.errors import InputError, PatinaError
+from ..core.output_folder import check_out, staged_folder
 from ..core.scan import Camera, Mesh
 from ..core.scan.formats import read_reconstruction
 from ..core.scan.readers.colmap import is_colmap
@@ -14,7 +15,6 @@ from ..core.scan.scan import read_scan
 from ..core.solve import LocaliseJob, find_photos
 from .progress import Progress
 from .solve import check_threads
-from .staging import check_out, staged_folder
 
 HELP = "cameras for lit photos that share no viewpoint with a photo of the scan"
 

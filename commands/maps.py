@@ -13,12 +13,12 @@ from ..core.maps import MapsJob, MapsSettings
 from ..core.maps.maps_job import REFITS, MapsResult
 from ..core.maps.texels import check_size
 from ..core.maps.write import write_maps
+from ..core.output_folder import check_out, staged_folder
 from ..core.report import result_json
 from ..core.result import read_result
 from .fit import NO_SCENE, timed
 from .needs_blender import has_blender
 from .progress import Progress
-from .staging import check_out, staged_folder
 
 HELP = "base colour without light, roughness and coverage maps over the mesh's UVs"
 

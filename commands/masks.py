@@ -10,8 +10,8 @@ from ..core.errors import InputError
 from ..core.jobs import finished
 from ..core.masks.proposal import MOST_MATERIALS
 from ..core.masks.write_masks import MasksJob, Wanted, check_final
+from ..core.output_folder import check_out, staged_folder
 from .progress import Progress
-from .staging import check_out, staged_folder
 
 HELP = "shadow masks and proposed materials of a capture, to look at, repaint and fit with"
 

@@ -8,11 +8,11 @@ from pathlib import Path
 from ..core.concurrency.job import Step
 from ..core.errors import InputError
 from ..core.export.subject import Subject
+from ..core.output_folder import check_out, staged_folder
 from ..core.report.relit import Picture, write_page
 from ..core.result import read_result
 from .needs_blender import check_blender
 from .progress import Progress
-from .staging import check_out, staged_folder
 
 HELP = "render a result's materials, and the scanned object, under pictures of the world"
 

@@ -6,10 +6,10 @@ import argparse
 from pathlib import Path
 
 from ..core.errors import InputError
+from ..core.output_folder import check_out, staged_folder
 from ..core.solve import SolveJob
 from ..core.solve.solve import LENSES
 from .progress import Progress
-from .staging import check_out, staged_folder
 
 HELP = "cameras and sparse points from a folder of photos (structure from motion)"
 

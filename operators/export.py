@@ -6,9 +6,9 @@ from pathlib import Path
 
 import bpy
 
-from ..commands.export_open import ExportJob
 from ..core.errors import InputError
 from ..scene.export.export_choice import FORMATS
+from ..scene.export.export_job import ExportJob
 from ..scene.session.folders import cache_folder
 from ..scene.session.running_job import tell
 from ..scene.session.scene_properties import capture_path, stored_result

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import bpy
 
-from ..commands.staging import check_out, staged_folder
 from ..core.capture import Capture, read_capture
 from ..core.concurrency.job import Job, Step
 from ..core.errors import InputError, PatinaError
 from ..core.masks.proposal import MOST_MATERIALS
 from ..core.masks.proposal_job import ProposalJob
 from ..core.masks.write_masks import MasksJob, Wanted, Written, material_names
+from ..core.output_folder import check_out, staged_folder
 from ..scene.paint.apply_paint import take_all
 from ..scene.paint.mask_images import (
     masks_folder,

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import bpy
 
-from ..commands.staging import check_out
 from ..core.errors import PatinaError
+from ..core.output_folder import check_out
 from ..scene.paint.apply_paint import take_all
 from ..scene.paint.brushes import ready_to_paint
 from ..scene.paint.canvas import canvas_of, canvases, draw

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import bpy
 
-from ..commands.staging import check_out, staged_folder
 from ..core.errors import InputError
+from ..core.output_folder import check_out, staged_folder
 from ..core.scan.readers.colmap import read_colmap
 from ..core.solve import SolveJob
 from ..core.solve.solution import MODEL

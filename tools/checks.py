@@ -14,6 +14,7 @@ from .build import DIST
 from .common import ROOT, Failure, cache_dir, call, say, this_platform
 from .environment import test_python
 from .extension import pack
+from .import_rules import check_imports
 from .wheels import PYTHONS
 
 
@@ -23,7 +24,7 @@ def lint(python: Path) -> int:
 
 
 def types(python: Path) -> int:
-    """Run mypy over core.
+    """Run mypy over core and the Python API.
 
     Its imports are relative, so it is a package only under a parent; the checkout may have any
     name, so mypy is shown it as `patina` through a link in an empty folder.
@@ -33,13 +34,15 @@ def types(python: Path) -> int:
         try:
             seen.symlink_to(ROOT, target_is_directory=True)
         except OSError:  # Windows without the right to make links
-            shutil.copytree(ROOT / "core", seen / "core")
-            shutil.copy2(ROOT / "__init__.py", seen)
+            for room in ("core", "commands"):
+                shutil.copytree(ROOT / room, seen / room)
+            for file in ("__init__.py", "api.py"):
+                shutil.copy2(ROOT / file, seen)
         command = [
             python, "-c", "import os, sys; os.chdir(sys.argv.pop(1)); "
             "from mypy.__main__ import console_entry; console_entry()",
             folder, "--config-file", ROOT / "pyproject.toml",
-            "--cache-dir", cache_dir() / "mypy", "-p", "patina.core",
+            "--cache-dir", cache_dir() / "mypy", "-p", "patina.core", "-m", "patina.api",
         ]  # fmt: skip
         return call(command)
 
@@ -88,6 +91,7 @@ def main(arguments: Sequence[str]) -> int:
         stages = [
             ("ruff", lambda: lint(python)),
             ("mypy", lambda: types(python)),
+            ("imports", lambda: check_imports(python)),
             ("pytest", lambda: python_tests(python, rest)),
         ]
     if asked.blender or asked.only_blender:

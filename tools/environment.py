@@ -27,6 +27,7 @@ TEST_TOOLS = [
     "mitsuba==3.9.1",
     "ruff==0.13.3",
     "mypy==1.18.2",
+    "import-linter==2.17",
     "jsonschema==4.25.1",  # validates what is written against assets/schemas
 ]
 

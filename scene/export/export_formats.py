@@ -119,3 +119,12 @@ def _objects(result: FittedResult, subjects: Sequence[Subject]) -> tuple[list, s
     export_scene.new_stage()
     made = export_scene.create_materials(subjects, whole=False)
     return export_scene.preview_spheres(made), PREVIEW
+
+
+def write_format(
+    name: str, folder: Path, final: Path, result: FittedResult, subjects: Sequence[Subject]
+) -> list[Loss]:
+    """Write one of the formats that need Blender into ``folder``, whose files will move to
+    ``final``."""
+    write = {"blend": to_blend, "gltf": to_gltf, "usd": to_usd}[name]
+    return write(folder, final, result, subjects)

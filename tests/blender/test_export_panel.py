@@ -77,8 +77,8 @@ def test_tables_are_those_of_the_command() -> None:
     record = out / "record"
     record.mkdir()
     (record / "result.json").write_text(bpy.data.texts["Patina result"].as_string())
-    material, result = extension("commands.material"), extension("core.result")
-    for _ in material.export(
+    exporting, result = extension("core.export.material_formats"), extension("core.result")
+    for _ in exporting.export_materials(
         out / "command", result.read_result(record), ["mtlx", "binary", "npz"]
     ):
         pass
@@ -198,7 +198,7 @@ def test_a_second_blender_that_fails_is_one_line() -> None:
 def test_a_dropped_export_leaves_nothing() -> None:
     measured()
     out = folder()
-    export = extension("commands.export_open")
+    export = extension("scene.export.export_job")
     job = export.ExportJob(bpy.context.scene, ["gltf"], out / "a", folder())
     for _ in range(8):
         assert job.step()

@@ -13,6 +13,7 @@ import pytest
 
 from patina.commands import material
 from patina.core.errors import InputError
+from patina.core.export import material_formats
 from tests import make_result as made
 
 pytestmark = pytest.mark.blender
@@ -88,7 +89,7 @@ def test_a_run_that_dies_leaves_nothing(result: Path, tmp_path: Path, monkeypatc
         (folder / "half.bsdf").write_bytes(b"half")
         raise OSError("no space left")
 
-    monkeypatch.setitem(material.PLAIN, "pbrt", fails)
+    monkeypatch.setitem(material_formats.PLAIN, "pbrt", fails)
     told = argparse.Namespace(
         result=result, to=["binary", "pbrt"], out=tmp_path / "out", material=["bronze"]
     )

@@ -15,19 +15,19 @@ from typing import Any
 
 import bpy
 
-from ..core.concurrency.job import Job, Step
-from ..core.errors import InputError, PatinaError
-from ..core.export import Loss
-from ..core.jobs import CaptureResult
-from ..core.report import write_report
-from ..core.report.result_json import write_json
-from ..core.result import read_result
-from ..scene.export.export_choice import FORMATS, RECORD, REPORT, missing
-from ..scene.session.background_blender import in_background
-from ..scene.session.last_fit import kept_fit
-from ..scene.session.scene_properties import DIAGNOSIS, capture_path, stored_result
-from . import material
-from .staging import check_out, staged_folder
+from ...core.concurrency.job import Job, Step
+from ...core.errors import InputError, PatinaError
+from ...core.export import Loss
+from ...core.export.material_formats import BLENDER, export_materials
+from ...core.jobs import CaptureResult
+from ...core.output_folder import check_out, staged_folder
+from ...core.report import write_report
+from ...core.report.result_json import write_json
+from ...core.result import read_result
+from ..session.background_blender import in_background
+from ..session.last_fit import kept_fit
+from ..session.scene_properties import DIAGNOSIS, capture_path, stored_result
+from .export_choice import FORMATS, RECORD, REPORT, missing
 
 MARKS = ("losses.txt", "result.json", "report/index.html")  # of an earlier export
 FIT = ("scene.blend",)  # of a folder that `fit` left: the record of the fit itself
@@ -68,13 +68,13 @@ class ExportJob(Job):
         with tempfile.TemporaryDirectory(prefix="patina-", ignore_cleanup_errors=True) as folder:
             result = Path(folder)
             write_json(result / "result.json", self.found)
-            if set(told) & set(material.BLENDER):
+            if set(told) & set(BLENDER):
                 yield Step("copying the scene", 0.0)
                 _save_copy(result / "scene.blend")
                 yield from self._by_another_blender(result, told)
             else:
                 fitted = read_result(result, self.cache)
-                self.losses, _ = yield from material.export(self.out, fitted, told)
+                self.losses, _ = yield from export_materials(self.out, fitted, told)
         self.files += ["losses.txt", "losses.json"]
         self.files += sorted({file for loss in self.losses for file in loss.files})
 
