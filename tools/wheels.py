@@ -29,6 +29,7 @@ PINS = {
     "defusedxml": "0.7.1",
     "sunposition": "1.2.1",
     "threadpoolctl": "3.8.0",
+    "tomlkit": "0.15.2",
 }
 
 OPTIONAL = {"rawpy": "0.28.0"}
@@ -46,6 +47,7 @@ TAGS = {
     "defusedxml": None,
     "sunposition": None,
     "threadpoolctl": None,
+    "tomlkit": None,
     "rawpy": ("manylinux_2_27_x86_64.manylinux_2_28_x86_64", "win_amd64", "macosx_11_0_arm64"),
 }
 """Per library the platform part of its wheels' names, in the order of PLATFORMS; None: pure Python.

@@ -8,13 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import AoT, Table
 
 from ..errors import InputError, PatinaError
 from ..files import atomic_path
 from .entries import LightEntry
 from .model import Capture
 from .reader import read_capture
-from .toml_text import Statement, statements
 
 VECTORS = ("direction", "position", "mounted")
 TABLES = ("sphere", "sun", "white")
@@ -43,44 +45,56 @@ def write_lights(capture: Capture, lights: Sequence[LightEntry], out: Path) -> N
 def with_lights(text: str, capture: Capture, lights: Sequence[LightEntry]) -> str:
     """The text of the capture's file with ``lights`` in place of its own. Raises InputError where a
     light that changes is not a [[light]] table of its own."""
-    found = list(statements(text))
-    edits: list[tuple[int, int, str]] = []
-    for place, (old, new) in enumerate(zip(capture.lights, lights, strict=True)):
-        values = _changes(old, new)
-        if values:
-            own = [s for s in found if s.path[:2] == ("light", place)]
-            name = next((s for s in own if s.path[2:] == ("name",)), None)
-            if name is None:
-                raise capture.error(
-                    "is written inside another value: give it a [[light]] table of its own, then "
-                    "its lamp can be saved", "light", place,
-                )  # fmt: skip
-            for key, value in values.items():
-                edits += _edits(text, [s for s in own if s.path[2:3] == (key,)], name, key, value)
-    for start, end, new_text in sorted(edits, key=lambda edit: edit[:2], reverse=True):
-        text = text[:start] + new_text + text[end:]
-    return text
+    changes = {
+        place: values
+        for place, (old, new) in enumerate(zip(capture.lights, lights, strict=True))
+        if (values := _changes(old, new))
+    }
+    if not changes:
+        return text
+    mark, body = ("\ufeff", text[1:]) if text.startswith("\ufeff") else ("", text)
+    try:
+        document = tomlkit.parse(body)
+    except TOMLKitError as error:
+        raise InputError(f"cannot be edited ({error})", file=capture.file) from error
+    tables = document.get("light")
+    for place, values in changes.items():
+        if not isinstance(tables, AoT):
+            raise capture.error(
+                "is written inside another value: give it a [[light]] table of its own, then "
+                "its lamp can be saved", "light", place,
+            )  # fmt: skip
+        for key, value in values.items():
+            if value is not None:
+                _set(tables[place], key, value, "\r\n" if "\r\n" in body else "\n")
+    before = document.as_string()
+    for place, values in changes.items():
+        for key in [key for key, value in values.items() if value is None]:
+            tables[place].remove(key)
+    return mark + _commented(before, document.as_string())
 
 
-def _edits(
-    text: str, there: list[Statement], name: Statement, key: str, value: str | None
-) -> list[tuple[int, int, str]]:
-    """(start, end, what to put there instead) for one key of a light. name: the light's name, after
-    which a new key is put."""
-    if value is None:
-        return [(s.start, s.end, _commented(text[s.start : s.end])) for s in there]
-    if there and there[0].value is not None:
-        return [(*there[0].value, value)]
-    line = text[name.start : name.end]
-    indent = line[: len(line) - len(line.lstrip(" \t"))]
-    line_break = "\r\n" if line.endswith("\r\n") else "\n"
-    before = "" if line.endswith("\n") else line_break
-    return [(name.end, name.end, f"{before}{indent}{key} = {value}{line_break}")]
+def _set(table: Table, key: str, value: str, line_break: str) -> None:
+    """Give a key of a table another value, as TOML; a new key follows the keys that are there."""
+    item = tomlkit.value(value)
+    if key in table:
+        table[key] = item
+        return
+    own = next((i for k, i in table.value.body if k is not None and k.key == "name"), None)
+    item.trivia.indent = own.trivia.indent if own is not None else ""
+    item.trivia.trail = line_break
+    table.append(key, item)
 
 
-def _commented(lines: str) -> str:
-    body, line_break = (lines[:-1], "\n") if lines.endswith("\n") else (lines, "")
-    return "\n".join(f"# {line}" for line in body.split("\n")) + line_break
+def _commented(before: str, after: str) -> str:
+    """``before`` with the lines that are missing in ``after`` as comments."""
+    kept = after.splitlines(keepends=True)
+    lines, place = [], 0
+    for line in before.splitlines(keepends=True):
+        stays = place < len(kept) and kept[place] == line
+        place += stays
+        lines.append(line if stays or not line.strip() else f"# {line}")
+    return "".join(lines)
 
 
 def _changes(old: LightEntry, new: LightEntry) -> dict[str, str | None]:

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import json
 import os
-import re
-import tomllib
 from collections.abc import Mapping, Sequence
-from datetime import date, datetime, time
 from pathlib import Path
 from typing import Any
+
+import tomlkit
 
 from ..capture import Capture
 from ..capture.model import LEFT_OUT, SHADOW_MASK
 from ..errors import InputError
 
-BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
-# where a capture file names files: what the reader calls file_path
-PLACES: tuple[tuple[str, ...], ...] = (
+PATHS: tuple[tuple[str, ...], ...] = (
     ("scan", "cameras"),
     ("scan", "mesh"),
     ("scan", "images"),
@@ -31,6 +28,7 @@ PLACES: tuple[tuple[str, ...], ...] = (
     ("photo", "file"),
     ("photo", "masks", "*"),
 )
+"""Keys of a capture file that name files; "*": any key."""
 
 
 def capture_with_masks(
@@ -40,39 +38,49 @@ def capture_with_masks(
     materials: Sequence[str] | None,
     painted: Sequence[Mapping[str, str]] = (),
 ) -> str:
-    """The capture's file as TOML for ``folder``: paths lead to the same files, masks are new.
+    """The capture's file as TOML for ``folder``: paths lead to the same files, masks are new, and
+    comments stay.
 
     shadows: one mask file a photo, relative to ``folder``; None: those of the capture stay.
-    materials: names that replace the capture's materials (masks by their names included), painted:
-    {name: mask file} of each photo; None: they stay. Comments of the old file are not kept.
-    Raises InputError where the file has changed into something else meanwhile.
+    materials: names that replace the capture's materials and the masks named after them, painted:
+    {name: mask file} of each photo; None: they stay. Raises InputError where the file has changed
+    meanwhile.
     """
     try:
-        data = tomllib.loads(capture.file.read_text("utf-8-sig"))
+        document = tomlkit.parse(capture.file.read_text("utf-8-sig"))
     except (OSError, ValueError) as error:
-        raise InputError(f"is gone or not a capture file any more ({error})", file=capture.file) \
+        raise InputError(f"is gone or no longer a capture file ({error})", file=capture.file) \
             from error  # fmt: skip
-    photos = data.get("photo", [])
+    photos = document.get("photo", [])
     if len(photos) != len(capture.photos):
-        raise InputError("has changed while it was worked on", file=capture.file)
-    for place in PLACES:
-        _redirect(data, place, capture.file.parent, folder)
+        raise InputError("has changed meanwhile: start again", file=capture.file)
+    for place in PATHS:
+        _redirect(document, place, capture.file.parent, folder)
     for number, photo in enumerate(photos):
-        masks = dict(photo.get("masks", {}))
+        old = dict(photo.get("masks", {}))
+        masks = old
         if materials is not None:
             masks = {name: file for name, file in masks.items() if name in LEFT_OUT}
             masks.update(painted[number] if number < len(painted) else {})
         if shadows is not None:
-            masks[SHADOW_MASK] = shadows[number]
+            masks = {**masks, SHADOW_MASK: shadows[number]}
+        if masks == old:
+            continue
         photo.pop("masks", None)
         if masks:
-            photo["masks"] = masks
+            table = tomlkit.inline_table()
+            table.update(masks)
+            photo["masks"] = table
     if materials is not None:
-        data.pop("material", None)
-        data["material"] = [{"name": name} for name in materials]
+        document.pop("material", None)
+        tables = tomlkit.aot()
+        for name in materials:
+            table = tomlkit.table()
+            table["name"] = name
+            tables.append(table)
+        document["material"] = tables
     name = json.dumps(capture.file.name, ensure_ascii=False)
-    head = f"# {name}, with masks that Patina proposes."
-    return "\n".join([head, *_document(data)]) + "\n"
+    return f"# {name}, with masks that Patina proposes.\n{document.as_string()}"
 
 
 def _redirect(data: Any, place: tuple[str, ...], old: Path, new: Path) -> None:
@@ -103,49 +111,3 @@ def _seen_from(folder: Path, file: Path) -> str:
         return Path(os.path.relpath(target, folder.resolve())).as_posix()
     except ValueError:
         return target.as_posix()
-
-
-def _document(data: Mapping[str, Any]) -> list[str]:
-    """Lines of TOML: plain keys, then tables, then arrays of tables (https://toml.io/en/v1.0.0)."""
-    lines = [f"{_key(k)} = {_value(v)}" for k, v in data.items() if not _is_table(v)]
-    for name, value in data.items():
-        if isinstance(value, dict):
-            lines += ["", f"[{_key(name)}]"]
-            lines += [f"{_key(k)} = {_value(v)}" for k, v in value.items()]
-        elif _is_table(value):
-            for entry in value:
-                lines += ["", f"[[{_key(name)}]]"]
-                lines += [f"{_key(k)} = {_value(v)}" for k, v in entry.items()]
-    return lines
-
-
-def _is_table(value: Any) -> bool:
-    tables = isinstance(value, list) and value and all(isinstance(v, dict) for v in value)
-    return isinstance(value, dict) or bool(tables)
-
-
-def _key(name: str) -> str:
-    return name if BARE_KEY.fullmatch(name) else _text(name)
-
-
-def _text(value: str) -> str:
-    # JSON escapes as TOML does, but for the control character DEL
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return _text(value)
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, float):
-        return repr(value)  # inf and nan are written so in TOML too
-    if isinstance(value, datetime | date | time):
-        return value.isoformat()
-    if isinstance(value, list):
-        return "[" + ", ".join(_value(v) for v in value) + "]"
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + "}"
-    raise TypeError(f"no TOML for a {type(value).__name__}")

@@ -15,14 +15,15 @@ from tools import staging, wheels
 
 ROOT = Path(__file__).resolve().parents[2]
 SETUP = (
-    "__init__", "blender", "build", "checks", "common", "environment", "extension", "headless",
-    "inside", "package", "staging", "wheels",
+    "__init__", "blender", "build", "check_package", "checks", "common", "environment",
+    "extension", "headless", "import_rules", "inside", "package", "staging", "wheels",
 )  # fmt: skip
 ROOMS = ("core", "scene", "operators", "panels", "commands")
 LIBRARIES = {"numpy", "scipy", "pycolmap", "OpenImageIO", "embreex"} | {
     "defusedxml",
     "sunposition",
     "threadpoolctl",
+    "tomlkit",
     "rawpy",  # where it is there
 }
 BLENDER = {
