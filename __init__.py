@@ -1,7 +1,7 @@
 """Patina: measured materials from photo scans.
 
-Blender calls ``register``; Python programs find the functions of ``api.py`` here. Neither is
-imported before it is used.
+Blender calls ``register``; Python programs find the functions of ``api.py`` here. Both parts are
+imported on first use.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ __all__ = [
     "select_photos",
 ]
 
-# Every module that has something to register, in order; unregistered the other way round
+# Every module that has something to register, in this order; unregistered in reverse order
 MODULES: tuple[str, ...] = (
     "panels.preferences",
     "scene.session.scene_properties",
@@ -100,7 +100,7 @@ MODULES: tuple[str, ...] = (
 
 
 def __getattr__(name: str) -> Any:
-    """A name of the Python API, imported on first use; ``__version__`` is the manifest's."""
+    """Import a name of the Python API on first use; ``__version__`` comes from the manifest."""
     if name == "__version__":
         result_json = importlib.import_module(".core.report.result_json", __package__)
         return result_json.program_version()
@@ -126,6 +126,6 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take everything away again."""
+    """Remove everything that ``register`` added."""
     for module in reversed(_modules()):
         module.unregister()

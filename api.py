@@ -6,10 +6,11 @@
     fitted = patina.fit(capture)
     patina.export(fitted, "results", ["json", "report", "binary", "pbrt"])
 
-Every function raises ``PatinaError`` for what a user can mend (its subclass ``InputError`` where a
-file or a value is wrong), with a message of one line: what was found, what was expected.
+Every function raises ``PatinaError`` for mistakes that a user can correct (its subclass
+``InputError`` for a wrong file or value), with a message of one line: what was found, what was
+expected.
 
-Frames and units are those of the whole program: directions are unit vectors that point away from
+Frames and units: directions are unit vectors that point away from
 the surface, in the frame of the scan; the BRDF ρ is in 1/sr; angles are in radians; radiance is in
 the linear unit of the photos (pixel value / exposure), irradiance in that unit × sr.
 """
@@ -38,7 +39,7 @@ from .core.jobs import CaptureResult, FitJob, Job, MaterialResult, Stage, finish
 from .core.jobs.check_job import CheckJob
 from .core.jobs.exported_result import exported_result
 from .core.jobs.photo_prediction import PhotoPrediction, predict_one, prediction_inputs
-from .core.jobs.select_photos import places_of, select_photos
+from .core.jobs.select_photos import photo_indices, select_photos
 from .core.output_folder import check_out, staged_folder
 from .core.predict.errors import PhotoErrors
 from .core.report import diagnosis_json, result_json, write_report
@@ -72,21 +73,22 @@ DEMO_CAPTURE = Path(__file__).parent / "assets" / "demo" / "demo.capture.toml"
 
 RECORD, REPORT = "json", "report"
 FORMATS: tuple[str, ...] = (RECORD, REPORT, *PLAIN, *BLENDER)
-"""What ``export`` writes. "json": result.json, which the command line reads; "report": report/ with
-its index.html; "blend", "gltf" and "usd" need Blender; the others as of `patina material --to`."""
+"""Formats of ``export``. "json": result.json, which the command line reads; "report": report/ with
+its index.html; "blend", "gltf" and "usd" need Blender; the others are those of `patina material
+--to`."""
 
 Progress = Callable[[Step], None]
-"""Called before each step of the work. A step has ``stage`` (what is being done) and ``fraction``
-(how much of the whole is done, 0..1)."""
+"""Called before each step of the work. A step has ``stage`` (its name) and ``fraction`` (the part
+of the work that is done, 0..1)."""
 
 
 @dataclass(frozen=True)
 class FitResult:
-    """The materials of a capture.
+    """The fitted materials of a capture.
 
-    details: everything the fit found (scan, lights, basis, material of each face). samples: the
-    reflectance samples of each material that it was fitted to, by name; ``diagnose`` needs them.
-    stages: time and memory of each stage of the work.
+    details: all results of the fit (scan, lights, basis, material of each face). samples: name of a
+    material → the reflectance samples that it was fitted to; ``diagnose`` needs them. stages: time
+    and memory of each stage of the work.
     """
 
     details: CaptureResult
@@ -100,32 +102,34 @@ class FitResult:
 
     @property
     def materials(self) -> tuple[MaterialResult, ...]:
-        """Every material, in the order of the capture. ``material.fit.brdf`` is its BRDF, with
+        """All materials, in the order of the capture. ``material.fit.brdf`` is its BRDF, with
         ``coefficients`` (3, k) and ``evaluate(angles)`` → (n, 3) float32 ρ in 1/sr;
-        ``material.held_out`` its error on held-out photos; ``material.warnings`` sentences."""
+        ``material.held_out`` is its error on held-out photos; ``material.warnings``: sentences."""
         return self.details.materials
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was read, assumed and left out, a sentence each."""
+        """Sentences on what was read, assumed and ignored."""
         return self.details.notes
 
     def material(self, name: str) -> MaterialResult:
-        """The material of a name. Raises InputError where there is none."""
+        """Return the material with this name. Raises InputError if there is none."""
         for material in self.materials:
             if material.name == name:
                 return material
         names = ", ".join(material.name for material in self.materials)
-        raise InputError(f"no material is called {name!r}; there are {names}", key="material")
+        raise InputError(
+            f"found no material named {name!r}; expected one of {names}", key="material"
+        )
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One cause that was tried. cause: a word of the vocabulary (docs/diagnosis.md); sentence: what
-    it means; accepted: whether it predicts held-out regions of the photos significantly better;
-    doubted: what speaks against it, else None. gain: of the log likelihood of held-out regions,
-    nats, with its standard error; p_value: of a gain by chance. parameters: name → (value, standard
-    error, unit)."""
+    """One cause that was tested. cause: its name (docs/method/diagnosis.md); sentence: its meaning;
+    accepted: whether it predicts held-out regions of the photos significantly better; doubted: the
+    reason why the second fit ignores it, else None. gain, standard_error: increase of the log
+    likelihood of held-out regions, nats; p_value: probability of such a gain by chance. parameters:
+    name → (value, standard error, unit)."""
 
     cause: str
     sentence: str
@@ -139,12 +143,12 @@ class Finding:
 
 @dataclass(frozen=True)
 class DiagnosisResult:
-    """What the photos show that light, scan and materials do not explain.
+    """The causes of residuals that light, scan and materials do not explain.
 
-    named: the accepted causes by the words of the vocabulary, "unknown" among them where structure
-    is left that no cause explains, ("none",) where nothing is wrong. findings: every cause that was
-    tried, the accepted ones first. before: the fit without them; after: the fit that takes them
-    into account. details: the content of diagnosis.json.
+    named: names of the accepted causes, with "unknown" if the residual has structure that no cause
+    explains; ("none",) if there is no cause. findings: all causes that were tested, the accepted
+    ones first. unexplained: whether "unknown" is among the names. before: the fit without the
+    causes; after: the fit that models them. details: the content of diagnosis.json.
     """
 
     named: tuple[str, ...]
@@ -156,9 +160,9 @@ class DiagnosisResult:
 
 
 def load_capture(path: str | os.PathLike[str]) -> Capture:
-    """Read and check a capture file (docs/capture-file.md).
+    """Read and check a capture file (docs/reference/capture-file.md).
 
-    Raises InputError naming the file, the line and the key that is wrong. The photos themselves are
+    Raises InputError with the file, the line and the key that is wrong. The photos themselves are
     opened by ``fit``.
 
     >>> import patina
@@ -178,16 +182,16 @@ def fit(
 ) -> FitResult:
     """Fit the BRDF of every material of a capture.
 
-    basis: principal components to fit in, None for the embedded ones. threads: how many read the
-    photos, None for one a core, at most four; the result does not depend on it. progress: called
-    before each step. Raises InputError for photos, masks or lights that are wrong or missing, and
-    where no lit pixel of a material is left.
+    basis: principal components of the fit, None for the embedded basis. threads: number of threads
+    that read the photos, None for one per core, at most four; the result does not depend on it.
+    progress: called before each step. Raises InputError for wrong or missing photos, masks or
+    lights, and if a material has no usable lit pixel.
 
     >>> import numpy as np
     >>> import patina
     >>> fitted = patina.fit(patina.load_capture(patina.DEMO_CAPTURE))
     >>> clay = fitted.material("clay")
-    >>> clay.held_out.typical < 0.1  # a held-out photo is predicted to some per cent
+    >>> clay.held_out.typical < 0.1  # error on held-out photos below 10 %
     True
     >>> angles = patina.half_difference(  # normal, light and view as (n, 3)
     ...     np.array([[0.0, 0.0, 1.0]]), np.array([[0.6, 0.0, 0.8]]), np.array([[0.0, 0.0, 1.0]])
@@ -209,12 +213,11 @@ def diagnose(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> DiagnosisResult:
-    """Find what is wrong with a capture, and fit it again with that taken into account.
+    """Find the causes of the errors of a capture, and fit it again with these in the model.
 
-    capture: a capture, or what ``fit`` returned for it, which is then not fitted once more.
-    without: causes that the second fit leaves out even where they are accepted. threads, progress:
-    as of ``fit``. Takes a minute or two. Raises InputError as ``fit`` does, and for an unknown
-    cause.
+    capture: a capture, or the result of ``fit``, which is not fitted again. without: causes that
+    the second fit ignores even if they are accepted. threads, progress: as for ``fit``. Takes one
+    or two minutes. Raises InputError as ``fit`` does, and for an unknown cause.
 
     >>> import patina
     >>> fitted = patina.fit(patina.load_capture(patina.DEMO_CAPTURE))  # doctest: +SKIP
@@ -226,7 +229,7 @@ def diagnose(
     known = [kind.cause for kind in EFFECTS]
     for cause in without:
         if cause not in known:
-            raise InputError(f"found {cause!r}, expected of {', '.join(known)}", key="without")
+            raise InputError(f"found {cause!r}, expected one of {', '.join(known)}", key="without")
     if isinstance(capture, FitResult):
         fit_job: FitJob = _FinishedFit(capture, threads)
     else:
@@ -254,18 +257,18 @@ def predict(
     photos: Sequence[str | int] | None = None,
     progress: Progress | None = None,
 ) -> tuple[PhotoPrediction, ...]:
-    """Predict what photos show, and compare with what they do show.
+    """Predict photos from a fit, and compare the predictions with the photos.
 
-    capture: the fitted one, or another of the same mesh with other photos; photos: those to
-    predict, by name or place from 0, None for all of them. For photos that the fit has not seen,
-    nothing is estimated from the photo itself: no exposure, pose or colour, and no light is
-    refined. The material of a pixel is that of the face it shows, as the fit found it. Light is
+    capture: the fitted capture, or another one of the same mesh with other photos. photos: the
+    photos to predict, by name or index from 0; None for all of them. For photos that were not part
+    of the fit, nothing is estimated from the photo itself: no exposure, pose or colour, and no
+    light is refined. A pixel has the material that the fit assigned to the face it shows. Light is
     direct, with cast shadows; effects of a diagnosis are not part of the prediction.
 
     Each prediction has ``radiance``, ``encoded`` and ``measured``, (h, w, 3) float32, and
-    ``errors``: typical, relative RMS and RMSE in the photo's own encoding, over the pixels that see
-    the mesh and are not beside outlines. Raises InputError where photos or lights do not belong to
-    the fit, or for a photo that is not there.
+    ``errors``: typical error, relative RMS and RMSE in the encoding of the photo, over the pixels
+    that show the mesh and are not next to outlines. Raises InputError if photos or lights do not
+    belong to the fit, or for an unknown photo.
 
     >>> import patina
     >>> capture = patina.load_capture(patina.DEMO_CAPTURE)
@@ -275,7 +278,7 @@ def predict(
     ((430, 384, 3), True)
     """
     inputs = prediction_inputs(capture, result.details)
-    places = range(len(capture.photos)) if photos is None else places_of(capture, photos)
+    places = range(len(capture.photos)) if photos is None else photo_indices(capture, photos)
     found = []
     for done, place in enumerate(places):
         if progress is not None:
@@ -289,11 +292,12 @@ def export(
     folder: str | os.PathLike[str],
     formats: Sequence[str] = (RECORD, REPORT, "binary"),
 ) -> tuple[Loss, ...]:
-    """Write the materials for other programs into a folder, all of it or nothing.
+    """Export the materials to a folder. If this fails, no file is written.
 
-    formats: of ``FORMATS``. Returns what each format keeps of each material, which losses.txt and
-    losses.json say as well. Files of the same names are replaced. Raises InputError for an unknown
-    format and a folder that cannot be written, PatinaError where a format needs Blender.
+    formats: entries of ``FORMATS``. Returns what each format keeps of each material, which is also
+    written to losses.txt and losses.json. Files of the same name are replaced. Raises InputError
+    for an unknown format or a folder that cannot be written to, PatinaError if a format needs
+    Blender and there is none.
 
     >>> import tempfile
     >>> import patina
@@ -304,10 +308,10 @@ def export(
     >>> sorted({file for loss in losses for file in loss.files if file.endswith(".binary")})
     ['clay.binary', 'glaze.binary']
     """
-    chosen = list(dict.fromkeys(formats))
-    for name in chosen:
+    requested = list(dict.fromkeys(formats))
+    for name in requested:
         if name not in FORMATS:
-            raise InputError(f"found {name!r}, expected of {', '.join(FORMATS)}", key="formats")
+            raise InputError(f"found {name!r}, expected one of {', '.join(FORMATS)}", key="formats")
         if name in BLENDER:
             check_blender(f"the format {name}", f"material RESULT --to {name}")
     out = check_out(Path(folder))
@@ -317,7 +321,7 @@ def export(
     subjects = [Subject(material) for material in fitted.materials]
     losses: list[Loss] = []
     with staged_folder(out) as staging:
-        for name in chosen:
+        for name in requested:
             if name == RECORD:
                 result_json.write(staging / "result.json", result.details, result.stages, ())
             elif name == REPORT:
@@ -339,7 +343,7 @@ def _by_blender(*arguments: Any) -> list[Loss]:
 
 
 class _FinishedFit(FitJob):
-    """A fit that is already done, for jobs that begin with one."""
+    """A finished fit, for jobs whose first stage is a fit."""
 
     def __init__(self, fitted: FitResult, threads: int | None) -> None:
         super().__init__(fitted.capture, basis=fitted.details.basis, threads=threads, keep=True)
@@ -347,12 +351,12 @@ class _FinishedFit(FitJob):
         self.samples = dict(fitted.samples)
 
     def run(self) -> Iterator[Step]:
-        """Nothing is left to do."""
+        """Return no steps."""
         return iter(())
 
 
 def _drain(job: Job, progress: Progress | None) -> None:
-    """All of a job; it lets go of its threads also where it fails or is interrupted."""
+    """Run a job to its end, and stop its threads even if it fails or is interrupted."""
     try:
         job.drain((lambda step: None) if progress is None else progress)
     finally:
@@ -360,7 +364,7 @@ def _drain(job: Job, progress: Progress | None) -> None:
 
 
 def _finding(cause: Mapping[str, Any]) -> Finding:
-    """One entry of diagnosis.json."""
+    """Convert one entry of diagnosis.json."""
     return Finding(
         cause=cause["cause"],
         sentence=cause["sentence"],

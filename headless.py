@@ -1,10 +1,10 @@
-"""Patina without a window.
+"""Run Patina without a graphical interface.
 
 blender -b --python-exit-code 1 -P headless.py -- COMMAND …
 python headless.py COMMAND …                            (with the bpy wheel)
 
-Inside a Blender that has the extension enabled, that extension runs; otherwise the files beside
-this one do, as package "patina".
+In a Blender in which the extension is enabled, the installed extension is used. Otherwise the files
+in the folder of this script are imported as package "patina".
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 
 
 def package() -> str:
-    """The name the extension is importable by; loads and registers it where needed."""
+    """Return the importable name of the extension; import and register it if necessary."""
     installed = next(
         (n for n in sys.modules if n.startswith("bl_ext.") and n.endswith(".patina")), None
     )
@@ -36,13 +36,13 @@ def package() -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """Run one command; 0 when all was done, 2 for wrong input (one line on stderr)."""
+    """Run one command. Return 0 on success, 2 for wrong input (one line on stderr)."""
     command_line = importlib.import_module(f"{package()}.commands.command_line")
     return int(command_line.main(arguments))
 
 
 def own_arguments() -> list[str]:
-    """What follows "--" inside Blender, all of it outside."""
+    """Return the arguments after "--" in Blender, and all arguments outside Blender."""
     if "--" in sys.argv:
         return sys.argv[sys.argv.index("--") + 1 :]
     return sys.argv[1:]

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Patina from a terminal: `python3 run.py demo`, `headless`, `test` or `build`.
+"""Run Patina from a terminal: `python3 run.py demo`, `headless`, `test` or `build`.
 
-Needs any Python >= 3.11 and nothing else; what is missing is set up on the first call, in a cache
-folder of the user's.
+Requires only Python >= 3.11. Missing dependencies are installed on the first call, into a cache
+folder of the user.
 """
 
 from __future__ import annotations
@@ -10,20 +10,21 @@ from __future__ import annotations
 import importlib.util
 import sys
 
-USAGE = "usage: python3 run.py COMMAND ...  (--help after a command says more)"
+USAGE = "usage: python3 run.py COMMAND ...  (COMMAND --help lists the options)"
 
 COMMANDS = {
-    "demo": ("tools.headless:demo", "all of it on the embedded capture, into ./patina-demo"),
-    "headless": ("tools.headless:main", "a headless command: fit, import, compare, basis ..."),
-    "test": ("tools.checks:main", "ruff, mypy and pytest; with --blender also in Blender"),
-    "build": ("tools.build:main", "the extension's zips, one per platform, into dist/"),
-    "pictures": ("tools.make_pictures", "the pictures of docs/images, made anew"),
-    "experiments": ("tools.experiments", "the paper's experiment, for docs/method/experiments.md"),
-    "hunt": ("tools.hunt.table", "captures with a hidden effect, and whether it is found"),
-    "bench": ("tools.bench_main", "the measurements behind the figures in docs/"),
+    "demo": ("tools.headless:demo", "run the demo capture and write the results to ./patina-demo"),
+    "headless": ("tools.headless:main", "run a headless command: fit, import, compare, basis ..."),
+    "test": ("tools.checks:main", "run ruff, mypy and pytest; with --blender also in Blender"),
+    "build": ("tools.build:main", "build the zips of the extension, one per platform, in dist/"),
+    "pictures": ("tools.make_pictures", "render the pictures of docs/images again"),
+    "experiments": ("tools.experiments", "run the experiments of docs/method/experiments.md"),
+    "hunt": ("tools.hunt.table", "diagnose simulated captures with a hidden effect"),
+    "bench": ("tools.bench_main", "run the benchmarks behind the figures in docs/"),
 }
-"""Command → what runs and what it does: MODULE:FUNCTION is called here with the arguments, a
-MODULE alone is run in the environment of the tests. No module, no command."""
+"""Command → (entry point, help text). A MODULE:FUNCTION is called in this process with the
+arguments; a MODULE alone is run in the test environment. Commands whose module is absent are not
+offered."""
 
 
 def available() -> dict[str, tuple[str, str]]:
@@ -36,20 +37,20 @@ def available() -> dict[str, tuple[str, str]]:
 
 
 def main(words: list[str]) -> int:
-    """Dispatch, and turn a Failure into its one line."""
-    if sys.version_info < (3, 11):  # noqa: UP036  whoever has an older one reads this
+    """Run one command and return its exit code; a Failure is printed as one line."""
+    if sys.version_info < (3, 11):  # noqa: UP036  message for users of an older Python
         print("patina: run.py needs Python 3.11 or later", file=sys.stderr)
         return 2
     from tools.common import Failure
 
     commands = available()
     if not words or words[0] not in commands:
-        asked_for_help = words[:1] in (["-h"], ["--help"])
-        out = sys.stdout if asked_for_help else sys.stderr
+        help_requested = words[:1] in (["-h"], ["--help"])
+        out = sys.stdout if help_requested else sys.stderr
         print(USAGE, file=out)
         for name, (_, what) in commands.items():
             print(f"  {name:10} {what}", file=out)
-        return 0 if asked_for_help else 2
+        return 0 if help_requested else 2
     module, _, function = commands[words[0]][0].partition(":")
     try:
         if function:
@@ -61,7 +62,7 @@ def main(words: list[str]) -> int:
         print(f"patina: {failure}", file=sys.stderr)
         return failure.code
     except KeyboardInterrupt:
-        print("patina: stopped", file=sys.stderr)
+        print("patina: Interrupted.", file=sys.stderr)
         return 130
 
 

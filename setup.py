@@ -1,7 +1,7 @@
-"""What pyproject.toml cannot say of the Python package: its version, and which files belong to it.
+"""The parts of the package metadata that pyproject.toml cannot express: version and files.
 
-The repository root is the extension of Blender and the package ``patina`` at once. The version is
-that of blender_manifest.toml; what only Blender or developers use is left out of the package.
+The repository root is both the Blender extension and the package ``patina``. The version is that of
+blender_manifest.toml. Modules that only Blender or developers use are not part of the package.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from setuptools import find_packages, setup
 from setuptools.command.build_py import build_py
 
 ROOT = Path(__file__).resolve().parent
-ROOT_MODULES = ("__init__", "api")  # of the root's files: the others are scripts
+ROOT_MODULES = ("__init__", "api")  # the other files of the root are scripts
 NEEDS_BLENDER = {("patina.commands", "export_open")}
 
 
 class BuildPackage(build_py):
-    """Leaves out the scripts of the root and the modules that import bpy."""
+    """Excludes the scripts of the root and the modules that import bpy."""
 
     def find_package_modules(self, package: str, package_dir: str) -> list[tuple[str, str, str]]:
-        """(package, module, file) of every module that is installed."""
+        """Return (package, module, file) of every module that is installed."""
         found = super().find_package_modules(package, package_dir)
         return [
             (owner, module, file)

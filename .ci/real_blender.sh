@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# A real Blender on a Debian machine, as root: Debian's own package in a folder of its own.
+# A real Blender on a Debian machine, as root: Debian's package, in a chroot.
 #   real_blender.sh install [DIR]       Blender 4.3 with Python 3.13 (about 2 minutes, 1.5 GB)
-#   real_blender.sh blender DIR ARGS    that Blender; sees the current folder, the checkout,
-#                                       the data beside it and Patina's cache, at the same paths
+#   real_blender.sh blender DIR ARGS    run that Blender; the current folder, the checkout, the
+#                                       folder ../shared and Patina's cache have the same paths
 #   real_blender.sh session DIR OUT     tools/window/session.py in a real window on a virtual screen:
-#                                       photographs of every stage in OUT (the extension as
-#                                       `run.py headless` has installed it)
-# Debian's build has no OSL and no USD: those are tested on the bpy wheel.
+#                                       screenshots of every stage in OUT (with the extension
+#                                       that `run.py headless` installed)
+# Debian's build has no OSL and no USD; these are tested with the bpy wheel.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
@@ -40,7 +40,7 @@ install() { # DIR
       blender python3-numpy python3-requests python3-cattr libgl1-mesa-dri >/dev/null
   fi
   system "$dir"
-  # Debian's blender only recommends numpy, and a Blender without it cannot run the extension.
+  # Debian's package only recommends numpy, which the extension requires.
   inside "$dir" python3 -c 'import numpy' 2>/dev/null || {
     inside "$dir" apt-get update -qq
     inside "$dir" apt-get install -y -qq --no-install-recommends python3-numpy >/dev/null
@@ -49,8 +49,8 @@ install() { # DIR
 }
 
 what=${1:-}
-# Everything is mounted in a namespace of its own and gone when this ends: a /dev that stays bound in
-# the folder is deleted with it by whoever cleans up.
+# All mounts are in a private namespace and disappear when this script ends. Otherwise, deleting the
+# folder with /dev still mounted in it would delete the files of the host's /dev.
 if [ "${IN_NAMESPACE:-}" != 1 ] && [ -n "$what" ]; then
   IN_NAMESPACE=1 exec unshare --mount bash "${BASH_SOURCE[0]}" "$@"
 fi

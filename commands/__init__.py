@@ -1,5 +1,5 @@
-"""The headless commands, one a file: parse, call core and scene, write into place.
+"""The headless commands, one per module: parse arguments, call core and scene, write the results.
 
-Each module has ``add_arguments(parser)`` and ``run(arguments) -> None``; a PatinaError is the
-user's mistake and becomes one line and exit code 2 (headless.py).
+Each module has ``add_arguments(parser)`` and ``run(arguments) -> None``. A PatinaError means wrong
+input; command_line.py prints it as one line and returns exit code 2.
 """

@@ -1,4 +1,4 @@
-"""``basis --merl FOLDER``: a basis from the user's own MERL files, cached for the user."""
+"""``basis --merl FOLDER``: compute a basis from the user's own MERL files and cache it."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ from ..core.concurrency.job import Step
 from ..core.output_folder import staged_folder
 from .progress import Progress
 
-HELP = "principal components of your own copy of the MERL database"
+HELP = "compute the principal components of your own copy of the MERL database"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--merl", type=Path, required=True, help="folder of the 100 .binary files")
-    parser.add_argument("--out", type=Path, help="folder to leave a copy in, as basis.npz")
+    parser.add_argument(
+        "--merl", type=Path, required=True, help="folder with the 100 .binary files"
+    )
+    parser.add_argument("--out", type=Path, help="folder for a copy of the basis, basis.npz")
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -1,4 +1,4 @@
-"""``build-basis NBRDF.npz``: make the embedded basis anew (for developers)."""
+"""``build-basis NBRDF.npz``: compute the embedded basis again (for developers)."""
 
 from __future__ import annotations
 
@@ -12,13 +12,15 @@ from ..core.basis.merl_folder import CHECKSUMS_FILE
 from ..core.concurrency.job import Step
 from .progress import Progress
 
-HELP = "make the embedded basis anew from neural encodings (for developers)"
+HELP = "compute the embedded basis again from neural encodings (for developers)"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("encodings", type=Path, help="nbrdf_merl.npz")
-    parser.add_argument("--checksums", type=Path, help="merl_sha256.csv: rewrite those too")
-    parser.add_argument("--out", type=Path, default=DEFAULT_FILE, help="the .npz to write")
+    parser.add_argument("encodings", type=Path, help="the neural encodings, nbrdf_merl.npz")
+    parser.add_argument(
+        "--checksums", type=Path, help="merl_sha256.csv; also write the embedded checksums"
+    )
+    parser.add_argument("--out", type=Path, default=DEFAULT_FILE, help="the .npz file to write")
 
 
 def run(arguments: argparse.Namespace) -> None:

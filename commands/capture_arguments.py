@@ -1,4 +1,4 @@
-"""The arguments of commands that fit a capture."""
+"""Arguments shared by the commands that fit a capture."""
 
 from __future__ import annotations
 
@@ -7,9 +7,13 @@ from pathlib import Path
 
 
 def add_arguments(parser: argparse.ArgumentParser, out: str) -> None:
-    """The capture, where to write (``out``: what), and on how many threads."""
+    """Add the capture, the output folder and the number of threads.
+
+    out: what is written, as the help text names it.
+    """
     parser.add_argument("capture", type=Path, help="the capture file (*.capture.toml)")
     parser.add_argument("--out", type=Path, required=True, help=f"folder for {out}")
     parser.add_argument(
-        "--threads", type=int, metavar="N", help="look at the photos on N threads (default: cores)"
-    )
+        "--threads", type=int, metavar="N",
+        help="process the photos on N threads (default: one per core, at most four)",
+    )  # fmt: skip

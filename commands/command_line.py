@@ -1,4 +1,4 @@
-"""The command line of Patina: one parser and one dispatch, for headless.py and for ``patina``."""
+"""Parser and dispatch of Patina's command line, used by headless.py and the script ``patina``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import NoReturn
 
 from ..core.errors import PatinaError
 
-DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130  # exit codes; 130 is the shells' own for SIGINT
+DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130  # exit codes; shells use 130 for SIGINT
 
 COMMANDS = {
     "fit": "fit",
@@ -28,21 +28,21 @@ COMMANDS = {
     "material": "material",
     "render": "render",
 }
-"""Command → its module in this folder, which has HELP, add_arguments(parser) and run(arguments)."""
+"""Command → module in this folder with HELP, add_arguments(parser) and run(arguments)."""
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run one command and return its exit code: 0 when all was done, 2 for wrong input (one line
-    on stderr), 130 when it was interrupted by ctrl-C or SIGTERM.
+    """Run one command and return its exit code: 0 on success, 2 for wrong input (one line on
+    stderr), 130 if it was interrupted by Ctrl-C or SIGTERM.
 
-    arguments: the words after the program's name. Raises SystemExit for wrong usage (code 2) and
-    for ``--help`` (code 0), as argparse does.
+    arguments: the words after the program name. Raises SystemExit for wrong usage (code 2) and for
+    ``--help`` (code 0), as argparse does.
     """
     modules = {
         command: importlib.import_module(f".{file}", __package__)
         for command, file in COMMANDS.items()
     }
-    signal.signal(signal.SIGTERM, _interrupt)  # after the libraries, some of which set their own
+    signal.signal(signal.SIGTERM, _interrupt)  # after the imports: some libraries install a handler
     parser = _Parser(prog="patina", description="Measured materials from photo scans")
     choices = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for command, module in modules.items():
@@ -54,7 +54,7 @@ def main(arguments: Sequence[str]) -> int:
         print(f"patina: {error}", file=sys.stderr)
         return WRONG_INPUT
     except KeyboardInterrupt:
-        print("patina: stopped; nothing was written", file=sys.stderr)
+        print("patina: Interrupted. No files were written.", file=sys.stderr)
         return INTERRUPTED
     return DONE
 
@@ -65,10 +65,10 @@ def console() -> NoReturn:
 
 
 class _Parser(argparse.ArgumentParser):
-    """A mistake on the command line is one line too."""
+    """Prints wrong usage as one line."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(WRONG_INPUT, f"{self.prog}: {message} (--help says more)\n")
+        self.exit(WRONG_INPUT, f"{self.prog}: {message} (use --help for the options)\n")
 
 
 def _interrupt(*_: object) -> NoReturn:

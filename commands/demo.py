@@ -1,4 +1,4 @@
-"""``demo --out DIR``: the whole job on the embedded capture."""
+"""``demo --out DIR``: diagnose the embedded capture and render the results."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from ..core.report.relit import add_to_report
 from .diagnose import MATERIALS, diagnose_to_folder
 from .render import render_to_folder
 
-HELP = "the whole job on the capture that comes with Patina"
-RELIT = "relit"  # folder in the report
+HELP = "diagnose the capture that comes with Patina, and render its materials"
+RELIT = "relit"  # folder in the report, for pictures under other light
 WORLDS, SIZE, SAMPLES, TURNS = ["forest"], 288, 48, 3
 CAPTURE = Path(__file__).parents[1] / "assets" / "demo" / "demo.capture.toml"
 
@@ -25,15 +25,18 @@ def run(arguments: argparse.Namespace) -> None:
     diagnose_to_folder(CAPTURE, out)
     _show_under_other_light(out)
     page = out / MATERIALS / "index.html"
-    print(f"Open {page} to see what was measured, the page above for what is wrong with it.")
+    print(f"Open {page} to see the materials. The report named above shows the diagnosis.")
 
 
 def _show_under_other_light(out: Path) -> None:
-    """Pictures under a world that Blender ships, where it ships any."""
+    """Render the materials under a world that Blender ships, and add the pictures to the report.
+
+    Prints a note if Blender or the world is not available.
+    """
     report = out / MATERIALS
     try:
         found = render_to_folder(out, report / RELIT, WORLDS, SIZE, SAMPLES, TURNS)
     except PatinaError as error:
-        print(f"note: no pictures under other light ({error})")
+        print(f"note: The materials were not rendered under other light ({error}).")
         return
     add_to_report(report / "index.html", found, RELIT)

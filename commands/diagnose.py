@@ -1,4 +1,4 @@
-"""``diagnose CAPTURE --out DIR``: fit, say what is wrong and why, and fit again without it."""
+"""``diagnose CAPTURE --out DIR``: fit, find causes of residuals, fit again with them."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ..core.jobs.check_job import CheckJob
 from ..core.output_folder import check_out, staged_folder
 from ..core.report import diagnosis, diagnosis_json
 from . import capture_arguments
-from .fit import tell, write_results
+from .fit import print_summary, write_results
 from .progress import Progress
 from .solve import check_threads
 
-MATERIALS = "report/materials"  # the second fit's own report
-HELP = "fit a capture, say what is wrong with it, and fit it again with that in the model"
+MATERIALS = "report/materials"  # report of the second fit
+HELP = "fit a capture, find the causes of its errors, and fit again with these in the model"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="CAUSE",
         choices=[kind.cause for kind in EFFECTS],
-        help="leave these out of the second fit, even if they are named: %(choices)s",
+        help="causes that the second fit ignores even if they are accepted: %(choices)s",
     )
 
 
@@ -42,8 +42,8 @@ def run(arguments: argparse.Namespace) -> None:
 def diagnose_to_folder(
     capture_file: Path, out: Path, threads: int | None = None, without: Sequence[str] = ()
 ) -> None:
-    """Check a capture and leave diagnosis.json and report/ in ``out``, and what a fit leaves, its
-    report in report/materials."""
+    """Diagnose a capture. Write diagnosis.json, report/ and the files of a fit to ``out``; the
+    report of the second fit is in report/materials. Raises PatinaError."""
     out = check_out(out)
     job = CheckJob(FitJob(read_capture(capture_file), threads=threads), without=without)
     progress = Progress(share=0.9)
@@ -56,20 +56,20 @@ def diagnose_to_folder(
         diagnosis.write_pages(report, found, finished(checked.context), before, after)
         diagnosis_json.write(folder / "diagnosis.json", found, before, after)
         write_results(folder, out, after, job.stages, progress, MATERIALS)
-    _tell_causes(found)
-    tell(out, after)
+    _print_causes(found)
+    print_summary(out, after)
     print(f"      {out / 'diagnosis.json'}")
 
 
-def _tell_causes(found: Diagnosis) -> None:
+def _print_causes(found: Diagnosis) -> None:
     for trial in found.reported:
         print(f"{trial.effect.cause}: {found.sentence(trial)}")
     if found.unexplained:
         print(f"unknown: {found.residual.sentence()}")
     if not found.causes:
-        print("none: nothing that can be named is wrong beyond noise and the scan's own errors")
+        print("none: No known cause found. Noise and errors of the scan explain the residuals.")
     before, after = found.error_before, found.error_after
     print(
-        f"left-out parts of the photos: {100 * before.parts:.1f} % off, "
-        f"{100 * after.parts:.1f} % with what is named in the model"
+        f"RMS error of held-out regions of the photos: {100 * before.parts:.1f} % without and "
+        f"{100 * after.parts:.1f} % with the causes found."
     )

@@ -1,4 +1,4 @@
-"""``fit CAPTURE --out DIR``: everything from files to materials, headless."""
+"""``fit CAPTURE --out DIR``: fit the materials of a capture and write the results."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from .needs_blender import has_blender
 from .progress import Progress
 from .solve import check_threads
 
-NO_SCENE = "no scene.blend was written, which needs Blender; everything else is complete"
-HELP = "fit every material of a capture and write them"
+NO_SCENE = "scene.blend was not written, because it needs Blender. All other files are complete."
+HELP = "fit every material of a capture and write the results"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,8 +35,8 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def fit_to_folder(capture_file: Path, out: Path, threads: int | None = None) -> CaptureResult:
-    """Fit a capture and leave result.json, NAME.binary, report/ and, with Blender, scene.blend in
-    ``out``."""
+    """Fit a capture. Write result.json, NAME.binary, report/ and, with Blender, scene.blend to
+    ``out``. Raises PatinaError."""
     out = check_out(out)
     progress = Progress(share=0.85)
     job = FitJob(read_capture(capture_file), threads=threads)
@@ -45,7 +45,7 @@ def fit_to_folder(capture_file: Path, out: Path, threads: int | None = None) -> 
     progress.share = 1.0
     with staged_folder(out) as folder:
         write_results(folder, out, result, job.stages, progress)
-    tell(out, result)
+    print_summary(out, result)
     return result
 
 
@@ -57,8 +57,8 @@ def write_results(
     progress: Progress,
     report: str = "report",
 ) -> None:
-    """Tables, report, result.json and, with Blender, scene.blend into a staged folder that moves
-    to ``out``."""
+    """Write tables, report, result.json and, with Blender, scene.blend to a staged folder, whose
+    files move to ``out``."""
     stages = [*stages]
     with timed(stages, "tables", progress, 0.9):
         for material in result.materials:
@@ -77,32 +77,32 @@ def write_results(
 
 @contextmanager
 def timed(stages: list[Stage], name: str, progress: Progress, fraction: float) -> Iterator[None]:
-    """Measure a stage of writing."""
+    """Report a stage of writing to ``progress``, and append its time and memory to ``stages``."""
     progress(Step(name, fraction))
     since = time.perf_counter()
     yield
     stages.append(Stage(name, time.perf_counter() - since, peak_memory()))
 
 
-def tell(out: Path, result: CaptureResult) -> None:
-    """What was found, for whoever reads the terminal."""
+def print_summary(out: Path, result: CaptureResult) -> None:
+    """Print a summary of a fit: errors, warnings, notes, refined lights and files."""
     for material in result.materials:
-        unseen = (
+        held_out_error = (
             "" if material.held_out is None
-            else f", predicts an unseen photo to "
+            else f"; error on a held-out photo: "
             f"{100 * material.held_out.typical:.0f} % (typical pixel), "
             f"{100 * material.held_out.error:.0f} % (relative RMS)"
         )  # fmt: skip
-        print(f"{material.name}: {material.samples:,} samples{unseen}")
+        print(f"{material.name}: {material.samples:,} samples{held_out_error}")
         if isinstance(material.fit, MeasuredResult):
             print(f"  90 % interval: {reach(material.spread)}")
         for warning in material.warnings:
             print(f"  note: {warning}")
     for note in result.notes:
         print(f"note: {note}")
-    for name, numbers in result.lights.moved.items():
-        said = ", ".join(f"{k} {v:.3g} ± {e:.2g}" for k, (v, e) in numbers.items())
-        print(f"light {name!r} refined: {said}")
+    for name, parameters in result.lights.moved.items():
+        values = ", ".join(f"{k} {v:.3g} ± {e:.2g}" for k, (v, e) in parameters.items())
+        print(f"light {name!r} refined: {values}")
     print(f"wrote {out / 'result.json'}")
     for material in result.materials:
         print(f"      {out / (material.name + '.binary')}")

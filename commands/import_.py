@@ -1,6 +1,6 @@
-"""``import CAPTURE --out FILE.blend``: mesh, cameras with photos behind them, lights.
+"""``import CAPTURE --out FILE.blend``: mesh, lights, and cameras with photos as backgrounds.
 
-What a reconstruction tool wrote does as well, without a mesh: its cameras and sparse points.
+A model of a reconstruction tool can be imported too: its cameras and sparse points, no mesh.
 """
 
 from __future__ import annotations
@@ -18,19 +18,20 @@ from ..core.output_folder import staged_folder
 from ..core.scan.formats import read_reconstruction
 from .needs_blender import check_blender
 
-HELP = "mesh, cameras with their photos and lights of a capture, as a .blend"
+HELP = "import mesh, lights, and cameras with their photos into a .blend"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "capture", type=Path, help="the capture file (*.capture.toml), or a scan's camera file"
+        "capture", type=Path, help="the capture file (*.capture.toml), or the camera file of a scan"
     )
-    parser.add_argument("--out", type=Path, required=True, help="the .blend to write")
+    parser.add_argument("--out", type=Path, required=True, help="the .blend file to write")
     parser.add_argument(
-        "--images", type=Path, help="folder of the photos, for a model without a capture file"
+        "--images", type=Path, help="folder of the photos, if there is no capture file"
     )
     parser.add_argument(
-        "--chunk", help="label of the chunk, for a Metashape file with several and no capture file"
+        "--chunk",
+        help="label of the chunk, for a Metashape file with several chunks and no capture file",
     )
 
 
@@ -38,14 +39,21 @@ def run(arguments: argparse.Namespace) -> None:
     check_blender("`import`", "import")
     out: Path = arguments.out
     if out.suffix != ".blend":
-        raise InputError("expected a file name that ends in .blend", file=out, key="--out")
+        raise InputError(
+            "found another file type, expected a file name that ends in .blend",
+            file=out,
+            key="--out",
+        )
     print("[  0 %] reading the scan", file=sys.stderr, flush=True)
     if arguments.capture.is_dir() or arguments.capture.suffix.lower() != ".toml":
         _import_model(arguments.capture, out, arguments.images, arguments.chunk)
         return
     for key in ("images", "chunk"):
         if getattr(arguments, key) is not None:
-            raise InputError(f"a capture file says its {key} itself", key=f"--{key}")
+            raise InputError(
+                f"found a capture file, which defines {key} itself; omit this option",
+                key=f"--{key}",
+            )
     capture = read_capture(arguments.capture)
     scan = capture_data.open_scan(capture)
     capture_data.check_photos(capture, scan)
@@ -68,7 +76,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 def _import_model(model: Path, out: Path, images: Path | None, chunk: str | None) -> None:
     if images is not None and not images.is_dir():
-        raise InputError("no such folder", file=images, key="--images")
+        raise InputError("found no such folder", file=images, key="--images")
     found = read_reconstruction(model, images, chunk)
     from ..scene.export.blend_file import write_reconstruction  # needs bpy
 

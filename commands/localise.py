@@ -1,4 +1,4 @@
-"""``localise SCAN --photos LIT … --out DIR``: cameras for further photos of a scanned object."""
+"""``localise SCAN --photos LIT … --out DIR``: camera poses of further photos of a scan."""
 
 from __future__ import annotations
 
@@ -16,21 +16,25 @@ from ..core.solve import LocaliseJob, find_photos
 from .progress import Progress
 from .solve import check_threads
 
-HELP = "cameras for lit photos that share no viewpoint with a photo of the scan"
+HELP = "compute camera poses of lit photos that are not part of the scan"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "scan", type=Path, help="the capture file (*.capture.toml), or a scan's camera file"
+        "scan", type=Path, help="the capture file (*.capture.toml), or the camera file of a scan"
     )
-    parser.add_argument("--mesh", type=Path, help="the scan's mesh, where no capture file names it")
-    parser.add_argument("--images", type=Path, help="folder of the scan's own photos, likewise")
-    parser.add_argument("--chunk", help="label of the chunk, likewise")
+    parser.add_argument("--mesh", type=Path, help="mesh of the scan, if there is no capture file")
     parser.add_argument(
-        "--photos", type=Path, nargs="+", required=True, help="the lit photos, or their folder"
+        "--images", type=Path, help="folder of the photos of the scan, if there is no capture file"
+    )
+    parser.add_argument("--chunk", help="label of the Metashape chunk, if there is no capture file")
+    parser.add_argument(
+        "--photos", type=Path, nargs="+", required=True, help="the lit photos, or their folders"
     )
     parser.add_argument("--out", type=Path, required=True, help="folder for the results")
-    parser.add_argument("--threads", type=int, help="at most so many (default: all cores)")
+    parser.add_argument(
+        "--threads", type=int, help="maximum number of threads (default: one per core)"
+    )
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -51,7 +55,7 @@ def run(arguments: argparse.Namespace) -> None:
             name = result.write(folder).name
         for found in result.placed:
             print(f"  {found.sentence()}")
-        print(f'wrote {out / name}: name it in the capture file, [scan] extra = "{name}"')
+        print(f'wrote {out / name}; add extra = "{name}" to [scan] of the capture file')
     if result.refused:
         more = f" (and {len(result.refused) - 1} more)" if len(result.refused) > 1 else ""
         count = f"{len(result.placed)} of {len(photos)} photos localised; "
@@ -66,29 +70,41 @@ def _photos(given: list[Path]) -> list[Path]:
         elif path.is_file():
             found.append(path)
         else:
-            raise InputError("no such file", file=path, key="--photos")
+            raise InputError("found no such file or folder", file=path, key="--photos")
     return found
 
 
 def _scan(
-    told: argparse.Namespace,
+    arguments: argparse.Namespace,
 ) -> tuple[tuple[Camera, ...], Mesh | None, Path, Path | None, tuple[str, ...]]:
-    """(cameras, mesh, folder of the scan's photos, COLMAP model where there is no mesh, notes)."""
-    cameras, mesh, images, chunk, frame = told.scan, told.mesh, told.images, told.chunk, None
-    if told.scan.is_file() and told.scan.suffix.lower() == ".toml":
+    """Return (cameras, mesh, folder of the photos, COLMAP model if there is no mesh, notes).
+
+    Raises InputError.
+    """
+    cameras, mesh, images, chunk, frame = (
+        arguments.scan,
+        arguments.mesh,
+        arguments.images,
+        arguments.chunk,
+        None,
+    )
+    if arguments.scan.is_file() and arguments.scan.suffix.lower() == ".toml":
         for key in ("mesh", "images", "chunk"):
-            if getattr(told, key) is not None:
-                raise InputError(f"a capture file says its {key} itself", key=f"--{key}")
-        entry = read_scan_entry(told.scan)
+            if getattr(arguments, key) is not None:
+                raise InputError(
+                    f"found a capture file, which defines {key} itself; omit this option",
+                    key=f"--{key}",
+                )
+        entry = read_scan_entry(arguments.scan)
         cameras, mesh, images = entry.cameras, entry.mesh, entry.images
         chunk, frame = entry.chunk, entry.frame
     if images is None:
         raise InputError(
-            "say where the scan's own photos lie: a new photo is found by comparing it with them",
+            "found no folder of the scan's photos, which are needed to match new photos; add it",
             key="--images",
         )
     if not images.is_dir():
-        raise InputError("no such folder", file=images, key="--images")
+        raise InputError("found no such folder", file=images, key="--images")
     if mesh is not None:
         scan = read_scan(cameras, mesh, images, chunk, frame)
         return scan.cameras, scan.mesh, images, None, scan.notes

@@ -1,4 +1,4 @@
-"""``maps CAPTURE RESULT --out DIR``: what varies over the surface, as maps over the mesh's UVs."""
+"""``maps CAPTURE RESULT --out DIR``: maps of colour and gloss over the UVs of the mesh."""
 
 from __future__ import annotations
 
@@ -20,28 +20,34 @@ from .fit import NO_SCENE, timed
 from .needs_blender import has_blender
 from .progress import Progress
 
-HELP = "base colour without light, roughness and coverage maps over the mesh's UVs"
+HELP = "compute maps of base colour (without lighting), roughness and coverage over the UVs"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("capture", type=Path, help="the capture file (*.capture.toml)")
-    parser.add_argument("result", type=Path, help="the folder that `fit` left, or its result.json")
+    parser.add_argument("result", type=Path, help="the output folder of `fit`, or its result.json")
     parser.add_argument("--out", type=Path, required=True, help="folder for the maps")
     parser.add_argument(
-        "--size", type=int, default=2048, help="texels a side (default %(default)s)"
+        "--size",
+        type=int,
+        default=2048,
+        help="width and height of a map in texels (default %(default)s)",
     )
     parser.add_argument(
         "--keep-fit",
         action="store_true",
-        help="do not fit again where the colour varies (faster; the highlight is less exact)",
+        help="do not fit materials with varying colour again (faster; less accurate highlights)",
     )
     parser.add_argument(
         "--normal",
         action="store_true",
-        help="a normal map too, of what the mesh's normals are off by",
+        help="also write a normal map that corrects the errors of the mesh normals",
     )
     parser.add_argument(
-        "--format", choices=("exr", "png"), default="exr", help="of the maps (default %(default)s)"
+        "--format",
+        choices=("exr", "png"),
+        default="exr",
+        help="file format of the maps (default %(default)s)",
     )
 
 
@@ -76,7 +82,7 @@ def run(arguments: argparse.Namespace) -> None:
             for material in result.refit.materials:
                 merl_file.write(folder / f"{material.name}.binary", material.fit.brdf.table())
             result_json.write(folder / "result.json", result.refit, stages, result.notes)
-    _tell(result)
+    _print_summary(result)
     for note in (*result.notes, *notes):
         print(f"  note: {note}")
     print(f"wrote {len(files)} maps and {out / 'maps.json'}")
@@ -84,24 +90,24 @@ def run(arguments: argparse.Namespace) -> None:
         print(f"      {out / name}")
 
 
-def _tell(result: MapsResult) -> None:
+def _print_summary(result: MapsResult) -> None:
     maps = result.maps
-    seen = maps.photos > 0
+    lit = maps.photos > 0
     print(
-        f"{len(result.texels):,} texels of {result.texels.size} × {result.texels.size}; "
-        f"{100 * seen.mean():.0f} % are seen lit by a photo"
+        f"{len(result.texels):,} texels in maps of {result.texels.size} × {result.texels.size}; "
+        f"{100 * lit.mean():.0f} % are visible and lit in at least one photo"
     )
     for index, level in enumerate(result.levels):
-        own = seen & (maps.material == index)
-        if not own.any():
+        lit_texels = lit & (maps.material == index)
+        if not lit_texels.any():
             print(
-                f"{level.name}: seen by no photo in the light; its maps are the fitted material's"
+                f"{level.name}: No photo shows it lit. Its maps hold the uniform fitted material."
             )
             continue
-        error = float(sorted(maps.error[own])[int(own.sum()) // 2])
-        scale = sorted(maps.materials[index].scale[own] @ level.channels)
+        error = float(sorted(maps.error[lit_texels])[int(lit_texels.sum()) // 2])
+        scale = sorted(maps.materials[index].scale[lit_texels] @ level.channels)
         low, middle, high = (scale[int(q * len(scale))] for q in (0.16, 0.5, 0.84))
         print(
-            f"{level.name}: varies by ± {50 * (high - low) / middle:.0f} %, known to "
-            f"± {100 * error:.0f} % (typical texel)"
+            f"{level.name}: brightness varies by ± {50 * (high - low) / middle:.0f} %; "
+            f"standard error ± {100 * error:.0f} % (median texel)"
         )

@@ -1,4 +1,4 @@
-"""``masks CAPTURE --out DIR``: shadow masks, proposed materials, a capture file with them."""
+"""``masks CAPTURE --out DIR``: shadow and material masks, and a capture file that names them."""
 
 from __future__ import annotations
 
@@ -9,30 +9,34 @@ from ..core.capture import read_capture
 from ..core.errors import InputError
 from ..core.jobs import finished
 from ..core.masks.proposal import MOST_MATERIALS
-from ..core.masks.write_masks import MasksJob, Wanted, check_final
+from ..core.masks.write_masks import MasksJob, MasksSettings, check_final
 from ..core.output_folder import check_out, staged_folder
 from .progress import Progress
 
-HELP = "shadow masks and proposed materials of a capture, to look at, repaint and fit with"
+HELP = "propose shadow masks and material masks of a capture, which you can repaint"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("capture", type=Path, help="the capture file (*.capture.toml)")
-    parser.add_argument("--out", type=Path, required=True, help="folder for masks and capture file")
     parser.add_argument(
-        "--shadows", action="store_true", help="write shadow masks (default without --materials)"
+        "--out", type=Path, required=True, help="folder for the masks and the capture file"
+    )
+    parser.add_argument(
+        "--shadows",
+        action="store_true",
+        help="write shadow masks (the default if --materials is not given)",
     )
     parser.add_argument(
         "--materials",
         metavar="N|auto",
-        help="propose so many materials; auto: as many as the photos show",
+        help="number of materials to propose; auto: estimated from the photos",
     )
     parser.add_argument(
         "--uncertainty",
         type=float,
         metavar="U",
-        help="how far off the mesh may be, scan units: shadow edges are blurred by as much "
-        "(default: a quarter of its median edge)",
+        help="position error of the mesh in scan units, by which shadow edges are blurred "
+        "(default: a quarter of its median edge length)",
     )
 
 
@@ -50,20 +54,24 @@ def run(arguments: argparse.Namespace) -> None:
         names = ", ".join(done.names)
         print(f"materials: {done.proposal.count} ({names})")
         if done.proposal.count == 1:
-            print("  note: the photos show no two materials; say how many with --materials N")
+            print("  note: The photos do not show two materials. Set a number with --materials N.")
     written = len(done.shadows) + sum(map(len, done.materials))
     print(f"wrote {written} masks and {out / name}")
 
 
-def _wanted(arguments: argparse.Namespace) -> Wanted:
-    count, said = None, arguments.materials
-    if said not in (None, "auto"):
-        if not said.isascii() or not said.isdigit() or not 1 <= int(said) <= MOST_MATERIALS:
+def _wanted(arguments: argparse.Namespace) -> MasksSettings:
+    count, requested = None, arguments.materials
+    if requested not in (None, "auto"):
+        if (
+            not requested.isascii()
+            or not requested.isdigit()
+            or not 1 <= int(requested) <= MOST_MATERIALS
+        ):
             raise InputError(
-                f"found {said!r}, expected auto or 1 to {MOST_MATERIALS}", key="--materials"
+                f"found {requested!r}, expected auto or 1 to {MOST_MATERIALS}", key="--materials"
             )
-        count = int(said)
+        count = int(requested)
     blur = arguments.uncertainty
     if blur is not None and not 0 <= blur < 1e12:
         raise InputError(f"found {blur}, expected 0 or more", key="--uncertainty")
-    return Wanted(arguments.shadows or said is None, said is not None, count, blur)
+    return MasksSettings(arguments.shadows or requested is None, requested is not None, count, blur)

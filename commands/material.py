@@ -1,4 +1,4 @@
-"""``material RESULT --to FORMAT … --out DIR``: a fit's materials for other programs."""
+"""``material RESULT --to FORMAT … --out DIR``: export fitted materials for other programs."""
 
 from __future__ import annotations
 
@@ -17,16 +17,17 @@ HELP = "export the materials of a result for other programs"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "result", type=Path, help="what `fit` left: its folder, or the result.json in it"
-    )
+    parser.add_argument("result", type=Path, help="the output folder of `fit`, or its result.json")
     parser.add_argument(
         "--to", nargs="+", required=True, choices=FORMATS, metavar="FORMAT",
         help=f"one or more of {', '.join(FORMATS)}",
     )  # fmt: skip
     parser.add_argument("--out", type=Path, required=True, help="folder for the files")
     parser.add_argument(
-        "--material", nargs="+", metavar="NAME", help="these alone (default: all of the result)"
+        "--material",
+        nargs="+",
+        metavar="NAME",
+        help="materials to export (default: all materials of the result)",
     )
 
 

@@ -1,4 +1,4 @@
-"""Whether Blender is available, and the error for commands that cannot run without it."""
+"""Test whether Blender is available; error for commands that cannot run without it."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ HOW = "run it in Blender: blender -b --python-exit-code 1 -P headless.py --"
 
 
 def has_blender() -> bool:
-    """Whether this Python runs in Blender or has bpy, and Patina's Blender code is installed.
+    """Return whether bpy can be imported and Patina's Blender code (``scene``) is installed.
 
-    The Python package, unlike the extension, leaves that code (``scene``) out.
+    The extension contains ``scene``; the Python package does not.
     """
     package = (__package__ or "").rpartition(".")[0]
     return all(importlib.util.find_spec(name) is not None for name in ("bpy", f"{package}.scene"))
 
 
 def check_blender(what: str, command: str) -> None:
-    """Raise PatinaError, which says how to run ``command`` in Blender, where there is none.
+    """Raise PatinaError if Blender is not available; its message says how to run ``command`` there.
 
     what: the subject of the sentence, such as "`render`" or "the format usd".
     """

@@ -1,4 +1,4 @@
-"""``render RESULT --world FILE|NAME|all --out DIR``: fitted materials under other light."""
+"""``render RESULT --world FILE|NAME|all --out DIR``: render materials under other light."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from ..core.result import read_result
 from .needs_blender import check_blender
 from .progress import Progress
 
-HELP = "render a result's materials, and the scanned object, under pictures of the world"
+HELP = "render the materials of a result, and the scanned object, under world images"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "result", type=Path, help="what `fit` left: its folder, or the result.json in it"
-    )
+    parser.add_argument("result", type=Path, help="the output folder of `fit`, or its result.json")
     parser.add_argument(
         "--world", nargs="+", required=True, metavar="WORLD",
-        help="a .hdr or .exr file, the name of a world that Blender ships, or all of those",
+        help="a .hdr or .exr file, the name of a world that Blender ships, or 'all' of these",
     )  # fmt: skip
     parser.add_argument("--out", type=Path, required=True, help="folder for the pictures")
-    parser.add_argument("--size", type=int, default=512, metavar="N", help="pixels along a side")
-    parser.add_argument("--samples", type=int, default=128, metavar="N", help="a pixel")
+    parser.add_argument(
+        "--size", type=int, default=512, metavar="N", help="width and height in pixels"
+    )
+    parser.add_argument("--samples", type=int, default=128, metavar="N", help="samples per pixel")
     parser.add_argument(
         "--turns", type=int, default=12, metavar="N",
-        help="pictures of one turn of the object (0: spheres alone)",
+        help="number of pictures in one turn of the object (0: only spheres)",
     )  # fmt: skip
-    parser.add_argument("--no-denoise", action="store_true", help="leave the noise in")
+    parser.add_argument("--no-denoise", action="store_true", help="do not denoise the pictures")
 
 
 def run(arguments: argparse.Namespace) -> None:
-    for key, least, most in (("size", 16, 8192), ("samples", 1, 65536), ("turns", 0, 360)):
-        if not least <= getattr(arguments, key) <= most:
+    for key, lowest, highest in (("size", 16, 8192), ("samples", 1, 65536), ("turns", 0, 360)):
+        if not lowest <= getattr(arguments, key) <= highest:
             raise InputError(
-                f"found {getattr(arguments, key)}, expected {least} to {most}", key=f"--{key}"
+                f"found {getattr(arguments, key)}, expected {lowest} to {highest}", key=f"--{key}"
             )
     out = check_out(arguments.out)
     pictures = render_to_folder(
@@ -58,18 +58,21 @@ def run(arguments: argparse.Namespace) -> None:
 def render_to_folder(
     result_file: Path,
     out: Path,
-    told: list[str],
+    world_names: list[str],
     size: int,
     samples: int,
     turns: int,
     denoise: bool = True,
 ) -> list[Picture]:
-    """Render a result under worlds into ``out``, with a page that shows all; returns them."""
+    """Render a result under the named worlds to ``out``, with a page that shows all pictures.
+
+    Returns the pictures. Raises PatinaError without Blender, InputError for an unknown world.
+    """
     check_blender("`render`", "render")
-    from ..scene.export.relight import Quality, relight, worlds_named  # needs bpy
+    from ..scene.export.relight import Quality, find_worlds, relight  # needs bpy
 
     result = read_result(result_file)
-    worlds = worlds_named(told)
+    worlds = find_worlds(world_names)
     subjects = [Subject(material) for material in result.materials]
     progress, found = Progress(), []
     quality = Quality(size, samples, turns, denoise)

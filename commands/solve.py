@@ -1,4 +1,4 @@
-"""``solve PHOTOS --out DIR``: cameras and sparse points from a folder of photos."""
+"""``solve PHOTOS --out DIR``: structure from motion from a folder of photos."""
 
 from __future__ import annotations
 
@@ -11,19 +11,21 @@ from ..core.solve import SolveJob
 from ..core.solve.solve import LENSES
 from .progress import Progress
 
-HELP = "cameras and sparse points from a folder of photos (structure from motion)"
+HELP = "compute cameras and sparse points from a folder of photos (structure from motion)"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("photos", type=Path, help="the folder of the scan's photos")
+    parser.add_argument("photos", type=Path, help="folder of the photos of the scan")
     parser.add_argument("--out", type=Path, required=True, help="folder for the results")
     parser.add_argument(
         "--lens",
         default=LENSES[0],
         choices=LENSES,
-        help="COLMAP's camera model (default %(default)s; OPENCV for a lens that bends more)",
+        help="COLMAP's camera model (default %(default)s; OPENCV for strong lens distortion)",
     )
-    parser.add_argument("--threads", type=int, help="at most so many (default: all cores)")
+    parser.add_argument(
+        "--threads", type=int, help="maximum number of threads (default: one per core)"
+    )
 
 
 def run(arguments: argparse.Namespace) -> None:
@@ -41,6 +43,6 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def check_threads(threads: int | None) -> None:
-    """Refuse a number of threads that is none."""
+    """Raise InputError unless ``threads`` is None or 1 to 1024."""
     if threads is not None and not 1 <= threads <= 1024:
         raise InputError(f"found {threads}, expected 1 to 1024", key="--threads")

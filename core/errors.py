@@ -1,4 +1,4 @@
-"""Errors of our own: each says what was found, what was expected and what to do."""
+"""Errors for users: each message says what was found, what was expected and what to do."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import zlib
 from pathlib import Path
 from zipfile import BadZipFile
 
-# what numpy raises for a file that is no .npz, or a damaged one
+# raised by numpy for a file that is not an .npz or is damaged
 UNREADABLE_NPZ = (
     OSError,
     KeyError,
@@ -19,13 +19,14 @@ UNREADABLE_NPZ = (
 
 
 class PatinaError(Exception):
-    """Anything Patina refuses to do, with a message a user can act on (one line, no traceback)."""
+    """An error that a user can resolve; its message is one line, shown without traceback."""
 
 
 class InputError(PatinaError):
-    """A file or key of the user's is wrong.
+    """Something is wrong in a file, key or option of the user.
 
     The message reads ``FILE:LINE: [key] what was found; what was expected``, as far as known.
+    ``detail`` is the message without that prefix.
     """
 
     def __init__(
@@ -37,11 +38,13 @@ class InputError(PatinaError):
         line: int | None = None,
     ) -> None:
         self.file, self.key, self.line = file, key, line
-        self.said = " ".join(message.split())  # without where, for whoever knows better where
+        self.detail = " ".join(
+            message.split()
+        )  # without the prefix, for callers that add their own
         where = "" if file is None else str(file) if line is None else f"{file}:{line}"
         head = ": ".join(part for part in (where, key and f"[{key}]") if part)
         super().__init__(" ".join(f"{head}: {message}".split()) if head else message)
 
 
 class FitError(PatinaError):
-    """The samples cannot support a fit (too few, all masked, nothing lit …)."""
+    """The samples do not support a fit (too few, all masked, none lit …)."""

@@ -1,4 +1,5 @@
-"""Check stage: what the photos show that the model does not, and why. Stepped as the fit is."""
+"""Check stage: find what the model does not explain in the photos, and name the causes. Runs in
+steps, as the fit does."""
 
 from __future__ import annotations
 
@@ -12,8 +13,8 @@ from ..core.jobs.check_job import CheckJob
 from ..core.jobs.refit_job import RefitJob
 from ..core.report.diagnosis_json import describe
 from ..scene.material.prepared_materials import PreparedJob
-from ..scene.session.last_diagnosis import keep, kept
-from ..scene.session.running_job import tell
+from ..scene.session.last_diagnosis import keep_check, kept_check
+from ..scene.session.running_job import set_running
 from ..scene.session.scene_properties import DIAGNOSIS, capture_path, store_result
 from ..scene.views.evidence import paint_evidence, show_evidence
 from .fit import can_fit, fit_job, show_result
@@ -21,8 +22,8 @@ from .stepped import Stepped
 
 
 class PATINA_OT_check(Stepped, bpy.types.Operator):
-    """Fit the materials, then find what the photos show that scan, light and materials do not \
-explain, name the cause, and fit again with it in the model"""
+    """Fit the materials, find what scan, lights and materials do not explain in the photos, name \
+the causes, and fit again with these effects included in the model"""
 
     bl_idname = "patina.check"
     bl_label = "Check"
@@ -34,18 +35,24 @@ explain, name the cause, and fit again with it in the model"""
         return can_fit(cls, context)
 
     def _start(self, context: bpy.types.Context) -> None:
-        keep(None)  # two at once would be too much
+        keep_check(None)  # the samples of two checks would need too much memory
         self._job = PreparedJob(CheckJob(fit_job(self, context.scene)))
         self._scene = context.scene.name
 
     def _finish(self, context: bpy.types.Context) -> Iterator[None]:
         checked, after = self._job.job.checked, self._job.result
-        found, setting, before = checked.found, checked.context, checked.result
+        found, diagnosis_context, before = checked.found, checked.context, checked.result
         scene = bpy.data.scenes.get(self._scene)
-        if found is None or setting is None or before is None or after is None or scene is None:
-            self.report({"WARNING"}, "The scene is gone; nothing was kept")
+        if (
+            found is None
+            or diagnosis_context is None
+            or before is None
+            or after is None
+            or scene is None
+        ):
+            self.report({"WARNING"}, "The scene no longer exists; the result was discarded.")
             return
-        keep(checked)
+        keep_check(checked)
         scene.patina.causes.clear()
         applied = {effect.cause for effect in after.effects}
         for trial in correctable_effects(found):
@@ -54,17 +61,20 @@ explain, name the cause, and fit again with it in the model"""
         yield from _show(self, scene, after)
         store_result(str(before.capture.file), describe(found, before, after), DIAGNOSIS)
         yield
-        mesh, vertices = scene.patina.mesh, setting.rays.mesh.vertices
-        if mesh is not None and not paint_evidence(mesh, vertices, setting.pixels, found):
-            self.report({"WARNING"}, f"{mesh.name} no longer has the scan's vertices: not coloured")
+        mesh, vertices = scene.patina.mesh, diagnosis_context.rays.mesh.vertices
+        if mesh is not None and not paint_evidence(mesh, vertices, diagnosis_context.pixels, found):
+            self.report(
+                {"WARNING"},
+                f"{mesh.name} no longer has the vertices of the scan, so it was not coloured.",
+            )
         for trial in found.reported:
             self.report({"WARNING"}, f"{trial.effect.cause}: {found.sentence(trial)}")
         if not found.causes:
-            self.report({"INFO"}, "Nothing that can be named is wrong")
+            self.report({"INFO"}, "No known cause found.")
 
 
 class PATINA_OT_refit(Stepped, bpy.types.Operator):
-    """Fit the materials again, with only those causes in the model that are switched on"""
+    """Fit the materials again, with only the enabled causes included in the model"""
 
     bl_idname = "patina.refit"
     bl_label = "Fit Again"
@@ -73,14 +83,16 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if kept(capture_path(context.scene)) is None:
-            cls.poll_message_set("Check first: samples are kept only as long as Blender runs")
+        if kept_check(capture_path(context.scene)) is None:
+            cls.poll_message_set(
+                "Run Check first; its samples are kept only until Blender is closed"
+            )
             return False
         return cls.idle(context)
 
     def _start(self, context: bpy.types.Context) -> None:
         off = [cause.name for cause in context.scene.patina.causes if not cause.use]
-        refit = RefitJob(kept(capture_path(context.scene)), without=off, exactly=True)
+        refit = RefitJob(kept_check(capture_path(context.scene)), without=off, exactly=True)
         self._job = PreparedJob(refit)
         self._scene = context.scene.name
 
@@ -88,23 +100,24 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
         checked, after = self._job.job.checked, self._job.result
         scene = bpy.data.scenes.get(self._scene)
         if after is None or scene is None or checked.result is None or checked.found is None:
-            self.report({"WARNING"}, "The scene is gone; the materials were not applied")
+            self.report({"WARNING"}, "The scene no longer exists; the materials were not applied.")
             return
         yield from _show(self, scene, after)
-        told = describe(checked.found, checked.result, after)
-        store_result(str(after.capture.file), told, DIAGNOSIS)
+        description = describe(checked.found, checked.result, after)
+        store_result(str(after.capture.file), description, DIAGNOSIS)
 
 
 def _show(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> Iterator[None]:
-    """The materials onto the mesh, and with which causes they were fitted."""
+    """Assign the materials to the mesh, and report which effects the fit included."""
     yield from show_result(operator, scene, result)
     used = ", ".join(effect.cause for effect in result.effects)
-    told = f"with {used} in the model" if used else "as the capture says"
-    operator.report({"INFO"}, f"{len(result.materials)} materials fitted {told}")
+    model = f"with {used} included in the model" if used else "without additional effects"
+    operator.report({"INFO"}, f"Materials fitted: {len(result.materials)}, {model}.")
 
 
 class PATINA_OT_show_evidence(bpy.types.Operator):
-    """Colour the scanned mesh by what this changes in the photos: blue darker, red brighter"""
+    """Colour the scanned mesh by the change that this effect makes in the photos: blue where they \
+get darker, red where they get brighter"""
 
     bl_idname = "patina.show_evidence"
     bl_label = "Show Where"
@@ -122,7 +135,7 @@ class PATINA_OT_show_evidence(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if not show_evidence(context.scene.patina.mesh, self.cause):
-            self.report({"WARNING"}, f"Nothing is kept of {self.cause}: run Check again")
+            self.report({"WARNING"}, f"The mesh has no colours for {self.cause}. Run Check again.")
             return {"CANCELLED"}
         for area in context.screen.areas if context.screen else ():
             if area.type == "VIEW_3D":
@@ -137,5 +150,5 @@ register, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
 
 def unregister() -> None:
     """Remove the classes and the status line."""
-    tell(None)
+    set_running(None)
     _unregister_classes()

@@ -1,6 +1,7 @@
-"""Files dropped onto a 3D viewport: captures come in, cameras become one, photos are asked about.
+"""Files dropped onto a 3D viewport: a capture is imported, a file of cameras starts a new capture,
+and for photos the user is asked what they are.
 
-Blender hands over files by their suffix; a folder has none and cannot be dropped.
+Blender selects the handler by file suffix; a folder has none and cannot be dropped.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ from ..core.capture.new_capture import CAMERAS, PHOTOS
 from ..core.errors import PatinaError
 from ..scene.session.running_job import running
 from ..scene.session.scene_properties import capture_path
-from .report_errors import hand_on, refuse
+from .report_errors import call_operator, report_and_cancel
 
 NOTHING, SOLVE, LIT = "NOTHING", "SOLVE", "LIT"
 
 
 class PATINA_OT_drop_photos(bpy.types.Operator):
-    """Ask what dropped photos are: those of a scan to be solved, or lit ones to measure with. \
-Nothing is added to a capture that is open"""
+    """Choose the use of dropped photos: solve their cameras, or measure materials with them. The \
+open capture is not changed"""
 
     bl_idname = "patina.drop_photos"
     bl_label = "Photos for Patina"
@@ -34,14 +35,15 @@ Nothing is added to a capture that is open"""
     )
     use: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="They Are",
-        description="What is to be done with them",
+        description="What to do with the photos",
         items=[
             (NOTHING, "Nothing for Now", "Leave the scene as it is"),
-            (SOLVE, "A Scan to Solve", "Find the cameras of all photos in their folder"),
+            (SOLVE, "Photos to Solve", "Find the cameras of all photos in their folder"),
             (
                 LIT,
                 "Lit Photos",
-                "Write a new capture with them: of the open capture's scan, or of one to choose",
+                "Write a new capture with these photos, using the scan of the open capture or one "
+                "that you choose",
             ),
         ],
         options={"SKIP_SAVE"},
@@ -51,18 +53,20 @@ Nothing is added to a capture that is open"""
     def poll(cls, context: bpy.types.Context) -> bool:
         if running(context.scene) is None:
             return True
-        cls.poll_message_set("Something is running; ESC stops it")
+        cls.poll_message_set("Another job is running; press ESC to stop it")
         return False
 
     def draw(self, context: bpy.types.Context) -> None:
-        """The question."""
+        """Draw the dialog."""
         layout = self.layout
         count = len(self.files)
         where = Path(self.directory).name
-        layout.label(text=f"{count} photo{'s' * (count != 1)} from {where}; nothing is added yet")
+        layout.label(
+            text=f"{count} photo{'s' * (count != 1)} from {where}; nothing is imported yet"
+        )
         if context.scene.patina.capture:
             name = Path(capture_path(context.scene)).name
-            layout.label(text=f"{name} stays as it is: a capture file names its own photos")
+            layout.label(text=f"{name} is not changed; a capture file lists its own photos")
         layout.column().prop(self, "use", expand=True)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -70,46 +74,49 @@ Nothing is added to a capture that is open"""
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if self.use == SOLVE:
-            return hand_on(self, bpy.ops.patina.solve_photos, _way(), directory=self.directory)
+            return call_operator(
+                self, bpy.ops.patina.solve_photos, _execution_context(), directory=self.directory
+            )
         if self.use == LIT:
             try:
-                told = self._scan(context.scene)
+                properties = self._scan(context.scene)
             except PatinaError as error:
-                return refuse(self, error)
-            told["photos_directory"] = self.directory
-            told["photos"] = [{"name": one.name} for one in self.files]
-            way = "EXEC_DEFAULT" if "cameras" in told else "INVOKE_DEFAULT"
-            return hand_on(self, bpy.ops.patina.new_capture, way, **told)
-        self.report({"INFO"}, "Nothing was added")
+                return report_and_cancel(self, error)
+            properties["photos_directory"] = self.directory
+            properties["photos"] = [{"name": one.name} for one in self.files]
+            way = "EXEC_DEFAULT" if "cameras" in properties else "INVOKE_DEFAULT"
+            return call_operator(self, bpy.ops.patina.new_capture, way, **properties)
+        self.report({"INFO"}, "Nothing was imported.")
         return {"CANCELLED"}
 
     def _scan(self, scene: bpy.types.Scene) -> dict[str, Any]:
-        """The open capture's, as the properties of patina.new_capture; {} without one."""
+        """The scan of the open capture, as properties of patina.new_capture; {} without a
+        capture."""
         path = capture_path(scene)
         if not path:
             return {}
-        said = read_capture(Path(path)).scan
-        told = {"cameras": said.cameras, "mesh": said.mesh, "images": said.images}
-        words = {key: str(value) for key, value in told.items() if value is not None}
-        return {**words, **({"chunk": said.chunk} if said.chunk else {})}
+        scan = read_capture(Path(path)).scan
+        files = {"cameras": scan.cameras, "mesh": scan.mesh, "images": scan.images}
+        properties = {key: str(value) for key, value in files.items() if value is not None}
+        return {**properties, **({"chunk": scan.chunk} if scan.chunk else {})}
 
 
-def _way() -> str:
-    """In steps where somebody sees them."""
+def _execution_context() -> str:
+    """The execution context: a stepped job in a window, a single call without one."""
     return "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
 
 
-class OverViewport:
-    """What is dropped into a 3D viewport."""
+class ViewportDropHandler:
+    """Mixin for file handlers that accept files dropped onto a 3D viewport."""
 
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:
-        """Nowhere else."""
+        """Accept 3D viewports only."""
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-class PATINA_FH_capture(OverViewport, bpy.types.FileHandler):
-    """A capture file."""
+class PATINA_FH_capture(ViewportDropHandler, bpy.types.FileHandler):
+    """Import a dropped capture file."""
 
     bl_idname = "PATINA_FH_capture"
     bl_label = "Patina: Capture"
@@ -117,8 +124,8 @@ class PATINA_FH_capture(OverViewport, bpy.types.FileHandler):
     bl_file_extensions = ".toml"
 
 
-class PATINA_FH_cameras(OverViewport, bpy.types.FileHandler):
-    """What a reconstruction tool wrote."""
+class PATINA_FH_cameras(ViewportDropHandler, bpy.types.FileHandler):
+    """Start a new capture from the file of a reconstruction tool."""
 
     bl_idname = "PATINA_FH_cameras"
     bl_label = "Patina: Cameras of a Scan"
@@ -126,8 +133,8 @@ class PATINA_FH_cameras(OverViewport, bpy.types.FileHandler):
     bl_file_extensions = ";".join(sorted(CAMERAS))
 
 
-class PATINA_FH_photos(OverViewport, bpy.types.FileHandler):
-    """Photos of any kind that is read."""
+class PATINA_FH_photos(ViewportDropHandler, bpy.types.FileHandler):
+    """Ask for the use of dropped photos, in any format that can be read."""
 
     bl_idname = "PATINA_FH_photos"
     bl_label = "Patina: Photos"

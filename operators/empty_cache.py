@@ -1,4 +1,4 @@
-"""Preferences: the cache emptied."""
+"""Preferences: empty the cache."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from ..scene.material.file_cache import MB, cached_files, empty_cache
 
 
 class PATINA_OT_empty_cache(bpy.types.Operator):
-    """Remove what Patina keeps on disk and can make again, except what the open file shows. A \
-.blend that was saved after its import may miss photos behind its cameras: import it again then"""
+    """Remove the files that Patina can create again, except those that the open file uses. Other \
+.blend files may then lack photos behind their cameras; import the capture again in these"""
 
     bl_idname = "patina.empty_cache"
     bl_label = "Empty Cache"
@@ -25,8 +25,8 @@ class PATINA_OT_empty_cache(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         count, size = empty_cache()
         left = len(cached_files())
-        more = f"; {left} are in use by the open file" if left else ""
-        self.report({"INFO"}, f"{count} files removed, {size / MB:,.1f} MB{more}")
+        more = f" Files kept because the open file uses them: {left}." if left else ""
+        self.report({"INFO"}, f"Files removed: {count}, {size / MB:,.1f} MB.{more}")
         return {"FINISHED"}
 
 

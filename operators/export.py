@@ -1,4 +1,4 @@
-"""Material stage: the measured materials for other programs. A stepped job, ESC cancels."""
+"""Material stage: export the measured materials for other programs. A stepped job; ESC cancels."""
 
 from __future__ import annotations
 
@@ -10,41 +10,41 @@ from ..core.errors import InputError
 from ..scene.export.export_choice import FORMATS
 from ..scene.export.export_job import ExportJob
 from ..scene.session.folders import cache_folder
-from ..scene.session.running_job import tell
+from ..scene.session.running_job import set_running
 from ..scene.session.scene_properties import capture_path, stored_result
-from .report_errors import hand_on
+from .report_errors import call_operator
 from .stepped import Stepped
 
 
 class PATINA_OT_export(Stepped, bpy.types.Operator):
-    """Write the measured materials for other programs, and what each format loses of them. They \
-are written as the last fit found them; glTF and USD take the scanned mesh along as it is now"""
+    """Export the measured materials for other programs, and report what each format cannot store. \
+The materials are those of the last fit; glTF and USD include the scanned mesh as it is now"""
 
     bl_idname = "patina.export"
     bl_label = "Export Materials"
     PANEL = "material"
     bl_options = {"REGISTER", "UNDO"}
 
-    ALONGSIDE = False
+    IN_BACKGROUND = False
     TICK = 0.1
-    CANCELLED = "Export cancelled"
+    CANCELLED = "Export cancelled."
 
     directory: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Directory",
-        description="The folder that the export's own folder is made in",
+        description="Folder in which the export folder is created",
         subtype="DIR_PATH",
         options={"SKIP_SAVE"},
     )
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})  # type: ignore[valid-type]
     folder: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Folder",
-        description="Name of the folder that is written; an earlier export in it is replaced. "
-        "Empty: the name of the capture and 'export'",
+        description="Name of the export folder; an earlier export in it is replaced. If empty, the "
+        "name of the capture followed by 'export'",
         options={"SKIP_SAVE"},
     )
     formats: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Formats",
-        description="What the materials are written as",
+        description="File formats to write the materials in",
         items=[(word, name, holds) for word, (name, holds) in FORMATS.items()],
         options={"ENUM_FLAG", "SKIP_SAVE"},
     )
@@ -52,21 +52,21 @@ are written as the last fit found them; glTF and USD take the scanned mesh along
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if stored_result(capture_path(context.scene)) is None:
-            cls.poll_message_set("Nothing is measured yet: fit the materials first")
+            cls.poll_message_set("No measured materials yet; fit the materials first")
             return False
         return cls.idle(context)
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Beside the file browser."""
+        """Draw the options in the side panel of the file browser."""
         layout = self.layout
         layout.prop(self, "folder")
         layout.label(text="Formats:")
         layout.column(align=True).prop(self, "formats")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        if getattr(self, "_picked", False):  # in the file browser: go on in steps
-            told = {name: getattr(self, name) for name in ("directory", "folder", "formats")}
-            return hand_on(self, bpy.ops.patina.export, "INVOKE_DEFAULT", **told)
+        if getattr(self, "_picked", False):  # confirmed in the file browser: continue in steps
+            chosen = {name: getattr(self, name) for name in ("directory", "folder", "formats")}
+            return call_operator(self, bpy.ops.patina.export, "INVOKE_DEFAULT", **chosen)
         return super().execute(context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -75,17 +75,17 @@ are written as the last fit found them; glTF and USD take the scanned mesh along
         if not self.directory:
             self._picked = True
             self.directory = str(Path(bpy.data.filepath or capture_path(context.scene)).parent)
-            self.folder = self.folder or _usual(context.scene)
+            self.folder = self.folder or _default_name(context.scene)
             context.window_manager.fileselect_add(self)
             return {"RUNNING_MODAL"}
         return super().invoke(context, event)
 
     def _start(self, context: bpy.types.Context) -> None:
         if not self.directory:
-            raise InputError("say which folder to write into", key="directory")
+            raise InputError("no folder given; choose the folder to write into", key="directory")
         formats = self.formats or context.scene.patina_export.formats
         parent = Path(bpy.path.abspath(self.directory))
-        out = parent / (self.folder or _usual(context.scene))
+        out = parent / (self.folder or _default_name(context.scene))
         self._job = ExportJob(context.scene, sorted(formats), out, cache_folder())
         self._scene = context.scene.name  # by name: a reference does not survive undo
 
@@ -95,11 +95,11 @@ are written as the last fit found them; glTF and USD take the scanned mesh along
             kind = "WARNING" if loss.dropped else "INFO"
             self.report({kind}, f"{head}: {'; '.join(more)}")
         count = len(self._job.files)
-        self.report({"INFO"}, f"{count} files in {self._job.out}")
+        self.report({"INFO"}, f"Files written: {count}, in {self._job.out}")
 
 
-def _usual(scene: bpy.types.Scene) -> str:
-    """The name of the folder where none is told."""
+def _default_name(scene: bpy.types.Scene) -> str:
+    """The default name of the export folder."""
     return f"{Path(capture_path(scene)).name.split('.')[0]} export"
 
 
@@ -108,5 +108,5 @@ register, _unregister_classes = bpy.utils.register_classes_factory((PATINA_OT_ex
 
 def unregister() -> None:
     """Remove the classes and the status line."""
-    tell(None)
+    set_running(None)
     _unregister_classes()

@@ -1,4 +1,5 @@
-"""Fit stage: a stepped job. Scripts drain it, the window steps it on a timer; ESC cancels."""
+"""Fit stage: a stepped job. Scripts run it to the end at once, a window steps it on a timer; ESC
+cancels."""
 
 from __future__ import annotations
 
@@ -13,48 +14,51 @@ from ..core.jobs import CaptureResult, FitJob
 from ..core.samples import Margins
 from ..scene.material.file_cache import own_basis, trim_cache
 from ..scene.material.prepared_materials import PreparedJob
-from ..scene.paint.apply_paint import take_all
+from ..scene.paint.apply_paint import apply_strokes
 from ..scene.paint.mask_images import with_mask_images
 from ..scene.photos.lamps import with_dragged_lamps
-from ..scene.scan.apply_result import applying
+from ..scene.scan.apply_result import apply_result_steps
 from ..scene.scan.face_slots import with_painted_slots
 from ..scene.session.last_fit import keep_fit
 from ..scene.session.preferences import preferences
-from ..scene.session.running_job import tell
+from ..scene.session.running_job import set_running
 from .stepped import Stepped
 
 
 def can_fit(operator: type[Stepped], context: bpy.types.Context) -> bool:
-    """False, with a reason, without a capture and while something runs."""
+    """Whether a fit can start: a capture is open and no job runs. Sets the poll message if not."""
     if not context.scene.patina.capture:
-        operator.poll_message_set("Import a capture first: it says which photos to measure")
+        operator.poll_message_set("Import a capture first; it lists the photos to measure")
         return False
     return operator.idle(context)
 
 
 def fit_job(operator: bpy.types.Operator, scene: bpy.types.Scene) -> FitJob:
-    """Of a scene's capture, with what the artist dragged and painted. Raises InputError where the
-    capture file is gone."""
+    """The fit of the scene's capture, with the lamps that the user moved and the slots and masks
+    that were painted. Raises InputError if the capture file does not exist."""
     path = Path(bpy.path.abspath(scene.patina.capture))
     if not path.is_file():
-        raise InputError("is gone; import the capture again from where it is now", file=path)
+        raise InputError(
+            "the file does not exist; import the capture again from its present place", file=path
+        )
     margins = preferences().margins
     capture, dragged = with_dragged_lamps(read_capture(path, margins), scene)
     if capture.fit.margins != Margins():
-        told = ", ".join(f"{name} {value:g}" for name, value in vars(capture.fit.margins).items())
-        operator.report({"INFO"}, f"left out, by capture and preferences: {told}")
+        margins = ", ".join(
+            f"{name} {value:g}" for name, value in vars(capture.fit.margins).items()
+        )
+        operator.report({"INFO"}, f"Margins set by capture and preferences: {margins}.")
     if dragged:
-        operator.report({"INFO"}, f"lights as their lamps stand now: {', '.join(dragged)}")
-    take_all(scene)
+        operator.report({"INFO"}, f"Lights taken from edited lamps: {', '.join(dragged)}.")
+    apply_strokes(scene)
     capture, prepare = with_painted_slots(with_mask_images(capture), scene)
     return FitJob(capture, own_basis(), prepare)
 
 
 def show_result(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> Iterator[None]:
-    """The materials onto the mesh, and what should be known about them to the user; piece by
-    piece."""
+    """Assign the materials to the mesh, one piece per yield, and report their warnings."""
     job = operator._job
-    notes = yield from applying(scene, result, job.stages, job.prepared)
+    notes = yield from apply_result_steps(scene, result, job.stages, job.prepared)
     yield
     keep_fit(result)
     trim_cache()
@@ -87,10 +91,10 @@ class PATINA_OT_fit(Stepped, bpy.types.Operator):
             return
         scene = bpy.data.scenes.get(self._scene)
         if scene is None:
-            self.report({"WARNING"}, "The scene is gone; the materials were not applied")
+            self.report({"WARNING"}, "The scene no longer exists; the materials were not applied.")
             return
         yield from show_result(self, scene, result)
-        self.report({"INFO"}, f"{len(result.materials)} materials measured")
+        self.report({"INFO"}, f"Materials measured: {len(result.materials)}.")
 
 
 register, _unregister_classes = bpy.utils.register_classes_factory((PATINA_OT_fit,))
@@ -98,5 +102,5 @@ register, _unregister_classes = bpy.utils.register_classes_factory((PATINA_OT_fi
 
 def unregister() -> None:
     """Remove the classes and the status line."""
-    tell(None)
+    set_running(None)
     _unregister_classes()

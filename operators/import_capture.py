@@ -1,4 +1,4 @@
-"""Scan stage: a capture into the scene."""
+"""Scan stage: import a capture into the scene."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from ..core.errors import PatinaError
 from ..core.inputs import capture_data
 from ..core.inputs.lights import find_lights
 from ..core.inputs.photos import LitPhotos
-from ..scene.scan.scan_collection import already_there, create_scan_collection
+from ..scene.scan.scan_collection import create_scan_collection, find_earlier_import
 from ..scene.session.folders import rectified_folder
-from .report_errors import refuse
+from .report_errors import report_and_cancel
 
 DEMO = Path(__file__).parents[1] / "assets" / "demo" / "demo.capture.toml"
 
 
 class PATINA_OT_import_capture(bpy.types.Operator):
-    """Bring in a capture: the scanned mesh, its cameras with the photos behind them, the lights"""
+    """Import a capture: the scanned mesh, the cameras with their photos, and the lights"""
 
     bl_idname = "patina.import_capture"
     bl_label = "Import Capture"
@@ -29,7 +29,7 @@ class PATINA_OT_import_capture(bpy.types.Operator):
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})  # type: ignore[valid-type]
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return bring_in(self, context, Path(bpy.path.abspath(self.filepath)))
+        return import_into_scene(self, context, Path(bpy.path.abspath(self.filepath)))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if self.filepath:
@@ -40,24 +40,27 @@ class PATINA_OT_import_capture(bpy.types.Operator):
 
 
 class PATINA_OT_import_demo(bpy.types.Operator):
-    """Bring in the capture that comes with Patina, to try everything without photos of your own"""
+    """Import the example capture included with Patina, to try it without photos of your own"""
 
     bl_idname = "patina.import_demo"
     bl_label = "Import Demo Capture"
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return bring_in(self, context, DEMO)
+        return import_into_scene(self, context, DEMO)
 
 
-def bring_in(operator: bpy.types.Operator, context: bpy.types.Context, path: Path) -> set[str]:
-    """Read everything, then make everything; a mistake is reported and makes nothing."""
+def import_into_scene(
+    operator: bpy.types.Operator, context: bpy.types.Context, path: Path
+) -> set[str]:
+    """Import a capture: read all files first, then create the objects. An error is reported and
+    creates nothing."""
     try:
-        there = already_there(context.scene, path)
-        if there is not None:
+        existing = find_earlier_import(context.scene, path)
+        if existing is not None:
             raise PatinaError(
-                f"this capture is in the scene already: delete the collection {there.name!r} to "
-                "import it anew"
+                f"this capture is already in the scene; to import it again, delete the collection "
+                f"{existing.name!r} first"
             )
         capture = read_capture(path)
         scan = capture_data.open_scan(capture)
@@ -66,7 +69,7 @@ def bring_in(operator: bpy.types.Operator, context: bpy.types.Context, path: Pat
         lights = find_lights(capture, scan, photos)
         made = create_scan_collection(context.scene, capture, scan, lights, rectified_folder(path))
     except PatinaError as error:
-        return refuse(operator, error)
+        return report_and_cancel(operator, error)
     context.scene.patina.capture = str(path)
     context.scene.patina.mesh = made.mesh
     for selected in context.selected_objects:
@@ -85,8 +88,8 @@ def bring_in(operator: bpy.types.Operator, context: bpy.types.Context, path: Pat
         operator.report({"INFO"}, note)
     operator.report(
         {"INFO"},
-        f"{len(made.cameras)} cameras, {len(capture.photos)} lit photos, "
-        f"{len(scan.mesh.faces):,} faces",
+        f"Imported: cameras {len(made.cameras)}, lit photos {len(capture.photos)}, "
+        f"faces {len(scan.mesh.faces):,}.",
     )
     return {"FINISHED"}
 

@@ -1,4 +1,4 @@
-"""Photos stage: stand where a lit photo was taken."""
+"""Photos stage: look through the camera of a lit photo."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from ..scene.photos.photo_list import lit_photos, looked_at
 
 
 class PATINA_OT_next_photo(bpy.types.Operator):
-    """Look through the camera of the next lit photo, with the photo behind the mesh"""
+    """Look through the camera of the next lit photo, with the photo behind the mesh and its lamp \
+switched on"""
 
     bl_idname = "patina.next_photo"
     bl_label = "Next Lit Photo"
@@ -22,23 +23,23 @@ class PATINA_OT_next_photo(bpy.types.Operator):
     ) -> str:
         which = "previous" if properties.step < 0 else "next"
         return (
-            f"Look through the camera of the {which} lit photo, the photo behind the mesh and its "
-            "lamp switched on"
+            f"Look through the camera of the {which} lit photo, with the photo behind the mesh and "
+            "its lamp switched on"
         )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if lit_photos(context.scene):
             return True
-        cls.poll_message_set("No lit photos here yet: import a capture first")
+        cls.poll_message_set("No lit photos in this scene; import a capture first")
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        found, now = lit_photos(scene), looked_at(scene)
-        at = (found.index(now) + self.step) % len(found) if now in found else 0
+        photos, current = lit_photos(scene), looked_at(scene)
+        index = (photos.index(current) + self.step) % len(photos) if current in photos else 0
         state = scene.patina_photos
-        state.active = list(state.photos).index(found[at])  # which looks at it
+        state.active = list(state.photos).index(photos[index])  # its update callback looks at it
         for area in context.screen.areas if context.screen else ():
             if area.type == "VIEW_3D":
                 area.spaces.active.region_3d.view_perspective = "CAMERA"

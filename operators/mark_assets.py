@@ -1,4 +1,4 @@
-"""Material stage: the measured materials into the asset browser."""
+"""Material stage: mark the measured materials as assets."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from ..scene.session.scene_properties import capture_path, stored_result
 
 
 class PATINA_OT_mark_assets(bpy.types.Operator):
-    """Mark the measured materials as assets, with their spheres, tags and where they come from; \
-saved in a file of an asset library they are found from everywhere"""
+    """Mark the measured materials as assets, with preview, tags and provenance. Save the file in \
+an asset library to use them in other files"""
 
     bl_idname = "patina.mark_assets"
     bl_label = "Mark as Assets"
@@ -21,20 +21,22 @@ saved in a file of an asset library they are found from everywhere"""
     def poll(cls, context: bpy.types.Context) -> bool:
         if measured_of(capture_path(context.scene)):
             return True
-        cls.poll_message_set("Nothing is measured yet: fit the materials first")
+        cls.poll_message_set("No measured materials yet; fit the materials first")
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         capture = capture_path(context.scene)
         result = stored_result(capture)
         if result is None:
-            self.report({"ERROR"}, "What the fit found is gone from this file: fit again")
+            self.report({"ERROR"}, "The result of the fit is no longer in this file. Fit again.")
             return {"CANCELLED"}
         marked = [m.name for m in measured_of(capture).values() if mark(m, result)]
         if not marked:
-            self.report({"ERROR"}, "The last fit knows none of these materials: fit again")
+            self.report(
+                {"ERROR"}, "None of these materials is in the result of the last fit. Fit again."
+            )
             return {"CANCELLED"}
-        self.report({"INFO"}, f"Assets now: {', '.join(marked)}")
+        self.report({"INFO"}, f"Marked as assets: {', '.join(marked)}.")
         return {"FINISHED"}
 
 

@@ -1,4 +1,4 @@
-"""Masks: shadow masks to paint on, materials proposed on the mesh. Stepped jobs, ESC cancels."""
+"""Masks: compute shadow masks, and propose materials on the mesh. Stepped jobs; ESC cancels."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from ..core.concurrency.job import Job, Step
 from ..core.errors import InputError, PatinaError
 from ..core.masks.proposal import MOST_MATERIALS
 from ..core.masks.proposal_job import ProposalJob
-from ..core.masks.write_masks import MasksJob, Wanted, Written, material_names
+from ..core.masks.write_masks import MasksJob, MasksSettings, WrittenMasks, material_names
 from ..core.output_folder import check_out, staged_folder
-from ..scene.paint.apply_paint import take_all
+from ..scene.paint.apply_paint import apply_strokes
 from ..scene.paint.mask_images import (
     masks_folder,
     shadow_images,
@@ -23,12 +23,12 @@ from ..scene.paint.mask_images import (
 )
 from ..scene.photos.lamps import with_dragged_lamps
 from ..scene.scan.face_slots import show_proposal
-from ..scene.session.running_job import tell
+from ..scene.session.running_job import set_running
 from .stepped import Stepped
 
 
-class _OfCapture(Stepped):
-    """Work on the capture in the scene. Subclasses say which job, and what then."""
+class _CaptureJob(Stepped):
+    """Mixin for jobs on the scene's capture. Subclasses create the job and apply its result."""
 
     PANEL = "masks"
 
@@ -42,8 +42,11 @@ class _OfCapture(Stepped):
     def _start(self, context: bpy.types.Context) -> None:
         path = Path(bpy.path.abspath(context.scene.patina.capture))
         if not path.is_file():
-            raise InputError("is gone; import the capture again from where it is now", file=path)
-        take_all(context.scene)
+            raise InputError(
+                "the file does not exist; import the capture again from its present place",
+                file=path,
+            )
+        apply_strokes(context.scene)
         capture, _ = with_dragged_lamps(read_capture(path), context.scene)
         self._capture = str(capture.file)
         self._scene = context.scene.name  # by name: a reference does not survive undo
@@ -61,8 +64,8 @@ class _OfCapture(Stepped):
         raise NotImplementedError
 
 
-class PATINA_OT_propose_materials(_OfCapture, bpy.types.Operator):
-    """Divide the mesh into materials that look different in the photos, as slots to repaint"""
+class PATINA_OT_propose_materials(_CaptureJob, bpy.types.Operator):
+    """Divide the mesh into materials that look different in the photos, as slots to paint over"""
 
     bl_idname = "patina.propose_materials"
     bl_label = "Propose Materials"
@@ -70,7 +73,7 @@ class PATINA_OT_propose_materials(_OfCapture, bpy.types.Operator):
 
     count: bpy.props.IntProperty(  # type: ignore[valid-type]
         name="Materials",
-        description="How many there are. 0: as many as the photos show",
+        description="Number of materials; 0 to let the photos decide",
         min=0,
         max=MOST_MATERIALS,
     )
@@ -78,7 +81,7 @@ class PATINA_OT_propose_materials(_OfCapture, bpy.types.Operator):
     def _job_of(self, scene: bpy.types.Scene, capture: Capture) -> Job:
         mesh = scene.patina.mesh
         if mesh is None or mesh.type != "MESH" or mesh.name not in scene.objects:
-            raise PatinaError("the scanned mesh is not in this scene: import the capture again")
+            raise PatinaError("the scanned mesh is not in this scene; import the capture again")
         return ProposalJob(with_mask_images(capture), self.count or None)
 
     def _take(self, scene: bpy.types.Scene) -> None:
@@ -87,29 +90,32 @@ class PATINA_OT_propose_materials(_OfCapture, bpy.types.Operator):
         show_proposal(scene.patina.mesh, self._capture, found.labels, found.confidence, names)
         scene.patina.use_slots = found.count > 1
         if found.count == 1:
-            self.report({"INFO"}, "One material: the photos show no difference")
+            self.report({"INFO"}, "One material found; the photos show no difference.")
         else:
-            self.report({"INFO"}, f"{found.count} materials; paint over what is wrong")
+            self.report(
+                {"INFO"}, f"{found.count} materials proposed. Paint over faces that are wrong."
+            )
 
 
 class _StagedMasks(Job):
-    """Shadow masks in the folder ``out``, all of them or none."""
+    """Write the shadow masks to the folder ``out``, all of them or none."""
 
     def __init__(self, capture: Capture, out: Path) -> None:
         super().__init__()
         self.capture, self.out = capture, out
-        self.result: Written | None = None
+        self.result: WrittenMasks | None = None
 
     def run(self) -> Iterator[Step]:
-        """Those of a MasksJob; then the files move into place."""
+        """Run a MasksJob in a temporary folder, then move the files into place."""
         with staged_folder(self.out) as folder:
-            job = MasksJob(self.capture, Wanted(), folder, self.out)
+            job = MasksJob(self.capture, MasksSettings(), folder, self.out)
             yield from job.run()
         self.result = job.result
 
 
-class PATINA_OT_shadow_masks(_OfCapture, bpy.types.Operator):
-    """Compute where each photo's light is blocked, as images to paint on: white is left out"""
+class PATINA_OT_shadow_masks(_CaptureJob, bpy.types.Operator):
+    """Compute where the light of each photo is blocked, as images to paint on. White areas are \
+excluded from the fit"""
 
     bl_idname = "patina.shadow_masks"
     bl_label = "Shadow Masks"
@@ -117,13 +123,13 @@ class PATINA_OT_shadow_masks(_OfCapture, bpy.types.Operator):
 
     replace: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Replace",
-        description="Compute masks anew that are there already; what was painted on them is lost",
+        description="Recompute existing masks; what was painted on them is lost",
         options={"SKIP_SAVE"},
     )
 
     def _job_of(self, scene: bpy.types.Scene, capture: Capture) -> Job:
         if shadow_images(self._capture) and not self.replace:
-            raise PatinaError("there are shadow masks already: choose Replace to lose them")
+            raise PatinaError("there are shadow masks already; enable Replace to overwrite them")
         self._photos = capture.photos
         return _StagedMasks(capture, check_out(masks_folder(capture.file)))
 
@@ -132,7 +138,7 @@ class PATINA_OT_shadow_masks(_OfCapture, bpy.types.Operator):
         files = [out / name for name in self._job.result.shadows]
         names = [photo.file.name for photo in self._photos]
         show_shadow_masks(scene, self._capture, names, files)
-        self.report({"INFO"}, f"{len(files)} shadow masks in {out}")
+        self.report({"INFO"}, f"Shadow masks written: {len(files)}, in {out}")
 
 
 CLASSES = (PATINA_OT_propose_materials, PATINA_OT_shadow_masks)
@@ -141,5 +147,5 @@ register, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
 
 def unregister() -> None:
     """Remove the classes and the status line."""
-    tell(None)
+    set_running(None)
     _unregister_classes()

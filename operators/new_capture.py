@@ -1,4 +1,4 @@
-"""Scan stage: a capture from cameras, a mesh and lit photos that no capture file names yet."""
+"""Scan stage: write a new capture file from cameras, a mesh and lit photos, and import it."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import bpy
 
 from ..core.capture.new_capture import (
     CAMERAS,
-    LampWords,
+    LampText,
     free_name,
-    mesh_beside,
+    mesh_in_folder,
     model_of,
     sort_files,
     write_new_capture,
@@ -19,13 +19,13 @@ from ..core.errors import InputError, PatinaError
 from ..core.scan.formats import read_reconstruction
 from ..scene.scan.scan_collection import create_reconstruction
 from ..scene.session.folders import rectified_folder
-from .import_capture import bring_in
-from .report_errors import refuse
+from .import_capture import import_into_scene
+from .report_errors import report_and_cancel
 
 
 class PATINA_OT_new_capture(bpy.types.Operator):
-    """Write a capture file beside a scan's cameras and bring it in: choose its lit photos, and \
-its mesh where several lie there. Without photos the cameras and their points alone come in"""
+    """Write a capture file in the folder of the cameras and import it. Select the lit photos, and \
+the mesh if the folder holds several. Without photos, only cameras and sparse points are imported"""
 
     bl_idname = "patina.new_capture"
     bl_label = "New Capture"
@@ -44,47 +44,47 @@ its mesh where several lie there. Without photos the cameras and their points al
     )
     cameras: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Cameras",
-        description="What the reconstruction tool wrote. Empty: the file that is chosen",
+        description="Cameras written by the reconstruction tool. If empty, the selected file",
         subtype="FILE_PATH",
         options={"SKIP_SAVE"},
     )
     mesh: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Mesh",
-        description="The scan's mesh. Empty: the one that is chosen, or the only one beside the "
-        "cameras",
+        description="Mesh of the scan. If empty, the selected one, or the only one in the folder "
+        "of the cameras",
         subtype="FILE_PATH",
         options={"SKIP_SAVE"},
     )
     images: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Scan's Photos",
-        description="Folder of the photos that the scan was made from. Empty: not needed",
+        name="Scan Photos",
+        description="Folder of the photos that the scan was reconstructed from (optional)",
         subtype="DIR_PATH",
         options={"SKIP_SAVE"},
     )
     chunk: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Chunk",
-        description="Label of the chunk, for a Metashape file with several",
+        description="Label of the chunk, for a Metashape file with several chunks",
         options={"SKIP_SAVE"},
     )
     light: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Light",
-        description="What the photos are lit by; its lamp can be dragged into place later",
+        description="Light source of the photos; its lamp can be moved into place later",
         items=[
-            ("FLASH", "Flash", "On the camera, and nothing else"),
-            ("DISTANT", "Distant Lamp", "One that stands still, far away"),
-            ("SUN", "Sun", "Where the photos' own time and place have it"),
+            ("FLASH", "Flash", "A flash on the camera and no other light"),
+            ("DISTANT", "Distant Lamp", "A fixed lamp far away"),
+            ("SUN", "Sun", "The sun, in the direction given by time and place of the photos"),
         ],
     )
     offset: bpy.props.FloatVectorProperty(  # type: ignore[valid-type]
-        name="Flash",
-        description="Place of the flash: right, down and forward of the lens, scan units",
+        name="Flash Offset",
+        description="Position of the flash right, down and forward of the lens, in scan units",
         size=3,
         soft_min=-10.0,
         soft_max=10.0,
     )
     direction: bpy.props.FloatVectorProperty(  # type: ignore[valid-type]
         name="Direction",
-        description="From the surface to the lamp, in the scan's own axes",
+        description="Direction from the surface to the lamp, in the axes of the scan",
         subtype="XYZ",
         size=3,
         default=(0.0, 0.0, 1.0),
@@ -93,7 +93,7 @@ its mesh where several lie there. Without photos the cameras and their points al
     )
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Beside the file browser."""
+        """Draw the options in the side panel of the file browser."""
         layout = self.layout
         layout.use_property_split = True
         for name in ("cameras", "mesh", "images", "chunk", "light"):
@@ -108,7 +108,7 @@ its mesh where several lie there. Without photos the cameras and their points al
         if dropped is not None and dropped.suffix.lower() in CAMERAS:
             self.cameras = str(model_of(dropped))
         if self.cameras and not self.mesh:
-            self.mesh = str(mesh_beside(Path(self.cameras)) or "")
+            self.mesh = str(mesh_in_folder(Path(self.cameras)) or "")
         self.files.clear()
         self.filepath = ""
         context.window_manager.fileselect_add(self)
@@ -121,8 +121,8 @@ its mesh where several lie there. Without photos the cameras and their points al
                 return self._cameras_alone(context, cameras)
             if mesh is None:
                 raise InputError(
-                    "the mesh is missing, or several lie beside the cameras: choose one with the "
-                    "photos",
+                    "found no mesh, or several in the folder of the cameras; select one together "
+                    "with the photos",
                     key="mesh",
                 )
             folder = cameras.parent
@@ -131,28 +131,33 @@ its mesh where several lie there. Without photos the cameras and their points al
                 out, cameras, mesh, photos, self._lamp(), self._images(), self.chunk or None
             )
         except PatinaError as error:
-            return refuse(self, error)
-        done = bring_in(self, context, out)
+            return report_and_cancel(self, error)
+        done = import_into_scene(self, context, out)
         if done == {"CANCELLED"}:
-            out.unlink(missing_ok=True)  # it said why
+            out.unlink(missing_ok=True)  # bring_in has reported the error
             return done
-        self.report({"INFO"}, f"wrote {out}")
+        self.report({"INFO"}, f"Capture file written: {out}")
         return done
 
     def _given(self) -> tuple[Path, Path | None, tuple[Path, ...]]:
-        """(cameras, mesh, photos), of what was chosen, typed and dropped."""
-        chosen = [_path(self.directory) / one.name for one in self.files if one.name]
-        if not chosen and self.filepath and _path(self.filepath).is_file():
-            chosen = [_path(self.filepath)]
-        chosen += [_path(self.photos_directory) / one.name for one in self.photos if one.name]
-        given = sort_files(chosen)
+        """(cameras, mesh, photos) from the selected files, the properties and the dropped files."""
+        paths = [_path(self.directory) / one.name for one in self.files if one.name]
+        if not paths and self.filepath and _path(self.filepath).is_file():
+            paths = [_path(self.filepath)]
+        paths += [_path(self.photos_directory) / one.name for one in self.photos if one.name]
+        given = sort_files(paths)
         cameras = (model_of(_path(self.cameras)),) if self.cameras else given.cameras
         if len(cameras) != 1:
-            raise InputError(f"found {len(cameras)} files of cameras, expected one", key="cameras")
+            raise InputError(
+                f"found {len(cameras)} files of cameras, expected one; select exactly one",
+                key="cameras",
+            )
         if len(given.meshes) > 1:
-            raise InputError(f"found {len(given.meshes)} meshes, expected one", key="mesh")
+            raise InputError(
+                f"found {len(given.meshes)} meshes, expected one; select exactly one", key="mesh"
+            )
         mesh = given.meshes[0] if given.meshes else _path(self.mesh) if self.mesh else None
-        return cameras[0], mesh or mesh_beside(cameras[0]), given.photos
+        return cameras[0], mesh or mesh_in_folder(cameras[0]), given.photos
 
     def _cameras_alone(self, context: bpy.types.Context, cameras: Path) -> set[str]:
         images = self._images()
@@ -163,15 +168,15 @@ its mesh where several lie there. Without photos the cameras and their points al
             self.report({"INFO"}, note)
         self.report(
             {"INFO"},
-            f"{len(found.cameras)} cameras and {len(found.points):,} points; no photos were "
-            "chosen, so nothing can be measured yet",
+            f"Imported: cameras {len(found.cameras)}, points {len(found.points):,}. No photos were "
+            "selected, so materials cannot be measured yet.",
         )
         return {"FINISHED"}
 
-    def _lamp(self) -> LampWords:
+    def _lamp(self) -> LampText:
         if self.light == "FLASH":
-            return LampWords.flash(self.offset)
-        return LampWords.sun() if self.light == "SUN" else LampWords.distant(self.direction)
+            return LampText.flash(self.offset)
+        return LampText.sun() if self.light == "SUN" else LampText.distant(self.direction)
 
     def _images(self) -> Path | None:
         return _path(self.images) if self.images else None

@@ -1,4 +1,4 @@
-"""Materials & Masks by hand: on the mesh, or on a photo, with Blender's own brushes."""
+"""Paint materials and masks on the mesh or on a photo, with Blender's own brushes."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ import bpy
 
 from ..core.errors import PatinaError
 from ..core.output_folder import check_out
-from ..scene.paint.apply_paint import take_all
-from ..scene.paint.brushes import ready_to_paint
+from ..scene.paint.apply_paint import apply_strokes
+from ..scene.paint.brushes import prepare_brush
 from ..scene.paint.canvas import canvas_of, canvases, draw
 from ..scene.paint.mask_files import write_masks
 from ..scene.paint.mesh_paint import show_on_mesh, shown_on_mesh, slots_of_face_sets
-from ..scene.paint.paint_kinds import paints, take_up, wear
+from ..scene.paint.paint_kinds import assign_slots, paints, update_brushes
 from ..scene.photos.photo_list import looked_at
 from ..scene.scan.face_slots import leave_edit_mode, new_slot
 from ..scene.session.image_editor import show_canvas
 from ..scene.session.scene_properties import capture_path
-from .report_errors import refuse
+from .report_errors import report_and_cancel
 
 
-class _OnScan:
-    """Work on the scanned mesh of the capture in the scene."""
+class _ScanOperator:
+    """Mixin for operators on the scanned mesh of the scene's capture."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -39,21 +39,21 @@ class _OnScan:
         try:
             return self._do(context)
         except PatinaError as error:
-            return refuse(self, error)
+            return report_and_cancel(self, error)
 
     def _do(self, context: bpy.types.Context) -> set[str]:
         raise NotImplementedError
 
 
-class PATINA_OT_add_material(_OnScan, bpy.types.Operator):
-    """Add a material to the scanned mesh, with a colour of its own, to paint where it is"""
+class PATINA_OT_add_material(_ScanOperator, bpy.types.Operator):
+    """Add a material slot to the scanned mesh, with its own paint colour"""
 
     bl_idname = "patina.add_material"
     bl_label = "Add Material"
     bl_options = {"REGISTER", "UNDO"}
 
     name: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Name", description="What the measured material will be called", maxlen=60
+        name="Name", description="Name of the measured material", maxlen=60
     )
 
     def _do(self, context: bpy.types.Context) -> set[str]:
@@ -61,12 +61,12 @@ class PATINA_OT_add_material(_OnScan, bpy.types.Operator):
         number = new_slot(scene, capture_path(scene), self.name)
         scene.patina.use_slots = True
         scene.patina_paint.active = number
-        _up_to_date(context)
+        _redraw_paint(context)
         return {"FINISHED"}
 
 
-class PATINA_OT_pick_paint(_OnScan, bpy.types.Operator):
-    """Paint with this: Blender's brushes get its colour"""
+class PATINA_OT_pick_paint(_ScanOperator, bpy.types.Operator):
+    """Set the colour of Blender's brushes to this material or mask"""
 
     bl_idname = "patina.pick_paint"
     bl_label = "Pick Paint"
@@ -76,14 +76,14 @@ class PATINA_OT_pick_paint(_OnScan, bpy.types.Operator):
 
     def _do(self, context: bpy.types.Context) -> set[str]:
         if not 0 <= self.number < len(paints(context.scene)):
-            raise PatinaError(f"there is no paint number {self.number}")
+            raise PatinaError(f"there is no paint with the number {self.number}")
         context.scene.patina_paint.active = self.number
-        take_up(context)
+        update_brushes(context)
         return {"FINISHED"}
 
 
-class PATINA_OT_paint_mesh(_OnScan, bpy.types.Operator):
-    """Paint materials on the mesh: seen in all photos at once. Press again to go on with it"""
+class PATINA_OT_paint_mesh(_ScanOperator, bpy.types.Operator):
+    """Paint materials on the mesh, for all photos at once. Press again to update the colours"""
 
     bl_idname = "patina.paint_mesh"
     bl_label = "Paint on the Mesh"
@@ -92,15 +92,15 @@ class PATINA_OT_paint_mesh(_OnScan, bpy.types.Operator):
     def _do(self, context: bpy.types.Context) -> set[str]:
         scene, mesh = context.scene, context.scene.patina.mesh
         if not scene.patina.use_slots or len(mesh.material_slots) < 2:
-            raise PatinaError("there is one material only: add another one, to paint where it is")
-        take_all(scene)
+            raise PatinaError("there is only one material; add another one, then paint its area")
+        apply_strokes(scene)
         leave_edit_mode(mesh)
         context.view_layer.objects.active = mesh
         if mesh.mode != "VERTEX_PAINT":
             with context.temp_override(active_object=mesh, object=mesh):
                 bpy.ops.object.mode_set(mode="VERTEX_PAINT")
         show_on_mesh(scene, mesh)
-        ready_to_paint(context, "vertex_paint")
+        prepare_brush(context, "vertex_paint")
         for area in context.screen.areas if context.screen else ():
             if area.type == "VIEW_3D":
                 shading = area.spaces.active.shading
@@ -108,8 +108,8 @@ class PATINA_OT_paint_mesh(_OnScan, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class PATINA_OT_paint_photo(_OnScan, bpy.types.Operator):
-    """Paint materials, and what is left out, on the photo that is looked at, in an Image Editor"""
+class PATINA_OT_paint_photo(_ScanOperator, bpy.types.Operator):
+    """Paint materials and excluded areas on the active photo in an Image Editor"""
 
     bl_idname = "patina.paint_photo"
     bl_label = "Paint on This Photo"
@@ -120,36 +120,38 @@ class PATINA_OT_paint_photo(_OnScan, bpy.types.Operator):
         if not super().poll(context):
             return False
         if looked_at(context.scene) is None:
-            cls.poll_message_set("Look through a lit photo first: click it in the list")
+            cls.poll_message_set("Look through a lit photo first; click it in the list")
             return False
         return True
 
     def _do(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        take_all(scene)
+        apply_strokes(scene)
         image = canvas_of(scene, capture_path(scene), looked_at(scene).place)
         show_canvas(context, image)
-        ready_to_paint(context, "image_paint")
+        prepare_brush(context, "image_paint")
         return {"FINISHED"}
 
 
-class PATINA_OT_take_paint(_OnScan, bpy.types.Operator):
-    """Take what was painted: strokes on photos go to the mesh and to masks, those on the mesh to \
-its materials. A fit and saving do so by themselves"""
+class PATINA_OT_take_paint(_ScanOperator, bpy.types.Operator):
+    """Apply painted strokes: strokes on photos to the mesh and the masks, strokes on the mesh to \
+its material slots. Fitting and saving apply them automatically"""
 
     bl_idname = "patina.take_paint"
-    bl_label = "Take Paint"
+    bl_label = "Apply Paint"
     bl_options = {"REGISTER", "UNDO"}
 
     def _do(self, context: bpy.types.Context) -> set[str]:
-        faces, pixels = take_all(context.scene)
-        _up_to_date(context)
-        self.report({"INFO"}, f"{faces:,} faces painted on the mesh, {pixels:,} pixels on photos")
+        faces, pixels = apply_strokes(context.scene)
+        _redraw_paint(context)
+        self.report(
+            {"INFO"}, f"Painted faces on the mesh: {faces:,}; painted pixels on photos: {pixels:,}."
+        )
         return {"FINISHED"}
 
 
-class PATINA_OT_slots_from_face_sets(_OnScan, bpy.types.Operator):
-    """Make a material of each face set of the scanned mesh (Sculpt Mode: lasso, masks, islands)"""
+class PATINA_OT_slots_from_face_sets(_ScanOperator, bpy.types.Operator):
+    """Create a material for each face set of the scanned mesh. Edit face sets in Sculpt Mode"""
 
     bl_idname = "patina.slots_from_face_sets"
     bl_label = "Materials from Face Sets"
@@ -162,20 +164,20 @@ class PATINA_OT_slots_from_face_sets(_OnScan, bpy.types.Operator):
                 bpy.ops.object.mode_set(mode="OBJECT")
         found = slots_of_face_sets(mesh)
         if found is None:
-            raise PatinaError("the mesh has one face set only: make some in Sculpt Mode")
+            raise PatinaError("the mesh has only one face set; create more in Sculpt Mode")
         mesh.data.materials.clear()
         scene.patina.use_slots = True
         for _ in range(int(found.max()) + 1):
             new_slot(scene, capture_path(scene), "")
-        wear(mesh, found)
-        _up_to_date(context)
-        self.report({"INFO"}, f"{int(found.max()) + 1} materials")
+        assign_slots(mesh, found)
+        _redraw_paint(context)
+        self.report({"INFO"}, f"Materials created: {int(found.max()) + 1}.")
         return {"FINISHED"}
 
 
-class PATINA_OT_export_masks(_OnScan, bpy.types.Operator):
-    """Write what is painted as PNG files: a mask for each photo and material, and for what is \
-left out"""
+class PATINA_OT_export_masks(_ScanOperator, bpy.types.Operator):
+    """Write the painted masks as PNG files: one for each photo and material, and one for each \
+photo and kind of excluded area"""
 
     bl_idname = "patina.export_masks"
     bl_label = "Export Masks"
@@ -190,22 +192,22 @@ left out"""
 
     def _do(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        take_all(scene)
+        apply_strokes(scene)
         folder = Path(bpy.path.abspath(self.directory))
         files = write_masks(scene, capture_path(scene), check_out(folder))
-        self.report({"INFO"}, f"{len(files)} masks in {folder}")
+        self.report({"INFO"}, f"Masks written: {len(files)}, in {folder}")
         return {"FINISHED"}
 
 
-def _up_to_date(context: bpy.types.Context) -> None:
-    """Canvases and the painted mesh show what is there now."""
+def _redraw_paint(context: bpy.types.Context) -> None:
+    """Redraw the canvases and the colours of the painted mesh."""
     scene, mesh = context.scene, context.scene.patina.mesh
     capture = capture_path(scene)
     for image in canvases(capture).values():
         draw(scene, capture, image)
     if shown_on_mesh(mesh):
         show_on_mesh(scene, mesh)
-    take_up(context)
+    update_brushes(context)
 
 
 CLASSES = (

@@ -1,4 +1,4 @@
-"""A user's mistake as a message in Blender, never a traceback."""
+"""Report a user's mistake as a message in Blender instead of a traceback."""
 
 from __future__ import annotations
 
@@ -10,19 +10,23 @@ import bpy
 from ..core.errors import PatinaError
 
 
-def refuse(operator: bpy.types.Operator, error: PatinaError) -> set[str]:
-    """Report an error and cancel."""
+def report_and_cancel(operator: bpy.types.Operator, error: PatinaError) -> set[str]:
+    """Report an error; returns {"CANCELLED"} for the operator to return."""
     operator.report({"ERROR"}, str(error))
     return {"CANCELLED"}
 
 
-def hand_on(
-    operator: bpy.types.Operator, following: Callable[..., set[str]], way: str, **told: Any
+def call_operator(
+    operator: bpy.types.Operator, following: Callable[..., set[str]], way: str, **properties: Any
 ) -> set[str]:
-    """Call another operator, as bpy.ops has it; what that one refuses is this one's message."""
+    """Call another operator; its error becomes the error of this one.
+
+    following: the function in bpy.ops; way: the execution context ("EXEC_DEFAULT",
+    "INVOKE_DEFAULT"); the keyword arguments are its properties. Returns the operator's result.
+    """
     try:
-        return following(way, **told)
+        return following(way, **properties)
     except RuntimeError as error:
-        said = str(error).strip().removeprefix("Error: ")
-        operator.report({"ERROR"}, said)
+        message = str(error).strip().removeprefix("Error: ")
+        operator.report({"ERROR"}, message)
         return {"CANCELLED"}

@@ -1,4 +1,4 @@
-"""Material stage: the sliders of a measured material back to 0."""
+"""Material stage: reset the sliders of a measured material."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..scene.material.trait_properties import reset, shown_material
 
 
 class PATINA_OT_reset_traits(bpy.types.Operator):
-    """Put every slider to 0, and the material back to what was measured"""
+    """Set every slider to 0, which restores the material as measured"""
 
     bl_idname = "patina.reset_traits"
     bl_label = "Reset to Measured"
@@ -19,11 +19,11 @@ class PATINA_OT_reset_traits(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         material = shown_material(context)
         if material is None:
-            cls.poll_message_set("Nothing is measured yet: fit the materials first")
+            cls.poll_message_set("No measured materials yet; fit the materials first")
         elif not state(material):
-            cls.poll_message_set(f"{material.name} is as measured")
+            cls.poll_message_set(f"{material.name} is not edited")
         elif measured_brdf(material) is None:
-            cls.poll_message_set("The components it was measured in are not on this computer")
+            cls.poll_message_set("The basis of this material is not on this computer")
         else:
             return True
         return False
@@ -31,7 +31,7 @@ class PATINA_OT_reset_traits(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         material = shown_material(context)
         reset(material)
-        self.report({"INFO"}, f"{material.name} is as measured again")
+        self.report({"INFO"}, f"{material.name} was reset to the measurement.")
         return {"FINISHED"}
 
 

@@ -1,4 +1,4 @@
-"""Photos stage: what was dragged in the scene, into a capture file."""
+"""Photos stage: save the lights as edited in the scene to a capture file."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from ..core.capture.write_lights import write_lights
 from ..core.errors import InputError, PatinaError
 from ..scene.photos.dragged_lamps import accept, with_dragged_lamps
 from ..scene.session.scene_properties import capture_path
-from .report_errors import refuse
+from .report_errors import report_and_cancel
 
 
 class PATINA_OT_save_lights(bpy.types.Operator):
-    """Save the capture file with the lights as their lamps stand now; all else in it is kept"""
+    """Save the capture file with the lights as their lamps are now; the rest of it is kept"""
 
     bl_idname = "patina.save_lights"
     bl_label = "Save Lights"
@@ -29,7 +29,7 @@ class PATINA_OT_save_lights(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if context.scene.patina.capture:
             return True
-        cls.poll_message_set("Import a capture first: it says which lights there are")
+        cls.poll_message_set("Import a capture first; it defines the lights")
         return False
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -37,7 +37,7 @@ class PATINA_OT_save_lights(bpy.types.Operator):
             path = Path(capture_path(context.scene))
             name = path.name.removesuffix(".toml").removesuffix(".capture")
             self.filepath = str(path.with_name(f"{name}_lights.capture.toml"))
-        self._shown = True  # the file browser marks a name that is taken
+        self._shown = True  # the file browser warns before it overwrites a file
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
@@ -45,20 +45,20 @@ class PATINA_OT_save_lights(bpy.types.Operator):
         try:
             names, out = self._save(context)
         except PatinaError as error:
-            return refuse(self, error)
-        said = ", ".join(names) if names else "no lamp was changed: a copy"
-        self.report({"INFO"}, f"{out.name}: {said}")
+            return report_and_cancel(self, error)
+        saved = ", ".join(names) if names else "none (no lamp was changed)"
+        self.report({"INFO"}, f"{out.name} saved. Updated lights: {saved}.")
         return {"FINISHED"}
 
     def _save(self, context: bpy.types.Context) -> tuple[list[str], Path]:
         path = Path(capture_path(context.scene))
-        asked = Path(bpy.path.abspath(self.filepath))
-        if not self.filepath or asked.is_dir():
-            raise InputError("expected the name of a file", key="filepath")
-        out = asked if asked.suffix == ".toml" else asked.with_name(f"{asked.name}.capture.toml")
-        agreed = not self.check_existing or (getattr(self, "_shown", False) and out == asked)
-        if out.exists() and not agreed:
-            raise InputError("is there already; choose another name", file=out)
+        given = Path(bpy.path.abspath(self.filepath))
+        if not self.filepath or given.is_dir():
+            raise InputError("found no file name; choose the file to write", key="filepath")
+        out = given if given.suffix == ".toml" else given.with_name(f"{given.name}.capture.toml")
+        may_overwrite = not self.check_existing or (getattr(self, "_shown", False) and out == given)
+        if out.exists() and not may_overwrite:
+            raise InputError("the file exists already; choose another name", file=out)
         capture = read_capture(path)
         now, names = with_dragged_lamps(capture, context.scene)
         write_lights(capture, now.lights, out)

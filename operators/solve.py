@@ -1,4 +1,4 @@
-"""Solve stage: cameras and sparse points from a folder of photos; a stepped job, ESC cancels."""
+"""Scan stage: find cameras and sparse points from a folder of photos (a stepped job)."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ..core.solve.solution import MODEL
 from ..core.solve.solve import LENSES
 from ..scene.scan.scan_collection import create_reconstruction
 from ..scene.session.folders import rectified_folder
-from .report_errors import hand_on
+from .report_errors import call_operator
 from .stepped import Stepped
 
 
 class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
-    """Find the cameras of a folder of photos, and points of the surface they show"""
+    """Find the cameras of the photos in a folder, and sparse points of the surface"""
 
     bl_idname = "patina.solve_photos"
     bl_label = "Solve Photos"
@@ -27,30 +27,30 @@ class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     TICK = 0.1
-    ALONGSIDE = False
-    CANCELLED = "Solving cancelled; nothing was written"
+    IN_BACKGROUND = False
+    CANCELLED = "Solving cancelled; nothing was written."
 
     directory: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Photos",
-        description="The folder of the photos",
+        description="Folder of the photos",
         subtype="DIR_PATH",
         options={"SKIP_SAVE"},
     )
     out: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Results",
-        description="Folder for the model and a capture file to go on from. "
-        "Empty: one beside the folder of photos, of its name and 'solved'",
+        description="Folder for the camera model and a draft of the capture file. If empty, a "
+        "folder next to that of the photos, with its name followed by 'solved'",
         subtype="DIR_PATH",
         options={"SKIP_SAVE"},
     )
     lens: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Lens",
-        description="Which distortion the lens may have",
+        description="Distortion model of the lens",
         items=[(name, name.replace("_", " ").title(), "") for name in LENSES],
         default=LENSES[0],
     )
     threads: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Threads", description="At most so many. 0: one for each core", min=0, max=1024
+        name="Threads", description="Maximum number of threads; 0 for one per core", min=0, max=1024
     )
 
     @classmethod
@@ -58,9 +58,9 @@ class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
         return cls.idle(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        if getattr(self, "_picked", False):  # in the file browser: go on in steps
-            told = {name: getattr(self, name) for name in ("directory", "out", "lens", "threads")}
-            return hand_on(self, bpy.ops.patina.solve_photos, "INVOKE_DEFAULT", **told)
+        if getattr(self, "_picked", False):  # confirmed in the file browser: continue in steps
+            chosen = {name: getattr(self, name) for name in ("directory", "out", "lens", "threads")}
+            return call_operator(self, bpy.ops.patina.solve_photos, "INVOKE_DEFAULT", **chosen)
         return super().execute(context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -72,10 +72,10 @@ class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
 
     def _start(self, context: bpy.types.Context) -> None:
         if not self.directory:
-            raise InputError("say which folder the photos lie in", key="directory")
+            raise InputError("no folder given; choose the folder of the photos", key="directory")
         self._photos = Path(bpy.path.abspath(self.directory)).resolve()
-        beside = self._photos.with_name(f"{self._photos.name} solved")
-        self._out = check_out(Path(bpy.path.abspath(self.out)) if self.out else beside)
+        default_out = self._photos.with_name(f"{self._photos.name} solved")
+        self._out = check_out(Path(bpy.path.abspath(self.out)) if self.out else default_out)
         self._job = SolveJob(self._photos, self.lens, self.threads or None)
         self._scene = context.scene.name  # by name: a reference does not survive undo
 
@@ -88,15 +88,20 @@ class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
         solution = self._job.solution
         with staged_folder(self._out) as folder:
             capture = solution.write(folder, self._out, self._photos)
-        self.report({"INFO"}, f"{solution.summary()}; wrote {self._out / capture.name}")
+        self.report({"INFO"}, f"{solution.summary()}. Written: {self._out / capture.name}")
         missing = solution.photos - solution.placed
         if missing:
-            self.report({"WARNING"}, f"{missing} photos have no pose; report.txt says why")
+            self.report(
+                {"WARNING"}, f"Photos without a pose: {missing}. See report.txt for the reasons."
+            )
         scene = bpy.data.scenes.get(self._scene)
         if scene is None:
-            self.report({"WARNING"}, "The scene is gone; the cameras lie in the files only")
+            self.report(
+                {"WARNING"},
+                "The scene no longer exists; the cameras are in the written files only.",
+            )
             return
-        # without the photos behind them: straightening each would take seconds in one piece
+        # without photos behind the cameras: undistorting each would block Blender for seconds
         found = read_colmap(self._out / MODEL)
         create_reconstruction(scene, self._photos.name, found, None, rectified_folder(capture))
 

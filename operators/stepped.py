@@ -1,7 +1,8 @@
-"""Long work from the window: scripts drain the job, the window looks at it on a timer, ESC cancels.
+"""Base class of operators with a long job. Scripts run the job to its end; in a window a timer
+follows its progress, and ESC cancels it.
 
-Work that knows nothing of Blender goes on in a thread of its own, so that a tick of the timer never
-waits for a piece of it. What is done to Blender's data is done on the timer, a piece a tick.
+A job that does not use Blender runs in its own thread, so that a timer tick never waits for it.
+Blender's data is changed on the timer only, one piece per tick.
 """
 
 from __future__ import annotations
@@ -15,68 +16,71 @@ import bpy
 from ..core.concurrency.background import BackgroundJob
 from ..core.errors import PatinaError
 from ..core.jobs import Job
-from ..scene.session.running_job import Running, running, tell
-from .report_errors import refuse
+from ..scene.session.running_job import Running, running, set_running
+from .report_errors import report_and_cancel
 
-TAKING = "putting it into the file"
-TELL = 0.25  # seconds from one drawing of the progress to the next
-TOLD, SOON = 0.05, 2.0  # done, and seconds taken, before time left is told
+APPLYING = "Applying the result"  # progress text
+REDRAW_INTERVAL = 0.25  # seconds between two updates of the progress bar
+MIN_FRACTION, MIN_SECONDS = 0.05, 2.0  # done and elapsed before the remaining time is estimated
 
 
 class Stepped:
-    """Subclasses set self._job and self._scene in _start, and take the result in _finish. A _finish
-    that yields is gone on with a tick later; no event is passed on meanwhile."""
+    """Mixin for operators. Subclasses set self._job and self._scene in _start, and apply the result
+    in _finish. A _finish that yields continues at the next tick; until it ends, no event is passed
+    on."""
 
     TICK = 0.05
-    ALONGSIDE = True  # False: the job touches Blender
-    PANEL = ""  # the stage that shows how far it is
-    CANCELLED = "Cancelled; nothing was changed"
+    IN_BACKGROUND = True  # run the job in a background thread; False: the job uses Blender
+    PANEL = ""  # the stage that shows the progress
+    CANCELLED = "Cancelled; nothing was changed."
 
     _timer: Any = None
-    _since = _told = 0.0
+    _started_at = _drawn_at = 0.0
     _job: Job | None = None
-    _alongside: BackgroundJob | None = None
-    _taking: Iterator[None] | None = None
+    _background: BackgroundJob | None = None
+    _applying: Iterator[None] | None = None
     _scene: str = ""  # by name: a reference does not survive undo
 
     @classmethod
     def idle(cls, context: bpy.types.Context) -> bool:
-        """False, with a reason, while something else runs."""
+        """Whether no other job runs. Sets the poll message if one does."""
         if running(context.scene) is not None:
-            cls.poll_message_set("Something is running; ESC stops it")
+            cls.poll_message_set("Another job is running; press ESC to stop it")
             return False
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """All of it at once."""
+        """Run the job and apply its result in one call."""
         try:
             self._start(context)
             self._job.drain()
             for _ in self._finish(context) or ():
                 pass
         except PatinaError as error:
-            return refuse(self, error)
+            return report_and_cancel(self, error)
         finally:
             self._stop(context)
         return {"FINISHED"}
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Begin, and go on by modal()."""
+        """Start the job; modal() continues it."""
         try:
             self._start(context)
         except PatinaError as error:
             self._stop(context)
-            return refuse(self, error)
-        self._since = time.perf_counter()
+            return report_and_cancel(self, error)
+        self._started_at = time.perf_counter()
         self._timer = context.window_manager.event_timer_add(self.TICK, window=context.window)
         context.window_manager.modal_handler_add(self)
-        tell(Running(self._scene, self.PANEL, "beginning", 0.0))  # the first step may be a long one
+        set_running(
+            Running(self._scene, self.PANEL, "Starting", 0.0)
+        )  # the first step may take long
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Look how far it is, or take over a piece of the result, once a tick."""
-        if self._taking is not None and event.type != "TIMER":
-            return {"RUNNING_MODAL"}  # too late to leave the file as it was
+        """Once per tick, check the job's progress or apply a piece of its result."""
+        if self._applying is not None and event.type != "TIMER":
+            return {"RUNNING_MODAL"}  # too late to cancel: the file has been changed
         if event.type == "ESC":
             self._stop(context)
             self.report({"WARNING"}, self.CANCELLED)
@@ -84,41 +88,45 @@ class Stepped:
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         try:
-            going = self._goes_on(context)
+            unfinished = self._advance(context)
         except PatinaError as error:
             self._stop(context)
-            return refuse(self, error)
+            return report_and_cancel(self, error)
         except BaseException:
             self._stop(context)
             raise
-        if going:
+        if unfinished:
             return {"RUNNING_MODAL"}
         self._stop(context)
         return {"FINISHED"}
 
-    def _goes_on(self, context: bpy.types.Context) -> bool:
-        """A tick's worth of work; False when all is done."""
-        if self._taking is None:
+    def _advance(self, context: bpy.types.Context) -> bool:
+        """Do the work of one tick; False when everything is done."""
+        if self._applying is None:
             if self._step():
-                if time.perf_counter() - self._told > TELL:  # drawing takes from the job's time
+                if (
+                    time.perf_counter() - self._drawn_at > REDRAW_INTERVAL
+                ):  # redrawing slows the job down
                     now = self._job.now
-                    tell(Running(self._scene, self.PANEL, now.stage, now.fraction, self._left()))
-                    self._told = time.perf_counter()
+                    set_running(
+                        Running(self._scene, self.PANEL, now.stage, now.fraction, self._remaining())
+                    )
+                    self._drawn_at = time.perf_counter()
                 return True
-            tell(Running(self._scene, self.PANEL, TAKING, 1.0))
-            self._taking = iter(self._finish(context) or ())
+            set_running(Running(self._scene, self.PANEL, APPLYING, 1.0))
+            self._applying = iter(self._finish(context) or ())
             return True
-        return next(self._taking, self) is not self
+        return next(self._applying, self) is not self
 
     def _step(self) -> bool:
         """False when the job is done."""
-        if not self.ALONGSIDE:
+        if not self.IN_BACKGROUND:
             return self._job.step()
-        self._alongside = self._alongside or BackgroundJob(self._job)
-        return self._alongside.step()
+        self._background = self._background or BackgroundJob(self._job)
+        return self._background.step()
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Blender ends the operator (the window closes)."""
+        """Called by Blender when it ends the operator (the window closes)."""
         self._stop(context)
 
     def _start(self, context: bpy.types.Context) -> None:
@@ -127,17 +135,19 @@ class Stepped:
     def _finish(self, context: bpy.types.Context) -> Iterator[None] | None:
         raise NotImplementedError
 
-    def _left(self) -> float | None:
-        """Seconds, as what is done took; None where too little is."""
-        done, took = self._job.now.fraction, time.perf_counter() - self._since
-        return took * (1 - done) / done if done > TOLD and took > SOON else None
+    def _remaining(self) -> float | None:
+        """Remaining seconds, extrapolated from the elapsed time; None if it is too early."""
+        done, elapsed = self._job.now.fraction, time.perf_counter() - self._started_at
+        return (
+            elapsed * (1 - done) / done if done > MIN_FRACTION and elapsed > MIN_SECONDS else None
+        )
 
     def _stop(self, context: bpy.types.Context) -> None:
-        if self._alongside is not None:
-            self._alongside.close()
+        if self._background is not None:
+            self._background.close()
         elif self._job is not None:
             self._job.close()
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
             self._timer = None
-        tell(None)
+        set_running(None)

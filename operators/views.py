@@ -1,4 +1,4 @@
-"""Charts of a measured material and looks at a photo, shown in an Image Editor."""
+"""Charts of a measured material and comparisons with a photo, shown in an Image Editor."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from ..scene.session.scene_properties import capture_path
 from ..scene.views.photo_comparison import look_job, show_photo_view
 from ..scene.views.view_properties import looked_at, show_chart
 from .fit import fit_job
-from .report_errors import refuse
+from .report_errors import report_and_cancel
 from .stepped import Stepped
 
 ITEMS = (
-    ("sphere", "Lit Sphere", "Under a key light and a rim light"),
-    ("polar", "Polar Slice", "Reflectance in the plane of incidence, with what was measured there"),
-    ("highlight", "Highlight", "Reflectance against the half vector's angle, with what was "
-     "measured there"),
-    ("slice", "Image Slice", "The BRDF over half and difference angle, and the samples"),
-    ("interval", "Certainty", "How far off the BRDF may be, over half and difference angle"),
-    ("ratio", "Ratio", "The BRDF that it is compared with, divided by this one"),
+    ("sphere", "Lit Sphere", "A sphere of the material under a key light and a rim light"),
+    ("polar", "Polar Slice", "Reflectance in the plane of incidence, with the samples near it"),
+    ("highlight", "Highlight", "Reflectance over the angle between half vector and normal, with "
+     "the samples near it"),
+    ("slice", "Image Slice", "The BRDF over half and difference angle, with the samples"),
+    ("interval", "Uncertainty", "Uncertainty of the BRDF over half and difference angle"),
+    ("ratio", "Ratio", "The BRDF to compare with, divided by that of the material"),
 )  # fmt: skip
 
 PHOTO_ITEMS = (
-    ("comparison", "Photo and Prediction", "The photo, what the materials predict for it, and the "
-     "signed difference"),
-    ("samples", "Where Samples Came From", "Which pixels were measured, and by which criterion the "
-     "others were left out"),
+    ("comparison", "Photo and Prediction", "The photo, the prediction of the fitted materials, and "
+     "the signed difference"),
+    ("samples", "Sampled Pixels", "The pixels that were measured, and the criteria that excluded "
+     "the others"),
 )  # fmt: skip
 
 
 class PATINA_OT_show_chart(bpy.types.Operator):
-    """Draw this of the measured material, with its samples and its 90 % interval, and show it in \
-an Image Editor"""
+    """Draw a chart of the measured material, with its samples and its 90 % interval, and show it \
+in an Image Editor"""
 
     bl_idname = "patina.show_chart"
     bl_label = "Show Chart"
@@ -45,12 +45,12 @@ an Image Editor"""
 
     @classmethod
     def description(cls, context: bpy.types.Context, properties: object) -> str:
-        return next(said for key, _, said in ITEMS if key == properties.kind)
+        return next(tooltip for key, _, tooltip in ITEMS if key == properties.kind)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if looked_at(context) is None:
-            cls.poll_message_set("Fit first: there is no measured material in this file")
+            cls.poll_message_set("Fit first; there is no measured material in this file")
             return False
         return True
 
@@ -58,17 +58,16 @@ an Image Editor"""
         try:
             image = show_chart(context, self.kind)
         except PatinaError as error:
-            return refuse(self, error)
+            return report_and_cancel(self, error)
         show_image(context, image)
         return {"FINISHED"}
 
 
 class PATINA_OT_look_at_photo(Stepped, bpy.types.Operator):
-    """Look at the photo whose camera is looked through: beside its prediction, or where samples \
-came from"""
+    """Show the active photo with its prediction, or the pixels that were sampled in it"""
 
     bl_idname = "patina.look_at_photo"
-    bl_label = "Look at Photo"
+    bl_label = "Show Photo"
     PANEL = "check"
     bl_options = {"REGISTER", "UNDO"}
 
@@ -76,15 +75,15 @@ came from"""
 
     @classmethod
     def description(cls, context: bpy.types.Context, properties: object) -> str:
-        return next(said for key, _, said in PHOTO_ITEMS if key == properties.kind)
+        return next(tooltip for key, _, tooltip in PHOTO_ITEMS if key == properties.kind)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if photo_of(context.scene) is None:
-            cls.poll_message_set("Look through a lit photo's camera first: Photos & Light")
+            cls.poll_message_set("Look through the camera of a lit photo first (Photos & Light)")
             return False
         if not measured_of(capture_path(context.scene)):
-            cls.poll_message_set("Fit first: this capture has no measured material in this file")
+            cls.poll_message_set("Fit first; this capture has no measured material in this file")
             return False
         return cls.idle(context)
 
@@ -96,7 +95,7 @@ came from"""
     def _finish(self, context: bpy.types.Context) -> None:
         scene = bpy.data.scenes.get(self._scene)
         if scene is None or self._job.view is None:
-            self.report({"WARNING"}, "The scene is gone; the photo was not looked at")
+            self.report({"WARNING"}, "The scene no longer exists; the view was not drawn.")
             return
         exposure = scene.patina_views.exposure
         image = show_photo_view(context, self._job.view, self.kind, exposure)

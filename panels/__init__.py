@@ -1,1 +1,1 @@
-"""The stages of the workflow, as the artist sees them."""
+"""Panels: one for each stage of the workflow, and the preferences page."""

@@ -1,4 +1,4 @@
-"""What a check found, best first."""
+"""Draw the results of a check: errors before and after, and the causes by significance."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any
 import bpy
 
 from ..scene.session.lengths import with_lengths
-from ..scene.views.evidence import MISSED
+from ..scene.views.evidence import RESIDUAL
 from .wrapped import IN_BOX, wrapped
 
-MOST = 6
+MAX_CAUSES = 6  # causes that the panel lists
 
 
 def draw_check(
@@ -18,32 +18,42 @@ def draw_check(
     diagnosis: dict[str, Any],
     causes: bpy.types.bpy_prop_collection,
 ) -> None:
-    """diagnosis: the content of diagnosis.json; causes: PatinaCause, what can be switched off."""
+    """Draw a diagnosis.
+
+    diagnosis: the content of diagnosis.json; causes: the PatinaCause items that the user can
+    switch off.
+    """
     base, extended = diagnosis["baseline"], diagnosis["extended"]
-    told = [("Left-out parts, RMS", base["held_out"], extended["held_out"])]
-    for one in diagnosis["materials"]:  # of a file that an earlier version checked: no typical ones
-        told.append((one["name"], one.get("typical_before"), one.get("typical_after")))
-    for place, (label, before, after) in enumerate(told):
+    errors = [("Held-out regions, RMS", base["held_out"], extended["held_out"])]
+    for material in diagnosis["materials"]:  # diagnoses by earlier versions have no typical errors
+        errors.append(
+            (material["name"], material.get("typical_before"), material.get("typical_after"))
+        )
+    for index, (label, before, after) in enumerate(errors):
         if before is not None and after is not None:
-            if place == 1:
-                layout.label(text="Unseen photos, typical pixel:")
+            if index == 1:
+                layout.label(text="Held-out photos, median error:")
             row = layout.row()
-            row.label(text=label, icon="MATERIAL" if place else "NONE")
+            row.label(text=label, icon="MATERIAL" if index else "NONE")
             row.label(text=f"{100 * before:.1f} → {100 * after:.1f} %")
-    show = layout.operator("patina.show_evidence", text="What is Missed", icon="OVERLAY")
-    show.cause = MISSED
+    show = layout.operator("patina.show_evidence", text="Show Residual", icon="OVERLAY")
+    show.cause = RESIDUAL
     ranked = diagnosis["causes"]
-    most = max((_sure(c) for c in ranked), default=1.0)
-    for cause in ranked[:MOST]:
+    largest = max((_significance(c) for c in ranked), default=1.0)
+    for cause in ranked[:MAX_CAUSES]:
         box = layout.box()
         row = box.row()
-        name = cause["cause"].replace("_", " ")
+        label = cause["cause"].replace("_", " ")
         switch = causes.get(cause["cause"])
         if switch is not None and cause["accepted"]:
             row.prop(switch, "use", text="")
         bar = row.row()
-        bar.active = cause["accepted"] and not cause.get("doubted")  # else grey, as in the report
-        bar.progress(text=name, factor=min(max(_sure(cause) / max(most, 1e-9), 0), 1), type="BAR")
+        bar.active = cause["accepted"] and not cause.get(
+            "doubted"
+        )  # greyed out otherwise, as in the report
+        bar.progress(
+            text=label, factor=min(max(_significance(cause) / max(largest, 1e-9), 0), 1), type="BAR"
+        )
         if cause["accepted"]:
             row.operator("patina.show_evidence", text="", icon="HIDE_OFF").cause = cause["cause"]
         if cause["accepted"] or cause.get("doubted"):
@@ -58,6 +68,6 @@ def draw_check(
         wrapped(layout, with_lengths(diagnosis["left"]["sentence"]), "QUESTION")
 
 
-def _sure(cause: dict[str, Any]) -> float:
-    """The gain in standard errors."""
+def _significance(cause: dict[str, Any]) -> float:
+    """The reduction of the held-out error, in standard errors of that reduction."""
     return float(cause["held_out_gain"] / max(cause["standard_error"], 1e-9))

@@ -1,5 +1,5 @@
-"""Material & Export: the formats to choose from, below the measured materials; choices that were
-named are found again in the header's menu of presets."""
+"""Export panel, below Material & Export: the formats to write. The header's menu holds presets of
+formats."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PRESETS = "patina/export"  # below the user's presets
 
 
 class PATINA_OT_add_export_preset(AddPresetBase, bpy.types.Operator):
-    """Keep this choice of formats under a name, or take one away"""
+    """Add or remove a preset of export formats"""
 
     bl_idname = "patina.add_export_preset"
     bl_label = "Add Export Preset"
@@ -35,7 +35,7 @@ class PATINA_PT_export_presets(PresetPanel, bpy.types.Panel):
 
 
 class PATINA_PT_export(bpy.types.Panel):
-    """Formats and the one button."""
+    """The formats and the Export button."""
 
     bl_idname = "PATINA_PT_export"
     bl_label = "Export"

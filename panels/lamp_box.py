@@ -1,4 +1,4 @@
-"""The lamp of the photo that is looked through: its kind, and where its numbers come from."""
+"""The lamp of the active lit photo: its kind, and whether it was edited or refined by a fit."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from ..scene.photos.dragged_lamps import by_hand, lamp_of
+from ..scene.photos.dragged_lamps import lamp_edits, lamp_of
 from ..scene.photos.lamp_placement import DISTANT, MOUNTED, NEAR
 from ..scene.property_keys import CAPTURE, LAMP_KIND, LIGHT_NAME
 from ..scene.session.lengths import length
@@ -18,20 +18,21 @@ KINDS = {DISTANT: "Distant", NEAR: "Lamp", MOUNTED: "Flash"}
 
 
 def draw_lamp(layout: bpy.types.UILayout, scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
-    """A line for the lamp, and more where it was changed by hand or refined by the last fit."""
+    """Draw a line for the lamp, and further lines if the user edited it or the last fit refined
+    it."""
     capture, name = camera.get(CAPTURE, ""), camera.get(LIGHT_NAME, "")
     lamp = lamp_of(scene, capture, name)
     column = layout.column(align=True)
     if lamp is None:
-        column.label(text=f"{name}: its lamp is gone", icon="LIGHT")
+        column.label(text=f"{name}: lamp not in scene", icon="LIGHT")
         return
     kind = lamp.get(LAMP_KIND)
     column.label(text=f"{KINDS.get(kind, 'Light')}: {name}", icon=ICONS.get(kind, "LIGHT"))
-    hand = by_hand(scene, lamp)
+    hand = lamp_edits(scene, lamp)
     if hand:
-        words = {"Moved": hand.moved, "strength": hand.strength, "size": hand.softness}
-        said = ", ".join(word for word, changed in words.items() if changed)
-        column.label(text=f"{said[0].upper()}{said[1:]} by hand", icon="VIEW_PAN")
+        edits = {"position": hand.moved, "strength": hand.strength, "size": hand.softness}
+        edited = ", ".join(word for word, changed in edits.items() if changed)
+        column.label(text=f"{edited[0].upper()}{edited[1:]} edited", icon="VIEW_PAN")
         column.operator("patina.save_lights", icon="FILE_TICK")
     refined = _refined(stored_result(capture) or {}, name)
     if refined:
@@ -39,9 +40,9 @@ def draw_lamp(layout: bpy.types.UILayout, scene: bpy.types.Scene, camera: bpy.ty
 
 
 def _refined(result: dict[str, Any], name: str) -> str | None:
-    """What the last fit has made of a light marked ``refine``."""
-    light = next((one for one in result.get("lights", []) if one.get("name") == name), {})
-    moved = {key: one["value"] for key, one in light.get("refined", {}).items()}
+    """How the last fit changed a light that is marked ``refine``; None if it did not."""
+    light = next((entry for entry in result.get("lights", []) if entry.get("name") == name), {})
+    moved = {key: entry["value"] for key, entry in light.get("refined", {}).items()}
     if not moved:
         return None
     if "angle 1" in moved:

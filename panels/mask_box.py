@@ -1,4 +1,4 @@
-"""Materials and masks in the sidebar: proposed, painted, exported."""
+"""Materials and masks in the sidebar: propose, paint and export them."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from ..scene.paint.swatches import swatch
 from ..scene.photos.photo_list import looked_at
 from ..scene.session.scene_properties import capture_path
 
-OUT_SAID = {
+MASK_LABELS = {
     "shadow": "Shadow",
-    "highlight": "Highlight to leave out",
+    "highlight": "Excluded Highlight",
     "ignore": "Ignore",
-    "erase": "Erase shadow, highlight, ignore",
+    "erase": "Erase Masks",
 }
 
 
 def draw_masks(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
-    """What can be painted, and where."""
-    there, state = paints(scene), scene.patina_paint
-    materials = [p for p in there if p.kind == "material"] if scene.patina.use_slots else []
+    """Draw the materials and masks that can be painted, and the buttons to paint them."""
+    kinds, state = paints(scene), scene.patina_paint
+    materials = [p for p in kinds if p.kind == "material"] if scene.patina.use_slots else []
     box = layout.box()
     head = box.row()
     head.label(text="Materials")
@@ -29,14 +29,14 @@ def draw_masks(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     for number, paint in enumerate(materials):
         _row(box, scene, paint, number, number == state.active)
     if not materials:
-        box.label(text="One: all of the object", icon="BLANK1")
+        box.label(text="One material for the whole object", icon="BLANK1")
     row = box.row(align=True)
     row.operator("patina.propose_materials", text="Propose", icon="SHADERFX")
     row.operator("patina.slots_from_face_sets", text="Face Sets", icon="FACE_MAPS")
     box = layout.box()
-    box.label(text="Left Out of a Photo")
-    first = sum(paint.kind == "material" for paint in there)
-    for number, paint in enumerate(there[first:], start=first):
+    box.label(text="Excluded from a Photo")
+    first = sum(paint.kind == "material" for paint in kinds)
+    for number, paint in enumerate(kinds[first:], start=first):
         _row(box, scene, paint, number, number == state.active)
     layout.separator()
     column = layout.column(align=True)
@@ -45,7 +45,7 @@ def draw_masks(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     column.operator("patina.take_paint", icon="CHECKMARK")
     layout.prop(state, "opacity", slider=True)
     if shadow_images(capture_path(scene)):
-        layout.operator("patina.shadow_masks", text="Shadow Masks Anew").replace = True
+        layout.operator("patina.shadow_masks", text="Recompute Shadow Masks").replace = True
     layout.operator("patina.export_masks", icon="EXPORT")
     mesh = scene.patina.mesh
     if mesh is not None and mesh.type == "MESH" and any(mesh.data.materials):
@@ -57,12 +57,12 @@ def _row(
 ) -> None:
     row = layout.row(align=True)
     slot = scene.patina.mesh.material_slots[paint.slot] if paint.slot >= 0 else None
-    said = OUT_SAID.get(paint.kind, paint.name)
+    label = MASK_LABELS.get(paint.kind, paint.name)
     icon = "RADIOBUT_ON" if active else "RADIOBUT_OFF"
     row.operator("patina.pick_paint", text="", icon=icon, depress=active).number = number
     row.label(text="", icon_value=swatch(paint.colour))
     if slot is None:
-        row.operator("patina.pick_paint", text=said, depress=active).number = number
+        row.operator("patina.pick_paint", text=label, depress=active).number = number
     elif slot.material is not None and slot.material.name == paint.name:
         row.prop(slot.material, "name", text="")
     else:

@@ -17,7 +17,7 @@ ROWS = 5
 
 
 class PATINA_UL_photos(bpy.types.UIList):
-    """A line a photo: how it looks, its file, its light, whether a shadow mask is there."""
+    """One row per photo: thumbnail, file name, light, and whether a shadow mask exists."""
 
     bl_idname = "PATINA_UL_photos"
 
@@ -31,9 +31,9 @@ class PATINA_UL_photos(bpy.types.UIList):
         active: PatinaPhotos,
         property_name: str,
     ) -> None:
-        there = has_camera(context.scene, item)
+        available = has_camera(context.scene, item)
         row = layout.row(align=True)
-        row.active = there
+        row.active = available
         preview = item.image.preview if item.image is not None else None
         if preview is not None and preview.icon_id:
             row.label(text=item.name, icon_value=preview.icon_id)
@@ -44,11 +44,11 @@ class PATINA_UL_photos(bpy.types.UIList):
         right.label(text=item.light)
         masked = item.place in shadow_images(capture_path(context.scene))
         state = "IMAGE_ALPHA" if masked else "BLANK1"
-        right.label(text="", icon=state if there else "ERROR")
+        right.label(text="", icon=state if available else "ERROR")
 
 
 def draw_photos(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
-    """The list, the photo that is looked at, and how it is shown."""
+    """Draw the list of photos, and the display settings of the active one."""
     state = scene.patina_photos
     if not len(state.photos):
         return

@@ -1,5 +1,5 @@
-"""The sidebar tab: Scan, Photos & Light, Materials & Masks, Fit, Check, Material & Export, in the
-order of the work."""
+"""The sidebar tab: Scan, Photos & Light, Materials & Masks, Fit, Check, Material & Export, in
+workflow order."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .mask_box import draw_masks
 from .measured_box import draw_measured, icon_of
 from .photo_rows import PATINA_UL_photos, draw_photos
 from .stage import StagePanel
-from .traits_box import standing_word
+from .traits_box import status_label
 from .wrapped import wrapped
 
 
@@ -91,9 +91,9 @@ class PATINA_PT_material(StagePanel, bpy.types.Panel):
             row = layout.row()
             row.label(text=material.name, icon_value=icon_of(material))
             portable = NO_OSL_REASON in material or hindrance is not None
-            row.label(text=standing_word(material, portable))
+            row.label(text=status_label(material, portable))
         for reason in sorted({*reasons} if reasons else {hindrance} - {None}):
-            wrapped(layout, f"Not the measurement itself: {reason}", "INFO")
+            wrapped(layout, f"Renders do not show the measured BRDF: {reason}", "INFO")
         if found:
             layout.operator("patina.mark_assets", icon="ASSET_MANAGER")
 

@@ -1,4 +1,4 @@
-"""What the panels of all stages have in common: what is there, what is missing, what to press."""
+"""Base class of the stage panels: what is present, what is missing, and the next button."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from ..scene.views.workflow_stages import next_stage, stages
 from .wrapped import wrapped
 
 DONE, NOW, LATER = "CHECKMARK", "PLAY", "RADIOBUT_OFF"
-LARGE = 1.4  # of the one button to press next
+NEXT_BUTTON_SCALE = 1.4  # height of the button to press next, in button heights
 
 
 class StagePanel:
-    """Subclasses are panels with a ``stage``, and say more in draw_more."""
+    """Mixin for panels. Subclasses set ``stage`` and may add content in draw_more."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
@@ -29,23 +29,23 @@ class StagePanel:
         layout, scene = self.layout, context.scene
         job = running(scene)
         if job is not None and job.panel == self.stage:
-            layout.progress(text=job.said, factor=job.fraction, type="BAR")
-            layout.label(text="ESC cancels", icon="CANCEL")
+            layout.progress(text=job.text, factor=job.fraction, type="BAR")
+            layout.label(text="Press ESC to cancel", icon="CANCEL")
             return
         found = stages(scene)
-        mine = found[self.stage]
-        for line in mine.has:
+        own = found[self.stage]
+        for line in own.has:
             wrapped(layout, line, "BLANK1")
-        if mine.missing is not None:
-            wrapped(layout, mine.missing, "INFO")
-        if mine.press and not mine.done:
+        if own.missing is not None:
+            wrapped(layout, own.missing, "INFO")
+        if own.press and not own.done:
             row = layout.row()
             if next_stage(found) == self.stage:
-                row.scale_y = LARGE
-            row.operator(mine.press)
-        elif mine.again:
-            layout.operator(mine.press, text=mine.again, icon="FILE_REFRESH")
+                row.scale_y = NEXT_BUTTON_SCALE
+            row.operator(own.press)
+        elif own.again:
+            layout.operator(own.press, text=own.again, icon="FILE_REFRESH")
         self.draw_more(layout, context)
 
     def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-        """Below the button that is to be pressed."""
+        """Draw further content below the stage's button."""

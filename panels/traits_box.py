@@ -1,4 +1,4 @@
-"""Below the material stage: sliders that change a measured material, and the way back."""
+"""Change Traits panel, below Material & Export: sliders that edit a measured material."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import bpy
 from ..scene.material.trait_offsets import (
     measured_brdf,
     movable,
+    plausibility,
+    slider_labels,
     sliders,
-    standing,
     state,
-    words_of,
 )
 from ..scene.material.trait_properties import shown_material
-from ..scene.material.trait_update import behind
+from ..scene.material.trait_update import outdated_pieces
 from ..scene.property_keys import BASIS_VERSION
 from .measured_box import SPHERE, icon_of
 from .wrapped import wrapped
@@ -39,16 +39,16 @@ class PATINA_PT_traits(bpy.types.Panel):
         _choice(layout, context, material)
         layout.template_icon(icon_value=icon_of(material), scale=SPHERE)
         if measured_brdf(material) is None:
-            said = (
-                "The components it was measured in are not on this computer: fit again to change it"
+            message = (
+                "The basis of this material is not on this computer. Fit again to edit the material"
             )
-            wrapped(layout, said, "ERROR")
+            wrapped(layout, message, "ERROR")
             return
         traits = material.patina_traits
         layout.row().prop(traits, "channels", expand=True)
         column, shifts = layout.column(align=True), getattr(traits, traits.channels)
         for number, (name, word) in enumerate(
-            zip(sliders(material), words_of(material[BASIS_VERSION]), strict=False), 1
+            zip(sliders(material), slider_labels(material[BASIS_VERSION]), strict=False), 1
         ):
             column.prop(shifts, name, text=f"{number} {word.capitalize()}", slider=True)
         for line, icon in notes(material):
@@ -59,7 +59,7 @@ class PATINA_PT_traits(bpy.types.Panel):
 def _choice(
     layout: bpy.types.UILayout, context: bpy.types.Context, material: bpy.types.Material
 ) -> None:
-    """Which material, and the list to choose another from where the mesh has several."""
+    """Draw the material's name, and a list of the mesh's materials if it has several."""
     mesh = context.scene.patina.mesh
     if mesh is not None and len(mesh.material_slots) > 1 and context.object in (None, mesh):
         layout.template_list(
@@ -74,35 +74,35 @@ def _choice(
     layout.label(text=material.name, icon="MATERIAL")
 
 
-def standing_word(material: bpy.types.Material, portable: bool) -> str:
-    """What a material in the list is; portable: where the measured shader cannot run."""
+def status_label(material: bpy.types.Material, portable: bool) -> str:
+    """The status of a material in the list. portable: whether the measured shader cannot run."""
     if movable(material) and state(material):
         return "Changed"
     return "Portable" if portable else "Measured"
 
 
 def notes(material: bpy.types.Material) -> list[tuple[str, str]]:
-    """(sentence, icon) on what the sliders have made of the material."""
-    said = []
-    found = standing(material)
+    """(sentence, icon) pairs: warnings and notes about the edited material."""
+    lines = []
+    found = plausibility(material)
     if found.excess is not None:
         albedo, view = found.excess
-        where = "from the front" if view < 0.1 else f"{math.degrees(view):.0f}° from the normal"
-        said.append(
-            (f"Seen {where} it gives back {albedo:.2g} times the light that falls on it: renders "
-             "hold it to 1", "ERROR")
+        where = "along the normal" if view < 0.1 else f"{math.degrees(view):.0f}° from the normal"
+        lines.append(
+            (f"Viewed {where}, the albedo is {albedo:.2g}, which is not physical. Renders limit "
+             "it to 1", "ERROR")
         )  # fmt: skip
     if not state(material):
-        return said
+        return lines
     if found.beyond:
         listed = ", ".join(str(i + 1) for i in found.beyond)
-        said.append(
-            (f"Component {listed}: farther out than any material the components were made from",
+        lines.append(
+            (f"Outside the range of the measured materials: component {listed}",
              "INFO")
         )  # fmt: skip
-    if behind(material):
-        said.append(("EEVEE and exports follow in a moment", "SORTTIME"))
-    return said
+    if outdated_pieces(material):
+        lines.append(("Updating EEVEE and exports…", "SORTTIME"))
+    return lines
 
 
 register, unregister = bpy.utils.register_classes_factory((PATINA_PT_traits,))

@@ -1,4 +1,4 @@
-"""Below the check: views of a measured material, and how to look at them."""
+"""Views panel, below Check: charts of a measured material and their display settings."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ICONS = {
 }  # fmt: skip
 ANGLES = {"polar": "incidence", "highlight": "theta_d", "slice": "phi_d", "interval": "phi_d",
           "ratio": "phi_d"}  # fmt: skip
-EXPOSED = ("sphere", "comparison")
+WITH_EXPOSURE = ("sphere", "comparison")
 
 
 class PATINA_PT_views(bpy.types.Panel):
@@ -54,7 +54,7 @@ class PATINA_PT_views(bpy.types.Panel):
             column.operator(
                 "patina.look_at_photo", text=name, icon=ICONS[kind], depress=depressed
             ).kind = kind
-        if views.shown in EXPOSED:
+        if views.shown in WITH_EXPOSURE:
             layout.prop(views, "exposure", slider=True)
         if views.shown not in ANGLES:
             return

@@ -1,1 +1,2 @@
-"""The only code that turns Blender data into core types and back."""
+"""Conversion between Blender data and the types of core. Only this package and its users import
+bpy."""

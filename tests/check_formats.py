@@ -1,4 +1,4 @@
-"""What tests of the formats ask: are the points where the writer put them?"""
+"""Check for tests of the formats: do the points project to the pixels that the writer used?"""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def seen(
 
 
 def check(found: Reconstruction, expected: Pixels, scene: Scene, close: float = CLOSE) -> None:
-    """All cameras, and each camera's pixels of all points, there and back."""
+    """Check the projections of all points in all cameras, and their inverse."""
     by_stem = {name.removesuffix(".png"): rows for name, rows in expected.items()}
     assert len(found.cameras) == len(expected) == 8
     points = np.array(scene.points)

@@ -1,4 +1,4 @@
-"""The checkout as package `patina`, and the data beside it where there is any."""
+"""Import the checkout as package `patina`; fixtures for the checkout and the reference data."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ ROOT = Path(__file__).resolve().parent.parent
 
 @pytest.fixture(scope="session")
 def root() -> Path:
-    """The checkout."""
+    """The folder of the checkout."""
     return ROOT
 
 
 @pytest.fixture(scope="session")
 def shared() -> Path:
-    """The folder of reference data beside the checkout; tests that want it skip without it."""
+    """The folder of reference data (../shared); tests that need it are skipped without it."""
     folder = Path(os.environ.get("PATINA_SHARED", ROOT.parent / "shared"))
     if not (folder / "data").is_dir():
-        pytest.skip("the reference data is not here (../shared, or PATINA_SHARED)")
+        pytest.skip("no reference data (../shared, or PATINA_SHARED)")
     return folder

@@ -1,4 +1,4 @@
-"""Good files of every format to damage, and what must hold of whatever is read from them then."""
+"""Valid files of every format to damage, and checks of what is read from damaged files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from patina.core.scan.reconstruction import Reconstruction
 from tests import make_reconstructions as made
 from tests.make_points_scene import FOCAL, HEIGHT, WIDTH, Scene, make_scene
 
-LONGEST = 5.0  # seconds
+MAX_SECONDS = 5.0  # of reading a file
 MILLIMETRES = {
     "type": "brown", "sensorWidth": 36.0, "focalLength": 39.4, "pixelRatio": 1.0,
     "principalPoint": [3.0, 4.0], "distortionParams": [0.1, 0.01, 0.0, 0.001, 0.002],
@@ -49,7 +49,7 @@ JSONS = ("cameras.sfm", "transforms.json", "sfm_data.json", "reconstruction.json
 
 
 def write_all(folder: Path) -> Path:
-    """A good file of each format, with photos."""
+    """Write a valid file of each format, with photos."""
     scene = make_scene(12)
     made.write_photos(folder / "photos", scene)
     for name, write in WRITERS.items():
@@ -58,7 +58,7 @@ def write_all(folder: Path) -> Path:
 
 
 def read(path: Path, images: Path | None = None) -> Reconstruction | InputError:
-    """What is in the file, or why it is refused; neither a warning nor another exception."""
+    """Return the content or the InputError; fails for warnings and other exceptions."""
     began = time.perf_counter()
     try:
         with warnings.catch_warnings():
@@ -67,12 +67,12 @@ def read(path: Path, images: Path | None = None) -> Reconstruction | InputError:
     except InputError as error:
         assert "\n" not in str(error) and len(str(error)) < 600
         found = error
-    assert time.perf_counter() - began < LONGEST
+    assert time.perf_counter() - began < MAX_SECONDS
     return found
 
 
 def check_sound(found: Reconstruction | InputError) -> None:
-    """Cameras that are cameras, whatever was read."""
+    """Check that the cameras are valid, if the file was read."""
     if isinstance(found, InputError):
         return
     assert found.cameras

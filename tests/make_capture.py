@@ -1,5 +1,5 @@
-"""A small capture with an exact answer, made without Patina: a glossy sphere, ray traced by the
-quadratic formula, with cameras written by pycolmap and photos by OpenImageIO."""
+"""A small capture with known truth, independent of Patina: a ray-traced glossy sphere, with cameras
+written by pycolmap and photos by OpenImageIO."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ IRRADIANCE = 3.0
 
 
 def blinn(normal, light, view):
-    """A reflectance of our own (n, 3), 1/sr: matte body and a Blinn lobe, reciprocal."""
+    """Return a reciprocal reflectance (n, 3) in 1/sr: matte body and Blinn lobe."""
     half = light + view
     half = half / np.linalg.norm(half, axis=-1, keepdims=True)
     lobe = np.maximum(np.sum(normal * half, axis=-1), 0.0) ** 60
@@ -25,7 +25,7 @@ def blinn(normal, light, view):
 
 
 def look_at(eye, target):
-    """(rotation world → camera, translation): x right, y down, z forward."""
+    """Return (rotation world → camera, translation): x right, y down, z forward."""
     forward = (target - eye) / np.linalg.norm(target - eye)
     right = np.cross(forward, np.array([0.1, 0.2, 1.0]))
     right /= np.linalg.norm(right)
@@ -42,7 +42,7 @@ def poses(count=6):
 
 
 def light_directions(count=6):
-    """A light at 25°, 60° … from each view, turned about it."""
+    """Return lights at 25°, 60° … from each view, at different azimuths."""
     for i, (rotation, _) in enumerate(poses(count)):
         away = np.radians((25, 60, 95)[i % 3])
         turn = 2.4 * i
@@ -53,8 +53,8 @@ def light_directions(count=6):
 
 
 def photo(rotation, translation, light, radius=1.0, brdf=blinn, lamp=None):
-    """(h, w, 3) radiance of the sphere; 0 elsewhere. lamp: (position, intensity) of a near lamp,
-    instead of the distant ``light``."""
+    """Render (h, w, 3) radiance of the sphere; 0 elsewhere. lamp: (position, intensity) of a near
+    lamp that replaces the distant ``light``."""
     rows, columns = np.indices((HEIGHT, WIDTH)) + 0.5
     rays = np.stack(
         [(columns - PRINCIPAL[0]) / FOCAL, (rows - PRINCIPAL[1]) / FOCAL, np.ones((HEIGHT, WIDTH))],
@@ -81,7 +81,7 @@ def photo(rotation, translation, light, radius=1.0, brdf=blinn, lamp=None):
 
 
 def sphere_mesh(subdivisions=5):
-    """(vertices, faces) of a subdivided icosahedron around CENTRE, radius 1."""
+    """Return (vertices, faces) of a subdivided icosahedron around CENTRE, radius 1."""
     g = (1 + 5**0.5) / 2
     v = [(-1, g, 0), (1, g, 0), (-1, -g, 0), (1, -g, 0), (0, -1, g), (0, 1, g), (0, -1, -g),
          (0, 1, -g), (g, 0, -1), (g, 0, 1), (-g, 0, -1), (-g, 0, 1)]  # fmt: skip
@@ -103,7 +103,7 @@ def sphere_mesh(subdivisions=5):
 
 
 def write_ply(path: Path, vertices, faces, face_attribute=None) -> None:
-    """ASCII PLY, written by hand."""
+    """Write an ASCII PLY."""
     lines = ["ply", "format ascii 1.0", f"element vertex {len(vertices)}"]
     lines += [f"property double {axis}" for axis in "xyz"]
     lines += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
@@ -118,7 +118,7 @@ def write_ply(path: Path, vertices, faces, face_attribute=None) -> None:
 
 
 def write_exr(path: Path, pixels) -> None:
-    """Float EXR."""
+    """Write a float EXR."""
     data = np.ascontiguousarray(pixels, np.float32)
     spec = oiio.ImageSpec(data.shape[1], data.shape[0], data.shape[2], "float")
     out = oiio.ImageOutput.create(str(path))
@@ -128,7 +128,7 @@ def write_exr(path: Path, pixels) -> None:
 
 
 def write_png(path: Path, mask) -> None:
-    """8-bit grey."""
+    """Write an 8-bit grey image."""
     data = np.ascontiguousarray(mask, np.uint8)[..., None]
     out = oiio.ImageOutput.create(str(path))
     out.open(str(path), oiio.ImageSpec(data.shape[1], data.shape[0], 1, "uint8"))
@@ -137,7 +137,7 @@ def write_png(path: Path, mask) -> None:
 
 
 def write_colmap(folder: Path, count=6, text=False, model="PINHOLE", params=None) -> None:
-    """A COLMAP model with one lens and the poses."""
+    """Write a COLMAP model with one lens and the poses."""
     params = params or [FOCAL, FOCAL, *PRINCIPAL]
     made = pycolmap.Reconstruction()
     lens = pycolmap.Camera(model=model, width=WIDTH, height=HEIGHT, params=params, camera_id=1)
@@ -154,7 +154,7 @@ def write_colmap(folder: Path, count=6, text=False, model="PINHOLE", params=None
 
 
 def make_capture(folder: Path, photos=6, extra="", brdf=blinn) -> Path:
-    """Write everything; returns the capture file."""
+    """Write all files; return the capture file."""
     folder.mkdir(parents=True, exist_ok=True)
     write_colmap(folder / "sparse", photos)
     write_ply(folder / "mesh.ply", *sphere_mesh())

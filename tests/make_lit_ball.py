@@ -1,4 +1,4 @@
-"""Pixels of a ball in six photos, as a diagnosis wants them, whose truth is written down here."""
+"""Pixels of a ball in six photos, as input of a diagnosis, with known truth."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ PHOTOS, EACH, SIZE = 6, 900, 0.8
 NOISE = 0.01
 
 
-SHARP, GLOSSY = 10, 21  # training materials: half as bright at well under 1°, and at 2.2°
+SHARP, GLOSSY = 10, 21  # training materials: half-width of the highlight below 1°, and 2.2°
 
 
 def lit_ball(seed: int = 0, material: int = SHARP) -> DiagnosisContext:
     """Pixels of a ball in six photos under three lights, of a material of the basis, with noise;
-    radiance is summed by hand here: ρ E cos θi."""
+    the radiance is computed here as ρ E cos θi."""
     rng = np.random.default_rng(seed)
     basis = default_basis()
     brdf = PrincipalBRDF(basis, basis.training[3 * material : 3 * material + 3])
@@ -74,7 +74,7 @@ def lit_ball(seed: int = 0, material: int = SHARP) -> DiagnosisContext:
 
 
 def shadowed(context: DiagnosisContext, photo: int, reach: float, lost: float) -> DiagnosisContext:
-    """A part of the light is lost in a round spot of one photo."""
+    """Return the ball with a darker round spot in one photo."""
     pixels = context.pixels
     spot = (pixels.photo == photo) & (np.hypot(pixels.x - 0.1, pixels.y) < reach)
     return changed(context, np.where(spot[:, None], 1 - lost, 1) * pixels.observed)

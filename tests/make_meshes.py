@@ -1,4 +1,4 @@
-"""Meshes written by hand, byte by byte, in the formats Patina reads; nothing of Patina is used."""
+"""Write meshes byte by byte in the formats that Patina reads, independent of Patina."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ PLY_LETTERS = {"uchar": "B", "ushort": "H", "int": "i", "uint": "I", "float": "f
 
 
 def two_triangles():
-    """(vertices, faces) of a square of side 1."""
+    """Return (vertices, faces) of a square of side 1."""
     return np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float), np.array(
         [[0, 1, 2], [0, 2, 3]]
     )
 
 
 def obj_text(vertices, faces, *, uv=None, normals=False, colours=None, materials=None, lib=None):
-    """An OBJ. uv: (f, 3, 2), written for every corner; materials: a name a face."""
+    """Return an OBJ. uv: (f, 3, 2), one per corner; materials: one name per face."""
     lines = ["# by hand", *([f"mtllib {lib}"] if lib else []), "o part"]
     for i, row in enumerate(vertices):
         extra = "" if colours is None else " " + " ".join(f"{c / 255:.6f}" for c in colours[i])
@@ -65,8 +65,8 @@ def ply_bytes(
     line_break="\n",
     before=(),
 ):
-    """A PLY. faces: rows of any length; attributes: name → (type, values); before: an element with
-    rows of floats that stands ahead of the vertices."""
+    """Return a PLY. faces: rows of any length; attributes: name → (type, values); before: an
+    element with rows of floats before the vertices."""
     attributes = attributes or {}
     head = ["ply", f"format {form} 1.0", "comment by hand"]
     if texture:
@@ -119,13 +119,13 @@ def ply_bytes(
 
 
 def stl_bytes(vertices, faces, title=b"by hand"):
-    """Binary STL; a title may begin with "solid", as CAD programs have it."""
+    """Return a binary STL; the title may begin with "solid", as in files of CAD programs."""
     body = [struct.pack("<12fH", 0, 0, 0, *np.ravel(vertices[list(face)]), 0) for face in faces]
     return title.ljust(80, b" ") + struct.pack("<I", len(faces)) + b"".join(body)
 
 
 def stl_text(vertices, faces):
-    """Ascii STL."""
+    """Return an ASCII STL."""
     lines = ["solid by hand"]
     for face in faces:
         lines += ["  facet normal 0 0 0", "    outer loop"]
@@ -135,7 +135,7 @@ def stl_text(vertices, faces):
 
 
 class GltfWriter:
-    """Collects arrays; ``document`` is the JSON to be."""
+    """Collects arrays for a glTF; ``document`` becomes the JSON."""
 
     def __init__(self) -> None:
         self.binary = b""
@@ -145,7 +145,7 @@ class GltfWriter:
         }  # fmt: skip
 
     def array(self, values, code, width, **more):
-        """Add an accessor; returns its number. code: glTF's component type."""
+        """Add an accessor; return its index. code: glTF's component type."""
         kind = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}[code]
         data = np.ascontiguousarray(values, kind)
         self.document["bufferViews"].append(
@@ -160,7 +160,7 @@ class GltfWriter:
         return len(self.document["accessors"]) - 1
 
     def primitive(self, vertices, faces, uv=None, colours=None, **more):
-        """A primitive of triangles; colours are linear floats."""
+        """Add a primitive of triangles; colours are linear floats."""
         attributes = {"POSITION": self.array(vertices, 5126, 3)}
         if uv is not None:
             attributes["TEXCOORD_0"] = self.array(uv, 5126, 2)
@@ -169,7 +169,7 @@ class GltfWriter:
         return {"attributes": attributes, "indices": self.array(np.ravel(faces), 5125, 1), **more}
 
     def glb(self) -> bytes:
-        """The document with its binary chunk."""
+        """Return a GLB: the document with its binary chunk."""
         self.document["buffers"] = [{"byteLength": len(self.binary)}]
         text = json.dumps(self.document).encode()
         text += b" " * (-len(text) % 4)
@@ -183,7 +183,7 @@ class GltfWriter:
         )
 
     def gltf(self, uri: str | None = None) -> bytes:
-        """The document with its buffer in a file ``uri``, else in a data URI."""
+        """Return the document, with its buffer in a file ``uri``, or else in a data URI."""
         if uri is None:
             uri = "data:application/octet-stream;base64," + base64.b64encode(self.binary).decode()
         self.document["buffers"] = [{"byteLength": len(self.binary), "uri": uri}]
@@ -191,7 +191,7 @@ class GltfWriter:
 
 
 def simple_gltf(vertices, faces, **more) -> GltfWriter:
-    """One node, one mesh, one primitive."""
+    """Return a glTF with one node, one mesh and one primitive."""
     writer = GltfWriter()
     writer.document["nodes"] = [{"mesh": 0}]
     writer.document["meshes"] = [{"primitives": [writer.primitive(vertices, faces, **more)]}]
@@ -199,7 +199,7 @@ def simple_gltf(vertices, faces, **more) -> GltfWriter:
 
 
 def samples() -> dict[str, bytes]:
-    """A small ball in every format: file name → content."""
+    """Return file name → content of a small ball, in every format."""
     vertices, faces = sphere_mesh(1)
     uv = np.tile(np.array([[0.1, 0.2], [0.3, 0.2], [0.2, 0.6]]), (len(faces), 1, 1))
     part = {"part": ("int", [i % 3 for i in range(len(faces))])}
@@ -222,7 +222,7 @@ def samples() -> dict[str, bytes]:
 
 
 def write_samples(folder: Path) -> dict[str, Path]:
-    """``samples`` as files."""
+    """Write ``samples`` to files."""
     paths = {}
     for name, content in samples().items():
         paths[name] = folder / name

@@ -1,7 +1,7 @@
-"""Writes Metashape's and PhotoScan's files from a scene that projects itself.
+"""Write files of Metashape and PhotoScan from an artificial scene with known projections.
 
-Nothing here uses the code under test: lenses are the formulas of Metashape's manual, one point at a
-time, and files are put together as text, in the flavours of document 1.2, 1.5 and 2.0.
+Independent of the code under test: lenses follow the formulas of Metashape's manual, evaluated for
+one point at a time, and files are assembled as text, for document versions 1.2, 1.5 and 2.0.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ CLOSE = 0.01  # pixels
 
 @dataclass
 class Sensor:
-    """values: f, k1 … b2, and cx, cy as offsets from the centre. offset: (R, t), to the master."""
+    """One sensor. values: f, k1 … b2, and cx, cy as offsets from the centre. offset: (R, t) to the
+    master sensor of a rig."""
 
     kind: str = "frame"
     width: int = 4000
@@ -37,7 +38,7 @@ class Sensor:
     adjusted: bool = True
 
     def project(self, X, Y, Z):
-        """(u, v) of a point in the camera's frame."""
+        """Project a point in the camera frame to (u, v)."""
         if self.kind == "spherical":
             across = self.width / (2 * math.pi)
             return (
@@ -65,7 +66,7 @@ class Sensor:
 
 @dataclass
 class Camera:
-    """matrix: (4, 4) camera → chunk (or component)."""
+    """One camera. matrix: (4, 4) camera → chunk (or component)."""
 
     label: str
     matrix: np.ndarray
@@ -80,7 +81,7 @@ class Camera:
 
 @dataclass
 class Scene:
-    """What a chunk holds. transform, components: (rotation, translation, scale) to the world."""
+    """Content of a chunk. transform, components: (rotation, translation, scale) to the world."""
 
     sensors: list
     cameras: list
@@ -92,7 +93,7 @@ class Scene:
 
 
 def rotation(rng) -> np.ndarray:
-    """A random one (Shoemake's quaternion)."""
+    """Return a random rotation (Shoemake's method)."""
     q = rng.normal(size=4)
     w, x, y, z = q / np.linalg.norm(q)
     return np.array(
@@ -105,7 +106,7 @@ def rotation(rng) -> np.ndarray:
 
 
 def toe_in(rng) -> np.ndarray:
-    """A rotation by a few degrees, as between the cameras of a rig."""
+    """Return a rotation by a few degrees, as between the cameras of a rig."""
     a, b = rng.uniform(-0.1, 0.1, 2)
     about_y = np.array([[math.cos(a), 0, math.sin(a)], [0, 1, 0], [-math.sin(a), 0, math.cos(a)]])
     about_z = np.array([[math.cos(b), -math.sin(b), 0], [math.sin(b), math.cos(b), 0], [0, 0, 1]])
@@ -113,7 +114,7 @@ def toe_in(rng) -> np.ndarray:
 
 
 def looking_at_origin(place, rng) -> np.ndarray:
-    """(4, 4) camera → chunk of a camera at ``place``, z towards the origin, rolled at random."""
+    """Return (4, 4) camera → chunk of a camera at ``place``, z to the origin, with random roll."""
     place = np.asarray(place, float)
     z = -place / np.linalg.norm(place)
     x = np.cross(rng.normal(size=3), z)
@@ -125,14 +126,14 @@ def looking_at_origin(place, rng) -> np.ndarray:
 
 
 def motion(R, t) -> np.ndarray:
-    """(4, 4)."""
+    """Return the (4, 4) matrix of a motion."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = R, t
     return matrix
 
 
 def truth(scene: Scene, camera: Camera, points) -> np.ndarray:
-    """(n, 2) pixels of points (n, 3) in the frame the camera's matrix is in."""
+    """Return pixels (n, 2) of points (n, 3) in the frame of the camera's matrix."""
     inverse = np.linalg.inv(camera.matrix)
     lens = scene.sensors[camera.sensor]
     return np.array([lens.project(*(inverse[:3, :3] @ p + inverse[:3, 3])) for p in points])
@@ -202,7 +203,7 @@ def _camera(number: int, camera: Camera) -> str:
 
 
 def chunk_xml(scene: Scene, version="2.0.0", extra="", attributes="") -> str:
-    """The <chunk> element."""
+    """Return the <chunk> element."""
     old = version.startswith("1.2")
     sensors = "".join(_sensor(i, s, old) for i, s in enumerate(scene.sensors))
     groups: dict = {}
@@ -241,7 +242,7 @@ HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
 
 
 def document(*chunks: str, version="2.0.0", active=None) -> str:
-    """cameras.xml: one <chunk>, or several in <chunks>."""
+    """Return cameras.xml, with one <chunk>, or several in <chunks>."""
     inside = "\n".join(chunks)
     if len(chunks) > 1:
         which = "" if active is None else f' active_id="{active}"'
@@ -259,7 +260,7 @@ FULL_FISH = {**FISH, "k3": 1e-3, "k4": -1e-4, "p3": 0.1, "b1": 3.0, "b2": 1.5}
 
 
 def ring(rng, count, sensor=0, **more):
-    """Cameras around the origin, 4 away."""
+    """Return cameras around the origin, at a distance of 4."""
     places = rng.normal(size=(count, 3))
     places *= 4 / np.linalg.norm(places, axis=1, keepdims=True)
     return [
@@ -269,7 +270,7 @@ def ring(rng, count, sensor=0, **more):
 
 
 def scene(version: str, seed: int = 0) -> Scene:
-    """A scene with all that a version can say."""
+    """Return a scene with all features of a document version."""
     rng = np.random.default_rng(seed)
     if version.startswith("1.2"):
         values = {k: v for k, v in FULL.items() if k not in ("p3", "p4")}
@@ -309,17 +310,17 @@ def scene(version: str, seed: int = 0) -> Scene:
 
 
 def read_from(made: Scene) -> dict:
-    """label → camera of those that a reader should return."""
+    """Return label → camera, for the cameras that a reader should return."""
     return {c.label: c for c in made.cameras if c.enabled and c.aligned}
 
 
 def simple(count=3, **more) -> Scene:
-    """A scene of one ordinary lens."""
+    """Return a scene with one frame lens."""
     return Scene([Sensor(values=BROWN)], ring(np.random.default_rng(0), count, **more))
 
 
 def agree(reconstruction, scene: Scene) -> None:
-    """Every camera that was read projects 1,000 points as its maker does."""
+    """Check that every camera that was read projects 1,000 points to the expected pixels."""
     points = np.random.default_rng(5).uniform(-1.0, 1.0, (1000, 3))
     expected = read_from(scene)
     assert {c.label for c in reconstruction.cameras} == set(expected)
@@ -329,7 +330,7 @@ def agree(reconstruction, scene: Scene) -> None:
 
 
 def write_psx(folder: Path, name: str, chunks: list[str], photos=None, active=0) -> Path:
-    """NAME.psx and NAME.files. photos: camera id → path, of every chunk's only frame."""
+    """Write NAME.psx and NAME.files. photos: camera id → path, for the frame of each chunk."""
     path = folder / f"{name}.psx"
     path.write_text(f'{HEAD}<document version="1.2.0" path="{{projectname}}.files/project.zip"/>\n')
     files = folder / f"{name}.files"
@@ -348,7 +349,7 @@ def write_psx(folder: Path, name: str, chunks: list[str], photos=None, active=0)
 
 
 def frame_xml(photos: dict) -> str:
-    """A frame's document."""
+    """Return the document of a frame."""
     cameras = "".join(
         f'<camera camera_id="{i}"><photo path={quoteattr(path)}><meta/></photo></camera>'
         for i, path in photos.items()
@@ -360,7 +361,7 @@ def frame_xml(photos: dict) -> str:
 
 
 def write_psz(path: Path, chunks: list[str], photos=None, active=0) -> Path:
-    """All in one document."""
+    """Write everything in one document, NAME.psz."""
     frames = f"<frames>{frame_xml(photos or {}).removeprefix(HEAD)}</frames></chunk>"
     inside = "".join(c.replace("</chunk>", frames) for c in chunks)
     text = (
@@ -370,7 +371,7 @@ def write_psz(path: Path, chunks: list[str], photos=None, active=0) -> Path:
 
 
 def write_zip(path: Path, members: dict) -> Path:
-    """A packed zip."""
+    """Write a zip archive."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in members.items():

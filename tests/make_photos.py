@@ -1,4 +1,4 @@
-"""Photo files written by hand, byte by byte: what the readers are told and what they must find."""
+"""Write photo files byte by byte, with known content and metadata, for tests of the readers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def rationals(*pairs: tuple[int, int], signed: bool = False) -> tuple[int, list]
 
 
 def tiff_bytes(main: dict, exif=None, gps=None, pixels: bytes = b"", order: str = "<") -> bytes:
-    """A TIFF structure of one directory and its Exif and GPS directories; tag → (type, values).
+    """Return a TIFF of one directory and its Exif and GPS directories; tag → (type, values).
 
     ``pixels`` are one strip; StripOffsets (or what the caller gives as None) points to it.
     """
@@ -77,7 +77,7 @@ def tiff_bytes(main: dict, exif=None, gps=None, pixels: bytes = b"", order: str 
 
 
 def write_tiff(path: Path, pixels: np.ndarray, tags=None, order: str = "<", **more) -> None:
-    """Uncompressed; (h, w) grey or (h, w, c); 8 or 16 bits or float32."""
+    """Write an uncompressed TIFF of (h, w) grey or (h, w, c); 8 or 16 bits or float32."""
     data = np.atleast_3d(pixels)
     height, width, channels = data.shape
     bits = data.dtype.itemsize * 8
@@ -98,7 +98,7 @@ def chunk(kind: bytes, data: bytes) -> bytes:
 
 
 def write_png(path: Path, pixels: np.ndarray, chunks=(), bits=None, palette=None) -> None:
-    """(h, w) grey or (h, w, 2..4), 8 or 16 bits; or (h, w) codes of ``bits`` 1, 2 or 4."""
+    """Write a PNG: (h, w) or (h, w, 2..4), 8 or 16 bits; or (h, w) codes of ``bits`` 1, 2, 4."""
     data = np.atleast_3d(pixels)
     height, width, channels = data.shape
     kind = 3 if palette is not None else {1: 0, 2: 4, 3: 2, 4: 6}[channels]
@@ -118,7 +118,7 @@ def write_png(path: Path, pixels: np.ndarray, chunks=(), bits=None, palette=None
 
 
 def write_jpeg(path: Path, pixels: np.ndarray, app: tuple[bytes, ...] = (), quality=100) -> None:
-    """(h, w, 3) 8 bits, no chroma subsampling; ``app``: whole marker segments put after SOI."""
+    """Write a JPEG of (h, w, 3), without chroma subsampling; ``app``: marker segments after SOI."""
     data = np.ascontiguousarray(np.atleast_3d(pixels), np.uint8)
     spec = oiio.ImageSpec(data.shape[1], data.shape[0], data.shape[2], "uint8")
     spec.attribute("CompressionQuality", quality)
@@ -141,7 +141,7 @@ def app2_icc(profile: bytes) -> bytes:
 
 
 def write_hdr(path: Path, rgbe: np.ndarray, lines=(), resolution: str | None = None) -> None:
-    """Flat (not run-length encoded) Radiance picture of (h, w, 4) bytes."""
+    """Write an uncompressed Radiance picture of (h, w, 4) bytes."""
     height, width = rgbe.shape[:2]
     text = "#?RADIANCE\n" + "".join(line + "\n" for line in lines) + "FORMAT=32-bit_rle_rgbe\n\n"
     text += (resolution or f"-Y {height} +X {width}") + "\n"
@@ -152,13 +152,13 @@ def curv(*values: int) -> bytes:
     return b"curv\0\0\0\0" + struct.pack(f">I{len(values)}H", len(values), *values)
 
 
-def para(function: int, *numbers: float) -> bytes:
-    fixed = [round(number * 65536) for number in numbers]
+def para(function: int, *parameters: float) -> bytes:
+    fixed = [round(number * 65536) for number in parameters]
     return b"para\0\0\0\0" + struct.pack(f">HH{len(fixed)}i", function, 0, *fixed)
 
 
 def icc_profile(curve: bytes, columns=None, space: bytes = b"RGB ", name: str = "made") -> bytes:
-    """A display profile of one curve; ``columns`` (3, 3): XYZ (D50) of R, G, B, each a column."""
+    """Return a display profile with one curve; ``columns`` (3, 3): XYZ (D50) of R, G, B."""
     desc = b"desc\0\0\0\0" + struct.pack(">I", len(name) + 1) + name.encode() + b"\0"
     tags = {b"desc": desc}
     if space == b"GRAY":
@@ -192,9 +192,10 @@ ADOBE_D50 = np.array(
 def write_dng(
     path: Path, mosaic: np.ndarray, black=64, white=4095, neutral=(0.5, 1.0, 0.625), **tags
 ) -> None:
-    """Uncompressed 16-bit RGGB mosaic; ``neutral``: what the camera records of white (D65).
+    """Write a DNG with an uncompressed 16-bit RGGB mosaic.
 
-    ``camera`` (3, 3): what it records, after white balance, of linear Rec.709; default the same.
+    ``neutral``: camera values of white (D65). ``camera`` (3, 3): linear Rec.709 → camera values
+    after white balance; default: identity.
     """
     height, width = mosaic.shape
     xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])

@@ -1,5 +1,5 @@
-"""Photographs with an exact answer, made without Patina: a block and two balls of a veined stone,
-ray traced by their equations; pictures under even light for a scan, and photos under one lamp."""
+"""Ray-traced photos with known truth, independent of Patina: a block and two balls of veined stone.
+Pictures under uniform light for a scan, and photos under one lamp."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ BALLS = ((np.array([0.25, 0.1, 0.62]), 0.36), (np.array([-0.3, -0.2, 0.5]), 0.3)
 
 @dataclass(frozen=True)
 class View:
-    """World → camera, x right, y down, z forward."""
+    """One view: world → camera, x right, y down, z forward."""
 
     rotation: np.ndarray
     translation: np.ndarray
@@ -30,7 +30,7 @@ class View:
 
 
 def look_from(direction, distance=DISTANCE, roll=0.0) -> View:
-    """A view from that direction (3,) at the object, turned by roll about its axis."""
+    """Return a view of the object from a direction (3,), with a roll angle."""
     eye = distance * np.asarray(direction, float) / np.linalg.norm(direction)
     forward = -eye / distance
     right = np.cross(forward, (0.0, 0.0, 1.0))
@@ -42,17 +42,17 @@ def look_from(direction, distance=DISTANCE, roll=0.0) -> View:
 
 
 def ring(count, heights=(0.35, 0.8), start=0.0):
-    """Views all around, at alternating heights."""
+    """Return views around the object, at alternating heights."""
     for i in range(count):
         a = start + 2 * np.pi * i / count
         yield look_from((np.cos(a), np.sin(a), heights[i % len(heights)]), roll=0.05 * (i % 3 - 1))
 
 
 def photo(view: View, light=None, seed=0) -> np.ndarray:
-    """(h, w, 3) linear radiance, 2 × 2 rays a pixel, with a camera's noise.
+    """Render (h, w, 3) linear radiance, 2 × 2 rays per pixel, with camera noise.
 
-    light None: even light from everywhere, on a grey ground without marks; else one distant lamp
-    in that direction (3,), with a sheen, cast shadows and darkness all around.
+    light None: uniform light, on a uniform grey ground; else one distant lamp in this direction
+    (3,), with a highlight, cast shadows and a black background.
     """
     total = np.zeros((HEIGHT, WIDTH, 3))
     for dx in (0.25, 0.75):
@@ -92,7 +92,7 @@ def _shaded(start, rays, light):
 
 
 def first_hit(start, rays):
-    """(distance (n,), inf where nothing is met; unit normal (n, 3)) of rays (n, 3)."""
+    """Return (distance (n,), inf without a hit; unit normal (n, 3)) of rays (n, 3)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         low, high = (-BOX - start) / rays, (BOX - start) / rays
     near, far = np.minimum(low, high), np.maximum(low, high)
@@ -114,7 +114,7 @@ def first_hit(start, rays):
 
 
 def stone(points) -> np.ndarray:
-    """(n, 3) albedo: noise of five octaves in space, each a smooth mix of random lattice values."""
+    """Return albedo (n, 3): value noise of five octaves, from random values on a lattice."""
     value = sum(_noise(points * 6.0 * 2**k, k) / 1.5**k for k in range(5))
     grey = np.clip(0.5 + 0.45 * value, 0.03, 1.0)[:, None]
     return grey * np.array([0.9, 0.75, 0.6])
@@ -135,7 +135,7 @@ def _noise(p, octave):
 
 
 def write_picture(path: Path, radiance, exposure=0.9, **exif) -> None:
-    """An 8-bit sRGB picture, as a camera would leave it."""
+    """Write an 8-bit sRGB picture, like a camera."""
     linear = np.clip(radiance * exposure, 0.0, 1.0)
     encoded = np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     write_pixels(path, np.round(255 * encoded).astype(np.uint8), "uint8", **exif)
@@ -155,7 +155,7 @@ def write_pixels(path: Path, pixels, kind: str, **attributes) -> None:
 
 
 def write_mesh(path: Path) -> None:
-    """The object's surface: the balls fine enough to lie within 0.0003 of theirs."""
+    """Write the surface of the object; the balls are accurate to 0.0003."""
     parts = [trimesh.creation.box(2 * BOX)]
     for centre, radius in BALLS:
         ball = trimesh.creation.icosphere(5, radius)

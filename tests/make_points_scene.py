@@ -1,6 +1,6 @@
-"""A made-up scene of points and cameras, and the pixels its points must have.
+"""An artificial scene of points and cameras, and the exact pixels of its points.
 
-Camera frame: x right, y down, z forward. Nothing here is numpy's or the package's: plain scalars.
+Camera frame: x right, y down, z forward. Computed with Python floats, without numpy or Patina.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ FOCAL = 700.0
 
 @dataclass(frozen=True)
 class View:
-    """rotation: world → camera; centre: where it stands."""
+    """One camera. rotation: world → camera; centre: its position."""
 
     name: str
     rotation: Matrix
@@ -37,7 +37,7 @@ class Scene:
 
 
 def make_scene(count: int = 1000, seed: int = 7) -> Scene:
-    """The scene: points in a ball of radius 1.2, cameras 4 away that look at its middle."""
+    """Return points in a ball of radius 1.2, and cameras at a distance of 4 that face it."""
     dice = random.Random(seed)
     points = []
     while len(points) < count:
@@ -57,7 +57,7 @@ def make_scene(count: int = 1000, seed: int = 7) -> Scene:
 
 
 def looking(centre: Vector, at: Vector, roll: float) -> Matrix:
-    """Rows: the camera's right, down and forward in the world."""
+    """Return the rotation; rows: the camera's right, down and forward in the world."""
     forward = unit(tuple(a - c for a, c in zip(at, centre, strict=True)))
     right = unit(cross(forward, (0.0, 0.0, 1.0)))
     down = cross(forward, right)
@@ -83,20 +83,20 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 def in_camera(view: View, point: Vector) -> Vector:
-    """A point in the camera's frame."""
+    """Return a point in the camera frame."""
     offset = tuple(p - c for p, c in zip(point, view.centre, strict=True))
     return tuple(dot(row, offset) for row in view.rotation)
 
 
 def translation(view: View) -> Vector:
-    """t of x_cam = R x + t."""
+    """Return t of x_cam = R x + t."""
     return tuple(-dot(row, view.centre) for row in view.rotation)
 
 
 def pixels(
     scene: Scene, distort: Distort, fx: float, fy: float, cx: float, cy: float
 ) -> dict[str, list[Vector]]:
-    """The pixels of all points in each view."""
+    """Return the pixels of all points in each view."""
     found: dict[str, list[Vector]] = {}
     for view in scene.views:
         rows = []
@@ -108,7 +108,7 @@ def pixels(
 
 
 def quaternion(m: Matrix) -> Vector:
-    """w, x, y, z of a rotation (Shepperd's method)."""
+    """Return the quaternion w, x, y, z of a rotation (Shepperd's method)."""
     trace = m[0][0] + m[1][1] + m[2][2]
     four = (trace, m[0][0], m[1][1], m[2][2])
     best = four.index(max(four))
@@ -128,7 +128,7 @@ def quaternion(m: Matrix) -> Vector:
 
 
 def axis_angle(m: Matrix) -> Vector:
-    """Of a rotation, by way of its quaternion."""
+    """Return axis times angle of a rotation, from its quaternion."""
     w, x, y, z = quaternion(m)
     side = math.hypot(x, y, z)
     angle = 2 * math.atan2(side, w)
@@ -139,7 +139,7 @@ def axis_angle(m: Matrix) -> Vector:
 
 
 def brown(k: Vector = (), p: Vector = (0.0, 0.0)) -> Distort:
-    """OpenCV's order of p1 and p2."""
+    """Brown's distortion, with p1 and p2 in OpenCV's order."""
 
     def distort(x: float, y: float, z: float) -> Vector:
         x, y = x / z, y / z
@@ -154,7 +154,7 @@ def brown(k: Vector = (), p: Vector = (0.0, 0.0)) -> Distort:
 
 
 def fisheye(k: Vector = (), p: Vector = (0.0, 0.0)) -> Distort:
-    """The angle to the axis in place of its tangent, then Brown's."""
+    """Fisheye: the angle to the axis instead of its tangent, then Brown's distortion."""
 
     def distort(x: float, y: float, z: float) -> Vector:
         side = math.hypot(x, y)
@@ -165,7 +165,7 @@ def fisheye(k: Vector = (), p: Vector = (0.0, 0.0)) -> Distort:
 
 
 def field_of_view(omega: float) -> Distort:
-    """Devernay and Faugeras: one parameter."""
+    """The one-parameter fisheye model of Devernay and Faugeras."""
 
     def distort(x: float, y: float, z: float) -> Vector:
         r = math.hypot(x, y) / z
@@ -176,7 +176,7 @@ def field_of_view(omega: float) -> Distort:
 
 
 def straightened_by(r: float) -> Distort:
-    """The point whose m (1 + r m²) is the straight one, by bisection."""
+    """The inverse of m (1 + r m²), by bisection."""
 
     def distort(x: float, y: float, z: float) -> Vector:
         straight = math.hypot(x, y) / z
@@ -193,6 +193,6 @@ def straightened_by(r: float) -> Distort:
 
 
 def panorama(x: float, y: float, z: float) -> Vector:
-    """Longitude and latitude over 2π."""
+    """Longitude and latitude, divided by 2π."""
     turn = 2 * math.pi
     return math.atan2(x, z) / turn, math.atan2(y, math.hypot(x, z)) / turn

@@ -1,5 +1,5 @@
-"""One made-up scene in every format of a reconstruction tool, written number by number from the
-formats' public descriptions (those that the readers name)."""
+"""Write an artificial scene in the format of every reconstruction tool, following the public
+descriptions of the formats (which the readers cite)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.make_points_scene import (
 
 
 def write_photos(folder: Path, scene: Scene, width: int = WIDTH, height: int = HEIGHT) -> Path:
-    """Grey PNG files of that size."""
+    """Write grey PNG files of this size."""
     folder.mkdir(parents=True, exist_ok=True)
     rows = zlib.compress((b"\0" + b"\x80" * width) * height)
     data = b"\x89PNG\r\n\x1a\n"
@@ -43,7 +43,7 @@ def write_photos(folder: Path, scene: Scene, width: int = WIDTH, height: int = H
 
 
 def write_bundler(path: Path, scene: Scene, k1: float, k2: float) -> dict[str, list[Vector]]:
-    """bundle.out v0.3 and list.txt."""
+    """Write bundle.out v0.3 and list.txt (Bundler)."""
     expected = pixels(scene, brown((k1, k2)), FOCAL, FOCAL, WIDTH / 2, HEIGHT / 2)
     lines = ["# Bundle file v0.3", f"{len(scene.views)} {len(scene.points)}"]
     for view in scene.views:
@@ -70,7 +70,7 @@ def write_bundler(path: Path, scene: Scene, k1: float, k2: float) -> dict[str, l
 def write_nvm(
     path: Path, scene: Scene, r: float, colmap: bool = False, fixed: bool = False
 ) -> dict[str, list[Vector]]:
-    """NVM_V3 as VisualSFM writes it, or as COLMAP does."""
+    """Write NVM_V3 as VisualSFM does, or as COLMAP does."""
     distort = brown((-r,)) if colmap else straightened_by(r)
     cx, cy = (333.0, 222.0) if fixed else (WIDTH / 2, HEIGHT / 2)
     expected = pixels(scene, distort, FOCAL, FOCAL, cx, cy)
@@ -96,7 +96,7 @@ def write_nvm(
 def write_meshroom(
     path: Path, scene: Scene, intrinsic: dict[str, object], version: str = "1.2.5"
 ) -> None:
-    """An .sfm: all numbers in quotes, as Boost writes them."""
+    """Write an .sfm (Meshroom) with all numbers in quotes, as Boost does."""
 
     def quoted(value: object) -> object:
         if isinstance(value, (list, tuple)):
@@ -134,7 +134,7 @@ def write_transforms(
     extension: bool = True,
     per_frame: bool = False,
 ) -> None:
-    """transforms.json; camera → world, x right, y up, z back."""  # fmt: skip
+    """Write transforms.json; camera → world, x right, y up, z back."""  # fmt: skip
     frames = []
     for view in scene.views:
         right, down, forward = view.rotation
@@ -147,7 +147,7 @@ def write_transforms(
 
 
 def write_openmvg(path: Path, scene: Scene, kind: str, intrinsic: dict[str, object]) -> None:
-    """sfm_data.json as cereal writes it."""
+    """Write sfm_data.json (OpenMVG), as the library cereal does."""
     views = [
         {"key": i, "value": {"polymorphic_id": 1 << 30, "ptr_wrapper": {
             "id": (1 << 31) + 1 + i,
@@ -175,7 +175,7 @@ def write_openmvg(path: Path, scene: Scene, kind: str, intrinsic: dict[str, obje
 
 
 def write_opensfm(path: Path, scene: Scene, camera: dict[str, object]) -> None:
-    """reconstruction.json."""
+    """Write reconstruction.json (OpenSfM)."""
     shots = {
         view.name: {"rotation": list(axis_angle(view.rotation)), "orientation": 1,
                     "translation": list(translation(view)), "camera": "v2 a camera"}
@@ -193,7 +193,8 @@ def write_opensfm(path: Path, scene: Scene, camera: dict[str, object]) -> None:
 
 
 def heading_pitch_roll(view: View) -> Vector:
-    """Degrees, with camera → world (x right, y up, z back) = Rz(−heading) Rx(pitch) Ry(roll)."""
+    """Return angles in degrees: camera → world (x right, y up, z back) is Rz(−heading) Rx(pitch)
+    Ry(roll)."""
     right, down, forward = view.rotation
     up, back = tuple(-v for v in down), tuple(-v for v in forward)
     # rows of the matrix are the world's axes: m[i][0] = right[i], m[i][1] = up[i] …
@@ -206,7 +207,7 @@ def heading_pitch_roll(view: View) -> Vector:
 def write_realityscan_csv(
     path: Path, scene: Scene, distortion: Vector, centre: Vector, newer: bool = False
 ) -> None:
-    """distortion: k1 … k4, t1, t2; centre: px, py."""
+    """Write the CSV of RealityScan. distortion: k1 … k4, t1, t2; centre: px, py."""
     columns = "name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2"
     if newer:
         columns = "name,x,y,alt,yaw,pitch,roll,f_35mm,px_norm,py_norm,k1,k2,k3,k4,t1,t2"
@@ -226,7 +227,7 @@ def write_realityscan_xmp(
     centre: Vector,
     elements: bool = True,
 ) -> None:
-    """One .xmp a photo; values as elements or as attributes."""  # fmt: skip
+    """Write one .xmp per photo; values as elements or as attributes."""  # fmt: skip
     folder.mkdir(parents=True, exist_ok=True)
     f = FOCAL / max(WIDTH, HEIGHT) * 36
     for view in scene.views:

@@ -1,4 +1,4 @@
-"""A result folder written by hand: what `fit` leaves, without a fit."""
+"""Write a result folder as `fit` does, without a fit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from patina.core.basis import default_basis
 
-BRONZE, FABRIC, ACRYLIC = 0, 4, 10  # places in the embedded basis' training set
+BRONZE, FABRIC, ACRYLIC = 0, 4, 10  # indices in the training set of the embedded basis
 PRINCIPLED = {
     "base_color": [0.5, 0.25, 0.1],
     "metallic": 0.0,
@@ -27,7 +27,7 @@ PRINCIPLED = {
 
 
 def coefficients(place: int) -> np.ndarray:
-    """(3, k) of a material that the basis was trained with."""
+    """Return the coefficients (3, k) of a training material of the basis."""
     training = default_basis().training
     assert training is not None
     return training[3 * place : 3 * place + 3]
@@ -59,10 +59,10 @@ def description(*materials: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def write_result(folder: Path, told: dict[str, Any]) -> Path:
-    """Leave result.json in a folder; returns the folder."""
+def write_result(folder: Path, content: dict[str, Any]) -> Path:
+    """Write result.json to a folder; return the folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "result.json").write_text(json.dumps(told), "utf-8")
+    (folder / "result.json").write_text(json.dumps(content), "utf-8")
     return folder
 
 

@@ -1,7 +1,7 @@
 """Chrome and glossy spheres on a table under one sun, rendered by Cycles.
 
-Needs bpy. Where the sun is, is known. The wide camera (70° across) sees four spheres, all of them
-off its axis.
+Needs bpy. The direction of the sun is known. The wide camera (70° field of view) sees four spheres,
+all of them off its axis.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ EYE, TARGET = np.array([0.15, -4.4, 4.2]), np.array([0.1, 0.6, 0.5])
 
 @dataclass(frozen=True)
 class Shown:
-    """One sphere in the picture. circle: the circle nearest to its outline, (x, y, radius)."""
+    """One sphere in the picture. circle: circle fitted to its outline, (x, y, radius), pixels."""
 
     surface: str
     centre: np.ndarray
@@ -36,7 +36,7 @@ class Shown:
 
 
 def directions(count: int = 20) -> np.ndarray:
-    """(count, 3) surface → light, over the upper hemisphere from 20° above the table, evenly."""
+    """Return unit vectors (count, 3) surface → light, uniform from 20° above the table up."""
     place = (np.arange(count) + 0.5) / count
     up = np.sin(np.radians(20.0)) + (0.99 - np.sin(np.radians(20.0))) * place
     turn = np.arange(count) * np.pi * (3 - np.sqrt(5.0))
@@ -45,7 +45,7 @@ def directions(count: int = 20) -> np.ndarray:
 
 
 def camera() -> Camera:
-    """The camera as Patina knows it (x right, y down, z forward)."""
+    """Return the camera in Patina's convention (x right, y down, z forward)."""
     forward = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
     right = np.cross(forward, [0, 0, 1.0])
     right /= np.linalg.norm(right)
@@ -56,7 +56,7 @@ def camera() -> Camera:
 
 
 def shown() -> list[Shown]:
-    """The spheres and the circles a person would draw around them."""
+    """Return the spheres, with the circles that a user would draw around them."""
     view = camera()
     found = []
     for x, y, radius, surface in SPHERES:
@@ -78,7 +78,7 @@ def shown() -> list[Shown]:
 
 
 def build(roughness: float = 0.05) -> None:
-    """The scene without its sun."""
+    """Build the scene without the sun."""
     import bpy
 
     from tests.wheel import cycles_sphere
@@ -131,7 +131,7 @@ def _material(name: str, colour: tuple[float, float, float], metallic: float, ro
 
 
 def highlight(sphere: Shown, direction: np.ndarray) -> np.ndarray:
-    """(x, y) where the mirror image of the sun is, by iterating on the half vector."""
+    """Return (x, y) of the mirror image of the sun, by iteration on the half vector."""
     view = camera()
     normal = direction
     for _ in range(60):
@@ -147,11 +147,10 @@ def picture(
     diameter: float = SUN_DIAMETER,
     samples: tuple[int, int, int] = (2, 24, 1024),
 ) -> np.ndarray:
-    """(h, w, 3) linear radiance under a sun of irradiance 3.
+    """Render (h, w, 3) linear radiance under a sun of irradiance 3.
 
-    samples: of the picture, of the boxes around the spheres, and of the pixels around the
-    highlights: the sun is smaller than a pixel there, and a few dozen rays would meet it or not by
-    chance.
+    samples: per pixel of the picture, of the boxes around the spheres, and of the highlights. In
+    highlights the sun is smaller than a pixel, so that a few dozen rays are not enough.
     """
     import bpy
 
@@ -179,7 +178,7 @@ def picture(
 
 
 def mask(sphere: Shown) -> np.ndarray:
-    """(h, w) bool: the pixels whose centre sees the sphere."""
+    """Return (h, w) bool, whether the centre of a pixel shows the sphere."""
     view = camera()
     y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
     rays = view.rays(np.stack([x.ravel(), y.ravel()], axis=1))

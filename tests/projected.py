@@ -1,4 +1,4 @@
-"""Materials of another kind as BRDFs of the embedded basis."""
+"""Project any BRDF on the embedded basis."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from patina.core.basis import PrincipalBRDF, default_basis
 
 
 def projected(evaluate: Callable[[Angles], np.ndarray], count: int) -> PrincipalBRDF:
-    """The nearest BRDF of ``count`` components to ``evaluate(angles) -> (n, 3)``."""
+    """Return the projection of ``evaluate(angles) -> (n, 3)`` on ``count`` components."""
     centres = merl_grid.node_angles(0.5)
-    seen = np.flatnonzero(merl_grid.visible(centres))
-    chosen = np.random.default_rng(0).choice(seen, 20000, replace=False)
-    angles = Angles(*(a.ravel()[chosen] for a in centres))
+    visible = np.flatnonzero(merl_grid.visible(centres))
+    selected = np.random.default_rng(0).choice(visible, 20000, replace=False)
+    angles = Angles(*(a.ravel()[selected] for a in centres))
     basis = default_basis()
     return PrincipalBRDF(basis, basis.project(evaluate(angles), angles, count, eta=1.0))

@@ -1,4 +1,4 @@
-"""The samples of a capture as the fit job takes them: of one material with the views, or of all."""
+"""The samples of a capture as the fit job takes them, of one or of all materials."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from patina.core.samples.take import light_surface, trusted_pixels
 
 
 def sampled(path: Path) -> tuple[SampleTable, list[SurfaceView]]:
-    """(all samples, one view a photo)."""
+    """Return (all samples, one view per photo)."""
     capture = read_capture(path)
     scan = capture_data.open_scan(capture)
     rays = RayScene.build(scan.mesh)
@@ -36,7 +36,7 @@ def sampled(path: Path) -> tuple[SampleTable, list[SurfaceView]]:
 
 
 def sampled_materials(path: Path) -> dict[str, SampleTable]:
-    """All samples of every material, by its name."""
+    """Return material name → all samples."""
     capture = read_capture(path)
     scan = capture_data.open_scan(capture)
     rays = RayScene.build(scan.mesh)

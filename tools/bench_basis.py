@@ -1,4 +1,4 @@
-"""The embedded basis: variance explained, cost of its coarse grid, unseen materials."""
+"""Measure the embedded basis: explained variance, interpolation error, held-out materials."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-# Nielsen et al. 2015: φd, θh, θd in degrees
+# Nielsen et al. 2015, five published directions: φd, θh, θd in degrees
 NIELSEN_5 = (
     (36.2, 1.4, 4.0),
     (86.5, 76.7, 13.1),
@@ -18,7 +18,10 @@ NIELSEN_5 = (
 
 
 def run(data: Path) -> None:
-    """Print the tables of docs/method/measurements.md, section "The basis"."""
+    """Print the tables of docs/method/measurements.md, section "The basis".
+
+    data: folder of the reference data.
+    """
     from patina.core.angles import Angles, cosines, merl_grid
     from patina.core.basis import PrincipalBRDF, default_basis
     from patina.core.basis.build_default import NeuralObservations
@@ -28,9 +31,9 @@ def run(data: Path) -> None:
     print("## basis\n")
     basis = default_basis()
     observations = NeuralObservations(nbrdf.load(data / "brdf" / "nbrdf_merl.npz")[1])
-    since = time.perf_counter()
+    start = time.perf_counter()
     directions, explained = principal(observations, basis.count)
-    print(f"principal components of 300 columns: {time.perf_counter() - since:.1f} s")
+    print(f"principal components of 300 columns: {time.perf_counter() - start:.1f} s")
     total = explained.cumsum()
     shares = ", ".join(f"{k}: {100 * total[k - 1]:.1f} %" for k in (1, 2, 3, 5, 10, 20, 40))
     print(f"variance explained by components {shares}")
@@ -39,8 +42,8 @@ def run(data: Path) -> None:
     cos_i, cos_o = cosines(*centres)
     rng = np.random.default_rng(1)
     for limit in (80, 90):
-        seen = np.flatnonzero((np.minimum(cos_i, cos_o) > np.cos(np.radians(limit))).ravel())
-        pick = rng.choice(seen, 60_000, replace=False)
+        visible = np.flatnonzero((np.minimum(cos_i, cos_o) > np.cos(np.radians(limit))).ravel())
+        pick = rng.choice(visible, 60_000, replace=False)
         angles = Angles(*(a.ravel()[pick] for a in centres))
         exact = exact_rows(observations, directions, angles)
         centre, rows = basis.rows(angles)

@@ -1,4 +1,4 @@
-"""What `diagnose` says of captures that nobody made for it: real photographs, and the demo."""
+"""Run `diagnose` on real photographs and on the demo."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ DEMO = ROOT / "assets" / "demo" / "demo.capture.toml"
 
 
 def run(data: Path) -> None:
-    """Print a row each, and the sentences."""
+    """Print one row per capture, then the sentences of the diagnosis."""
     from . import real_captures
 
     with tempfile.TemporaryDirectory() as name:
@@ -28,42 +28,43 @@ def run(data: Path) -> None:
             "| capture | named | error on held-out regions, before → after | on held-out photos | "
             "error ÷ noise floor | seconds: total, search |\n|---|---|---|---|---|---|"
         )
-        said = []
+        sentences = []
         for label, path in captures.items():
-            said += [f"- {label}: {sentence}" for sentence in _row(label, path)]
-        print("\n" + "\n".join(said))
+            sentences += [f"- {label}: {sentence}" for sentence in _row(label, path)]
+        print("\n" + "\n".join(sentences))
 
 
 def _row(label: str, path: Path) -> list[str]:
-    """Prints it; returns what was said of causes and materials."""
+    """Print the row of a capture; return the sentences on causes and materials."""
     from patina.core.capture import read_capture
     from patina.core.jobs import FitJob
     from patina.core.jobs.check_job import CheckJob
 
-    since = time.perf_counter()
+    start = time.perf_counter()
     job = CheckJob(FitJob(read_capture(path)))
     job.drain()
-    whole = time.perf_counter() - since
+    whole = time.perf_counter() - start
     found, after = job.checked.found, job.result
     assert found is not None and after is not None
-    search = next(s.seconds for s in job.stages if s.name == "trying what may be wrong")
-    one, other = found.error_before, found.error_after
+    search = next(s.seconds for s in job.stages if s.name == "testing possible causes")
+    error_before, error_after = found.error_before, found.error_after
     photos = "–"
-    if one.photos is not None and other.photos is not None:
-        photos = f"{100 * one.photos:.1f} → {100 * other.photos:.1f} %"
+    if error_before.photos is not None and error_after.photos is not None:
+        photos = f"{100 * error_before.photos:.1f} → {100 * error_after.photos:.1f} %"
     print(
-        f"| {label} | {', '.join(found.causes) or 'none'} | {100 * one.parts:.1f} → "
-        f"{100 * other.parts:.1f} % | {photos} | {one.over_floor:.2f} → {other.over_floor:.2f} | "
+        f"| {label} | {', '.join(found.causes) or 'none'} | {100 * error_before.parts:.1f} → "
+        f"{100 * error_after.parts:.1f} % | {photos} | {error_before.over_floor:.2f} → "
+        f"{error_after.over_floor:.2f} | "
         f"{whole:.0f}, {search:.0f} |",
         flush=True,
     )
-    said = [found.sentence(trial) for trial in found.reported]
+    sentences = [found.sentence(trial) for trial in found.reported]
     if found.unexplained:
-        said.append(found.residual.sentence())
+        sentences.append(found.residual.sentence())
     for before, material in zip(job.checked.result.materials, after.materials, strict=True):
         if before.held_out is not None and material.held_out is not None:
-            said.append(
-                f"{material.name}: unseen photos by the first fit {100 * before.held_out.error:.1f}"
-                f" % off, by the second {100 * material.held_out.error:.1f} % (relative RMS)"
+            sentences.append(
+                f"{material.name}: error on held-out photos {100 * before.held_out.error:.1f} % in "
+                f"the first fit, {100 * material.held_out.error:.1f} % in the second (relative RMS)"
             )
-    return said
+    return sentences

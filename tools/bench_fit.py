@@ -1,4 +1,4 @@
-"""The paper's fit on the captures with known truth, beside the best that components can do."""
+"""Run the paper's fit on captures with known truth; compare with the projected truth."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def run(data: Path) -> None:
         folder = data / "scans" / name
         truth = read_truth(folder / "truth.json")
         capture = read_capture(folder / "scan.capture.toml")
-        rows, peaks, held = [], [], []
+        rows, peaks, held_out_errors = [], [], []
         for seed in range(SEEDS):
             paper = replace(capture.fit.paper, seed=seed)
             fit = replace(capture.fit, method="paper", paper=paper)
@@ -45,12 +45,12 @@ def run(data: Path) -> None:
             found = metrics.compare(table, truth)
             rows.append((found.relative_l2, found.log_relative_rms, found.cube_root_rms))
             peaks.append(_peak(table, truth))
-            held.append((100 * material.held_out.typical, 100 * material.held_out.error))
+            held_out_errors.append((100 * material.held_out.typical, 100 * material.held_out.error))
         seconds = sum(stage.seconds for stage in job.stages)
         peak = job.stages[-1].peak_mb or float("nan")
         print(
             f"| {name} | the paper's fit | {_spread(rows, '.3f')} | {_list(peaks)} | "
-            f"{_spread(held, '.1f', ' %')} | {seconds:.1f} | {peak:.0f} |"
+            f"{_spread(held_out_errors, '.1f', ' %')} | {seconds:.1f} | {peak:.0f} |"
         )
         angles = Angles(*(a[truth.valid] for a in merl_grid.node_angles(0.5)))
         rho = np.moveaxis(truth.values, 0, -1)[truth.valid]
@@ -67,7 +67,7 @@ def run(data: Path) -> None:
 
 
 def _peak(fit, truth) -> list[float]:  # type: ignore[no-untyped-def]
-    """Median ratio over cells with θh < 3° (ih < 16) and all φd in view, all channels."""
+    """Return the median ratio over visible cells with θh < 3° (ih < 16), all φd and channels."""
     ratios = []
     for theta_d in (10, 40, 70):
         place = (slice(None), slice(0, 16), theta_d, slice(None))
@@ -81,7 +81,7 @@ def _list(rows: list[list[float]]) -> str:
 
 
 def _spread(rows: list[tuple[float, ...]], form: str, unit: str = "") -> str:
-    """Median (smallest … largest) of every column, as cells of a table."""
+    """Format the median (smallest … largest) of every column as table cells."""
     columns = np.array(rows).T
     return " | ".join(
         f"{np.median(c):{form}}{unit} ({c.min():{form}} … {c.max():{form}})" for c in columns

@@ -1,4 +1,4 @@
-"""Directions of light: from rendered spheres and from the photos of chrome spheres."""
+"""Measure errors of light directions, from rendered spheres and photos of chrome spheres."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _rendered() -> None:
 
 def _photos(folder: Path) -> None:
     if not folder.is_dir():
-        print("(no photos of chrome spheres here)\n")
+        print("(found no photos of chrome spheres)\n")
         return
     from tests.core import test_light_sphere_photos as photos
 

@@ -1,4 +1,4 @@
-"""`run.py bench [NAME ...]`: what docs/method/measurements.md states, measured again."""
+"""`run.py bench [NAME ...]`: repeat the measurements of docs/method/measurements.md."""
 
 from __future__ import annotations
 
@@ -25,28 +25,35 @@ BENCHES = (
     "traits",
     "steps",
 )
-OWN = ("speed", "traits", "steps")  # these need no reference data
+WITHOUT_DATA = ("speed", "traits", "steps")  # need no reference data
 
 
 def main() -> int:
-    """Run the named measurements, or all; returns the exit code."""
+    """Run the named benchmarks, or all; return the exit code."""
     parser = argparse.ArgumentParser(prog="run.py bench", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(BENCHES)}")
-    told = parser.parse_args()
-    unknown = [name for name in told.names if name not in BENCHES]
+    parser.add_argument(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help=f"benchmarks to run: {', '.join(BENCHES)} (default: all)",
+    )
+    arguments = parser.parse_args()
+    unknown = [name for name in arguments.names if name not in BENCHES]
     if unknown:
-        parser.error(f"no measurement is called {unknown[0]!r}; there are {', '.join(BENCHES)}")
-    if told.names and set(told.names) <= set(OWN):
+        parser.error(f"found {unknown[0]!r}, expected one of {', '.join(BENCHES)}")
+    if arguments.names and set(arguments.names) <= set(WITHOUT_DATA):
         load_patina()
-        for name in told.names:
+        for name in arguments.names:
             importlib.import_module(f".bench_{name}", __package__).run(Path())
         return 0
     data = Path(os.environ.get("PATINA_SHARED", ROOT.parent / "shared")) / "data"
     if not data.is_dir():
-        print(f"bench: the reference data is not here ({data.name}/ of ../shared)", file=sys.stderr)
+        print(
+            f"bench: found no reference data; expected it in ../shared/{data.name}", file=sys.stderr
+        )
         return 2
     load_patina()
-    for name in told.names or BENCHES:
+    for name in arguments.names or BENCHES:
         importlib.import_module(f".bench_{name}", __package__).run(data)
     return 0
 

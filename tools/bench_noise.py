@@ -1,4 +1,4 @@
-"""Noise of the measured material under pictures of the world, against Cycles' own closures."""
+"""Measure the noise of the measured material under world images, relative to Cycles' closures."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ def run(data: Path) -> None:
     from patina.core.appearance.principled_fit import fit_principled
 
     print(f"## noise ({SIZE} x {SIZE} pixels, {SAMPLES} samples, {SEEDS} seeds)\n")
-    print("| material | by the portal | world | Patina | Cycles' own | which | ratio |")
+    print(
+        "| material | light through the portal | world | Patina | Cycles | closure of Cycles "
+        "| ratio |"
+    )
     print("|---|---|---|---|---|---|---|")
     ratios: dict[str, list[float]] = {"diffuse": [], "glossy": []}
     for name, kind in MATERIALS:
@@ -33,10 +36,10 @@ def run(data: Path) -> None:
             ours = _noise(world, lambda sphere, b=brdf, f=fit: _measured(sphere, b, f))
             own = _noise(world, lambda sphere, k=kind, r=roughness: _own(sphere, k, r))
             ratios[kind].append(ours / own)
-            told = "Diffuse" if kind == "diffuse" else f"Glossy, roughness {roughness:.2f}"
+            closure = "Diffuse" if kind == "diffuse" else f"Glossy, roughness {roughness:.2f}"
             print(
                 f"| {name} | {100 * rest:.0f} % | {world} | {100 * ours:.1f} % | "
-                f"{100 * own:.1f} % | {told} | {ours / own:.2f} |",
+                f"{100 * own:.1f} % | {closure} | {ours / own:.2f} |",
                 flush=True,
             )
     for kind, values in ratios.items():
@@ -44,7 +47,7 @@ def run(data: Path) -> None:
 
 
 def brdf_of(data: Path, name: str):  # type: ignore[no-untyped-def]
-    """A measured material as 100 components of the basis."""
+    """Return a MERL material, projected on 100 components of the basis."""
     from patina.core.brdf import nbrdf
     from tests.projected import projected
 
@@ -73,8 +76,9 @@ def _own(sphere, kind: str, roughness: float) -> None:  # type: ignore[no-untype
     sphere.data.materials.append(material)
 
 
-def _noise(world: str, wear) -> float:  # type: ignore[no-untyped-def]
-    """RMS over pixels of the standard deviation between seeds, of the mean radiance."""
+def _noise(world: str, assign) -> float:  # type: ignore[no-untyped-def]
+    """Return the noise: RMS over pixels of the standard deviation between seeds, relative to the
+    mean radiance. assign: function that assigns a material to the sphere."""
     import bpy
 
     from patina.scene.export import relight
@@ -83,8 +87,8 @@ def _noise(world: str, wear) -> float:  # type: ignore[no-untyped-def]
     sphere = cycles_sphere.new_scene(size=SIZE, samples=SAMPLES, osl=True)
     scene = bpy.context.scene
     scene.cycles.filter_width = 1.0
-    relight.light_by(scene, relight.shipped_worlds()[world])
-    wear(sphere)
+    relight.light_with(scene, relight.shipped_worlds()[world])
+    assign(sphere)
     images = []
     with tempfile.TemporaryDirectory() as folder:
         for seed in range(SEEDS):

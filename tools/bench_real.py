@@ -1,7 +1,7 @@
-"""The main job on real captures: what a fit predicts of a photo it has not seen.
+"""Measure errors on held-out photos of real captures.
 
-Errors are taken in the photos' own encoding (0..1, what a viewer shows): a tone curve that is
-assumed must not choose the scale it is judged on.
+Errors are computed in the encoding of the photos (0..1, as displayed), so that the assumed tone
+curve does not change the scale of the error.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-THIN = 12  # every so many trusted pixels: neighbours say the same
-DARK = 0.02  # encoded; below it a relative error is the noise's
+THIN = 12  # use every 12th trusted pixel, because neighbours are redundant
+DARK = 0.02  # encoded value below which the relative error is mainly noise
 
 
 def run(data: Path) -> None:
@@ -36,7 +36,7 @@ def run(data: Path) -> None:
 
 @dataclass(frozen=True)
 class _Case:
-    """What a capture gives: its samples and the curve of its photos."""
+    """Samples of a capture, tone curve of its photos, and results of the light refinement."""
 
     table: object
     curve: tuple[np.ndarray, np.ndarray]
@@ -51,14 +51,17 @@ def _table(cases: list[tuple[str, Path]]) -> None:
     notes = []
     for label, path in cases:
         case = _samples(path)
-        errors = [_leave_one_out(case, way) for way in (_paper, _all_samples, _lambertian)]
+        errors = [
+            _leave_one_out(case, estimator) for estimator in (_paper, _all_samples, _lambertian)
+        ]
         cells = " | ".join(f"{100 * typical:.1f} %, {100 * rms:.1f} %" for typical, rms in errors)
         print(f"| {label} | {len(case.table):,} | {cells} |", flush=True)  # type: ignore[arg-type]
-        for name, numbers in case.moved.items():
-            said = ", ".join(f"{k} {v:.2f} ± {e:.2f}" for k, (v, e) in numbers.items())
+        for name, parameters in case.moved.items():
+            position = ", ".join(f"{k} {v:.2f} ± {e:.2f}" for k, (v, e) in parameters.items())
             before, after = case.unexplained or (0, 0)
             notes.append(
-                f"{label}: {name} at {said}; unexplained log residual {before:.3f} → {after:.3f}"
+                f"{label}: {name} at {position}; unexplained log residual {before:.3f} → "
+                f"{after:.3f}"
             )
     for note in notes:
         print(f"\n{note}")
@@ -97,27 +100,27 @@ def _samples(path: Path) -> _Case:
     table, _ = at_typical_level(SampleTable.join(tables), basis)
     encoded = np.linspace(0, 1, 4097)
     curve = photos.curve(0)
-    curve = curve if curve.curves else Transfer.named("srgb")  # what these JPEGs say themselves
+    curve = curve if curve.curves else Transfer.named("srgb")  # as these JPEGs state
     linear = curve.decode(np.repeat(encoded[:, None], 3, axis=1))
     return _Case(table, (encoded, linear), lights.unexplained, lights.moved)
 
 
-def _leave_one_out(case: _Case, way: object) -> tuple[float, float]:
-    """(typical, RMS) relative error of the encoded values of photos left out in turn."""
-    relative, missed, size = [], 0.0, 0.0
+def _leave_one_out(case: _Case, estimator: object) -> tuple[float, float]:
+    """Return (typical, RMS) relative errors of encoded values, each photo held out in turn."""
+    relative, squared_error, size = [], 0.0, 0.0
     table = case.table
     for photo in np.unique(table.photo):  # type: ignore[attr-defined]
         out = table.photo == photo  # type: ignore[attr-defined]
         held = table.select(out)  # type: ignore[attr-defined]
-        rho = way(table.select(~out), held)  # type: ignore[attr-defined,operator]
+        rho = estimator(table.select(~out), held)  # type: ignore[attr-defined,operator]
         predicted = _encode(rho * held.irradiance * held.cos_i[:, None], case.curve)
         measured = _encode(held.radiance, case.curve)
         level = measured.mean(axis=1)
-        off = np.abs(predicted - measured).mean(axis=1)
-        relative.append((off / level)[level > DARK])
-        missed += float(np.sum((predicted - measured) ** 2))
+        deviation = np.abs(predicted - measured).mean(axis=1)
+        relative.append((deviation / level)[level > DARK])
+        squared_error += float(np.sum((predicted - measured) ** 2))
         size += float(np.sum(measured**2))
-    return float(np.median(np.concatenate(relative))), float(np.sqrt(missed / size))
+    return float(np.median(np.concatenate(relative))), float(np.sqrt(squared_error / size))
 
 
 def _encode(radiance: np.ndarray, curve: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
@@ -133,7 +136,7 @@ def _paper(table: object, held: object) -> np.ndarray:
 
 
 def _all_samples(table: object, held: object) -> np.ndarray:
-    """Nielsen's ridge on every sample: no choice of pixels at all."""
+    """Ridge regression (Nielsen et al. 2015) on all samples, without a selection of pixels."""
     from patina.core.basis import default_basis
     from patina.core.fit import ridge
 
@@ -144,5 +147,5 @@ def _all_samples(table: object, held: object) -> np.ndarray:
 
 
 def _lambertian(table: object, held: object) -> np.ndarray:
-    """One colour, no gloss: what any BRDF must beat."""
+    """A Lambertian BRDF, as a baseline."""
     return np.broadcast_to(np.median(table.rho, axis=0), held.rho.shape)  # type: ignore[attr-defined]

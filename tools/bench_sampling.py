@@ -1,4 +1,4 @@
-"""What the sampler reads against the truth, with scanned and with exact normals."""
+"""Compare sampled reflectance with the truth, with scanned and with exact normals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Poses against known ones: rendered photographs, and a real capture leave-one-out."""
+"""Measure pose errors, for rendered photos and for a real capture (leave one out)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-# Of the chart photo, camera to chunk: the README beside it, from many more photos of the same scan
+# Pose of the chart photo, camera to chunk, from the README of the data (solved with more photos)
 CHART = """0.994922831 -0.0166604036 -0.0992521614 -0.839992538
 -0.0189328288 -0.999578736 -0.0219976919 -0.18724838
 -0.0988438597 0.0237651301 -0.994819134 1.36802745 0 0 0 1"""
@@ -73,8 +73,8 @@ def _rendered() -> None:
         again = LocaliseJob(truth, photos, sorted(lit.glob("*.jpg")), mesh)
         again.drain()
         result = again.result
-        said = np.degrees(np.median([p.angle_deviation for p in result.placed]))
-        note = f"{len(result.placed)} of {len(lamps)} placed; stated {said:.3f}°"
+        stated_degrees = np.degrees(np.median([p.angle_deviation for p in result.placed]))
+        note = f"{len(result.placed)} of {len(lamps)} placed; stated {stated_degrees:.3f}°"
         cameras = [p.camera for p in result.placed]
         by_label = {c.label: c for c in lit_truth}
         _row("localise", cameras, [by_label[c.label] for c in cameras], mesh.vertices, note)
@@ -116,8 +116,8 @@ def _real(folder: Path) -> None:
             truth.append(photo.camera)
     print(f"rodin_bronze, {len(photos)} photos of a shoot of 171, each against the others:\n")
     _table()
-    said = np.degrees(np.median([p.angle_deviation for p in placed]))
-    note = f"{len(placed)} of {len(photos)} placed; stated {said:.3f}°"
+    stated_degrees = np.degrees(np.median([p.angle_deviation for p in placed]))
+    note = f"{len(placed)} of {len(photos)} placed; stated {stated_degrees:.3f}°"
     _row("leave one out", [p.camera for p in placed], truth, mesh.vertices, note)
     chart = folder / "colorchecker" / "231016_miaEURO_9505.jpg"
     result = place(chart, features_of(chart), range(len(photos)))
@@ -126,10 +126,15 @@ def _real(folder: Path) -> None:
         rotation = matrix[:3, :3].T
         pose = Pose(rotation, -rotation @ matrix[:3, 3])
         camera = result.camera
-        told = Camera("chart", camera.width, camera.height, camera.model, camera.parameters, pose)
-        said = np.degrees(result.angle_deviation)
-        note = f"{result.inliers} features; stated {said:.3f}°, {result.place_deviation:.4f} units"
-        _row("chart photo", [camera], [told], mesh.vertices, note)
+        true_camera = Camera(
+            "chart", camera.width, camera.height, camera.model, camera.parameters, pose
+        )
+        stated_degrees = np.degrees(result.angle_deviation)
+        note = (
+            f"{result.inliers} features; stated {stated_degrees:.3f}°, "
+            f"{result.place_deviation:.4f} units"
+        )
+        _row("chart photo", [camera], [true_camera], mesh.vertices, note)
     print()
 
 
@@ -139,7 +144,7 @@ def _table() -> None:
 
 
 def _row(name: str, cameras: Sequence, truth: Sequence, points: np.ndarray, note: str) -> None:
-    """Differences of cameras from true ones; pixels: median over the points both see."""
+    """Print differences from the true cameras; pixels: median over points in both images."""
     angles, places, pixels = [], [], []
     for one, other in zip(cameras, truth, strict=True):
         turn = one.pose.rotation @ other.pose.rotation.T

@@ -1,7 +1,7 @@
-"""Seconds and peak memory of each stage at real photo sizes, and against the plain way.
+"""Measure time and peak memory of each stage at real photo sizes, and compare with simple code.
 
-Every case runs in a process of its own (this module as a script), so that its peak memory is its
-own; captures are made in a temporary folder.
+Every case runs in a separate process (this module as a script), so that its peak memory is not
+affected by others. Captures are created in a temporary folder.
 """
 
 from __future__ import annotations
@@ -22,11 +22,14 @@ PHOTOS = 8
 SIZES = ((1, 100_000), (6, 100_000), (24, 100_000), (1, 1_000_000), (6, 1_000_000),
          (24, 1_000_000), (1, 5_000_000), (6, 5_000_000), (24, 5_000_000))  # fmt: skip
 MANY_PHOTOS = (6, 100_000, 16)
-SMALL = (6, 100_000)  # megapixels, triangles: what the plain way can hold
+SMALL = (6, 100_000)  # megapixels, triangles: the largest case for the simple implementation
 SELECTIONS = ((10_000_000, 6), (10_000_000, 12), (10_000_000, 20))
 PLAIN_SELECTIONS = ((20_000, 6), (3_000, 20))
-STAGES = {"reading the scan": "scan", "sampling the photos": "samples"}  # all others are the fit's
-WITHOUT = ("Principled", "materials on")  # and those that come after the coefficients
+STAGES = {
+    "reading the scan": "scan",
+    "sampling the photos": "samples",
+}  # all other stages are part of the fit
+WITHOUT = ("Principled", "assigning materials")  # stages after the coefficients are known
 
 
 def run(data: Path) -> None:
@@ -42,7 +45,7 @@ def _jobs(folder: Path) -> None:
           "| to coefficients | processor time | peak memory, sampling | all | report "
           "| with it |")  # fmt: skip
     print("|---|---|---|---|---|---|---|---|---|---|---|---|---|")
-    told = []
+    comparisons = []
     for megapixels, triangles, photos in (*((*size, PHOTOS) for size in SIZES), MANY_PHOTOS):
         where = folder / f"{megapixels}_{triangles}_{photos}"
         _case("make", where, megapixels, triangles, photos)
@@ -57,9 +60,9 @@ def _jobs(folder: Path) -> None:
             flush=True,
         )
         if (megapixels, triangles, photos) == (*SMALL, PHOTOS):
-            told = [_threads(where, found), _plain_way(where)]
+            comparisons = [_threads(where, found), _plain_way(where)]
         _remove(where)
-    print("", *told, "", sep="\n")
+    print("", *comparisons, "", sep="\n")
 
 
 def _threads(where: Path, two: dict[str, Any]) -> str:
@@ -137,20 +140,20 @@ def _make(
 
 
 def _opened(folder: str):  # type: ignore[no-untyped-def]
-    """(capture, scan, seconds to read the scan)."""
+    """Return (capture, scan, seconds to read the scan)."""
     from patina.core.basis import default_basis
     from patina.core.capture import read_capture
     from patina.core.inputs import capture_data
 
     default_basis()
-    since = time.perf_counter()
+    start = time.perf_counter()
     capture = read_capture(Path(folder) / "ball.capture.toml")
     scan = capture_data.open_scan(capture)
-    return capture, scan, time.perf_counter() - since
+    return capture, scan, time.perf_counter() - start
 
 
 def _job(folder: str, threads: str, method: str) -> dict[str, Any]:
-    """The whole job, and its report. processor, peak_mb: to the end of the fit."""
+    """Run the fit job and write its report. processor, peak_mb: up to the end of the fit."""
     from dataclasses import replace
 
     from patina.core.capture import read_capture
@@ -159,40 +162,40 @@ def _job(folder: str, threads: str, method: str) -> dict[str, Any]:
     from patina.core.report import write_report
 
     capture = read_capture(Path(folder) / "ball.capture.toml")
-    # the plain way holds nothing out either
+    # the simple implementation has no held-out photos either
     fit = replace(capture.fit, method=method, held_out=method == "measured")
     job = FitJob(replace(capture, fit=fit), threads=int(threads))
-    worked, processor = time.process_time(), []
+    processor_start, processor = time.process_time(), []
 
-    def look(step: Step) -> None:
+    def measure(step: Step) -> None:
         if not step.stage.startswith(WITHOUT):
-            processor[:] = [time.process_time() - worked]
+            processor[:] = [time.process_time() - processor_start]
 
-    job.drain(look)
+    job.drain(measure)
     seconds = {"scan": 0.0, "samples": 0.0, "fit": 0.0}
     peak = sampling = 0.0
     for stage in job.stages:
         if not stage.name.startswith(WITHOUT):
             seconds[STAGES.get(stage.name, "fit")] += stage.seconds
-            peak = stage.peak_mb or float("nan")  # so far
+            peak = stage.peak_mb or float("nan")  # until this stage
             sampling = peak if STAGES.get(stage.name) else sampling
     result = finished(job.result)
     material = result.materials[0]
-    since = time.perf_counter()
+    start = time.perf_counter()
     with tempfile.TemporaryDirectory() as report:
         for _ in write_report(Path(report), job.result):
             pass
     return {
         "seconds": seconds, "samples": material.samples, "used": material.used, "peak_mb": peak,
         "sampling_mb": sampling, "processor": processor[0],
-        "report": time.perf_counter() - since, "report_mb": _peak(),
+        "report": time.perf_counter() - start, "report_mb": _peak(),
         "digest": hashlib.sha256(material.fit.brdf.coefficients.tobytes()).hexdigest(),
     }  # fmt: skip
 
 
 def _plain(folder: str) -> dict[str, Any]:
-    """Every pixel of a photo at once in float64, all samples of all photos kept, a condition number
-    from a decomposition for every candidate."""
+    """Run the simple implementation: all pixels of a photo at once in float64, all samples in
+    memory, and a singular value decomposition for the condition number of every candidate."""
     from patina.core.basis import default_basis
     from patina.core.fit import fit_paper, selection
     from patina.core.geometry import RayScene
@@ -204,9 +207,9 @@ def _plain(folder: str) -> dict[str, Any]:
     from .plain_sampling import sample_plainly
     from .plain_selection import choose_plainly
 
-    worked = time.process_time()
+    processor_start = time.process_time()
     capture, scan, reading = _opened(folder)
-    since = time.perf_counter()
+    start = time.perf_counter()
     rays = RayScene.build(scan.mesh)
     photos = LitPhotos.open(capture)
     lights = find_lights(capture, scan, photos)
@@ -218,12 +221,16 @@ def _plain(folder: str) -> dict[str, Any]:
         tables.append(sample_plainly(rays, camera, light, radiance, capture.fit.margins))
     selection.choose = choose_plainly
     fit_paper(SampleTable.join(tables), default_basis(), capture.fit.paper)
-    seconds = reading + time.perf_counter() - since
-    return {"seconds": seconds, "processor": time.process_time() - worked, "peak_mb": _peak()}
+    seconds = reading + time.perf_counter() - start
+    return {
+        "seconds": seconds,
+        "processor": time.process_time() - processor_start,
+        "peak_mb": _peak(),
+    }
 
 
 def _candidates(count: int, components: int):  # type: ignore[no-untyped-def]
-    """(angles, rows (count, components)) of random directions within what photos see."""
+    """Return (angles, rows (count, components)) of random directions in the range of photos."""
     import numpy as np
 
     from patina.core.angles import Angles
@@ -245,15 +252,15 @@ def _select(candidates: str, count: str) -> dict[str, Any]:
     from patina.core.fit.selection import choose_from_cells
 
     angles, rows = _candidates(int(candidates), int(count))
-    since = time.perf_counter()
-    chosen = choose_from_cells(rows, angle_cells(angles), int(count))
-    seconds = time.perf_counter() - since
-    condition = float(np.linalg.cond(rows[chosen]))
+    start = time.perf_counter()
+    selected = choose_from_cells(rows, angle_cells(angles), int(count))
+    seconds = time.perf_counter() - start
+    condition = float(np.linalg.cond(rows[selected]))
     return {"seconds": seconds, "condition": condition, "peak_mb": _peak()}
 
 
 def _nielsen(candidates: str, count: str) -> dict[str, Any]:
-    """His search with every candidate at every step, the best found by bounds."""
+    """Nielsen's search over all candidates at every step, accelerated by bounds."""
     import numpy as np
 
     from patina.core.fit import selection
@@ -261,17 +268,17 @@ def _nielsen(candidates: str, count: str) -> dict[str, Any]:
     from patina.core.fit.condition_bound import ConditionBound
 
     angles, rows = _candidates(int(candidates), int(count))
-    since = time.perf_counter()
+    start = time.perf_counter()
     tree = CandidateTree.of(rows, angle_cells(angles))
-    chosen = selection.search(
+    selected = selection.search(
         rows,
         int(np.square(rows).sum(axis=1).argmax()),
         int(count),
         lambda taken, limit: tree.smallest(ConditionBound.of(rows[taken]), taken, limit),
     )
     return {
-        "seconds": time.perf_counter() - since,
-        "condition": float(np.linalg.cond(rows[chosen].astype(float))),
+        "seconds": time.perf_counter() - start,
+        "condition": float(np.linalg.cond(rows[selected].astype(float))),
     }
 
 
@@ -284,7 +291,7 @@ def _compare(candidates: str, count: str) -> dict[str, Any]:
 
     _, rows = _candidates(int(candidates), int(count))
     marks = [time.perf_counter()]
-    plain = choose_plainly(rows, int(count), lambda chosen: np.ones(len(rows), bool))
+    plain = choose_plainly(rows, int(count), lambda selected: np.ones(len(rows), bool))
     marks.append(time.perf_counter())
     ours = choose(rows, int(count))
     marks.append(time.perf_counter())

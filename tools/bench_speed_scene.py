@@ -1,4 +1,4 @@
-"""A capture of any size to measure speed on: a bumpy ball, photos by a closed formula."""
+"""Create a capture of any size for speed tests: a bumpy ball, with analytically computed photos."""
 
 from __future__ import annotations
 
@@ -7,28 +7,33 @@ from pathlib import Path
 import numpy as np
 
 BUMP, WAVES = 0.01, np.array([9.0, 7.0, 8.0])
-DISTANCE, FILLS = 4.0, 0.46  # ball's radii; of the photo's height, the ball's radius
+DISTANCE, FILLS = (
+    4.0,
+    0.46,
+)  # in radii of the ball; radius of its image, fraction of the photo's height
 ALBEDO = np.array([0.16, 0.06, 0.04])
 IRRADIANCE = 3.0
 ASPECT = (3, 2)
-DISTORTION = (-0.08, 0.03)  # k1, k2 of a usual zoom lens
+DISTORTION = (-0.08, 0.03)  # k1, k2 of a typical zoom lens
 
 
 def photo_size(megapixels: float) -> tuple[int, int]:
-    """(width, height) of a 3:2 photo."""
+    """Return (width, height) of a 3:2 photo."""
     unit = round((megapixels * 1e6 / (ASPECT[0] * ASPECT[1])) ** 0.5)
     return ASPECT[0] * unit, ASPECT[1] * unit
 
 
 def make_capture(folder: Path, megapixels: float, triangles: int, photos: int = 8) -> Path:
-    """Write mesh (binary PLY), cameras (COLMAP text) and photos (half-float EXR); returns the
-    capture file."""
+    """Write mesh (binary PLY), cameras (COLMAP text) and photos (half-float EXR).
+
+    Returns the path of the capture file.
+    """
     from patina.core.photo.image import write_exr
 
     folder.mkdir(parents=True, exist_ok=True)
     write_mesh(folder / "mesh.ply", triangles)
     width, height = photo_size(megapixels)
-    # a sphere of radius 1 at DISTANCE ends at the tangent of this angle
+    # the outline of a sphere of radius 1 at DISTANCE is at the tangent of this angle
     focal = FILLS * height / np.tan(np.arcsin(1.0 / DISTANCE))
     lens = f"{focal:.9g} {width / 2} {height / 2} {DISTORTION[0]} {DISTORTION[1]}"
     cameras = folder / "cameras"
@@ -56,7 +61,7 @@ def make_capture(folder: Path, megapixels: float, triangles: int, photos: int = 
 
 
 def write_mesh(path: Path, triangles: int) -> None:
-    """About so many triangles of the ball, as binary PLY."""
+    """Write the ball with about this number of triangles, as binary PLY."""
     rows = round((triangles / 4) ** 0.5)
     columns = 2 * rows
     polar = np.pi * (np.arange(rows) + 0.5) / rows
@@ -91,7 +96,7 @@ def write_mesh(path: Path, triangles: int) -> None:
 
 
 def _view(i: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(rotation world → camera, translation, direction to the light) of photo i."""
+    """Return (rotation world → camera, translation, direction to the light) of photo i."""
     turn = 2 * np.pi * i / count
     eye = np.array([np.cos(turn), np.sin(turn), 0.5 * np.cos(2 * turn)])
     eye *= DISTANCE / np.linalg.norm(eye)
@@ -113,8 +118,8 @@ def _photo(
     light: np.ndarray,
     seed: int,
 ) -> np.ndarray:
-    """(h, w, 3) float32: a matte body under a Blinn lobe, 1 % of noise; the ball without its
-    bumps but with their normals, the lens without its distortion but for the first term."""
+    """Render (h, w, 3) float32: matte body, Blinn lobe, 1 % noise. Bumps change only the
+    normals, and the lens has only the first distortion term."""
     eye, light = (-rotation.T @ translation).astype(np.float32), light.astype(np.float32)
     rng = np.random.default_rng(seed)
     out = np.zeros((height, width, 3), np.float32)
@@ -154,7 +159,7 @@ def _photo(
 
 
 def _quaternion(rotation: np.ndarray) -> np.ndarray:
-    """(w, x, y, z) of a rotation."""
+    """Return the quaternion (w, x, y, z) of a rotation."""
     from scipy.spatial.transform import Rotation
 
     return np.roll(Rotation.from_matrix(rotation).as_quat(), 1)

@@ -1,7 +1,7 @@
-"""How long Blender stands still: the longest tick of each operator that runs in steps, on the demo.
+"""Measure how long Blender blocks: the longest tick of each stepped operator, on the demo.
 
-A window's timer calls `modal` once a tick; so does this, with the operators' own code and without a
-window. Between ticks Blender is free to draw.
+In a window, a timer calls `modal` once per tick. This benchmark calls it in the same way, without a
+window. Between ticks Blender can redraw.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from types import SimpleNamespace
 import numpy as np
 
 OPERATORS = ("fit", "check", "refit", "propose_materials", "shadow_masks")
-"""Masks last: they change what is fitted."""
+"""Masks are last, because they change what is fitted."""
 MODULES = {"fit": "fit", "check": "check", "refit": "check"}
 PROPERTIES = {"count": 0, "replace": True}
 
 
 def run(data: Path) -> None:
-    """Print the table of docs/guide/sidebar.md. data: not looked at."""
+    """Print the table of docs/guide/sidebar.md. data: not used."""
     import bpy
 
     from .package import load_patina
@@ -40,7 +40,7 @@ def run(data: Path) -> None:
 
 
 def _row(name: str) -> str:
-    """One operator, from its press to its end."""
+    """Run one operator from its start to its end; return its row."""
     import importlib
 
     import bpy
@@ -49,21 +49,22 @@ def _row(name: str) -> str:
 
     module = importlib.import_module(f"patina.operators.{MODULES.get(name, 'masks')}")
     context, timer = bpy.context, SimpleNamespace(type="TIMER")
-    since = time.perf_counter()
+    press = time.perf_counter()
     operator = without_window(getattr(module, f"PATINA_OT_{name}"), **PROPERTIES)
-    begun = time.perf_counter() - since
-    going: list[float] = []
-    taking: list[float] = []
+    start_seconds = time.perf_counter() - press
+    job_ticks: list[float] = []
+    result_ticks: list[float] = []
     answer = {"RUNNING_MODAL"}
     while answer == {"RUNNING_MODAL"}:
         time.sleep(operator.TICK)
-        ticks = going if operator._taking is None else taking
-        moment = time.perf_counter()
+        ticks = job_ticks if operator._applying is None else result_ticks
+        tick_start = time.perf_counter()
         answer = operator.modal(context, timer)
-        ticks.append(time.perf_counter() - moment)
-    took = time.perf_counter() - since
-    half, most = np.quantile(going, (0.5, 0.99))
+        ticks.append(time.perf_counter() - tick_start)
+    total_seconds = time.perf_counter() - press
+    median, percentile_99 = np.quantile(job_ticks, (0.5, 0.99))
     return (
-        f"| {name} | {took:.1f} s | {begun:.3f} s | {half:.3f} s, {most:.3f} s, {max(going):.3f} s "
-        f"| {len(taking)}, {max(taking):.3f} s |"
+        f"| {name} | {total_seconds:.1f} s | {start_seconds:.3f} s | {median:.3f} s, "
+        f"{percentile_99:.3f} s, {max(job_ticks):.3f} s "
+        f"| {len(result_ticks)}, {max(result_ticks):.3f} s |"
     )

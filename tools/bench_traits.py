@@ -1,4 +1,4 @@
-"""What each slider of a measured material does: the table of docs/guide/traits.md, written anew."""
+"""Write the table of docs/guide/traits.md: the effect of each slider of a measured material."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ DOCUMENT = ROOT / "docs" / "guide" / "traits.md"
 
 
 def run(data: Path) -> None:
-    """Write the table into the document, and print what a change costs. data: not looked at."""
+    """Write the table to the document, and print the time of a change. data: not used."""
     import numpy as np
 
     from patina.core.appearance.osl_atlas import TRAITS
-    from patina.core.appearance.traits import Looked, Movable, MovableAlbedo
+    from patina.core.appearance.traits import ComponentLookup, ShiftableAlbedo, ShiftableBRDF
     from patina.core.basis import PrincipalBRDF
     from patina.core.views import display
     from patina.core.views.sphere import LitSphere
@@ -37,8 +37,8 @@ def run(data: Path) -> None:
     print(table(basis))
     brdf = PrincipalBRDF(basis, np.zeros((3, basis.count)))
     sphere = LitSphere.of(128)
-    parts = [Movable.of(brdf, Looked.of(basis, p.angles)) for p in sphere.parts]
-    albedo = MovableAlbedo.of(brdf)
+    parts = [ShiftableBRDF.of(brdf, ComponentLookup.of(basis, p.angles)) for p in sphere.parts]
+    albedo = ShiftableAlbedo.of(brdf)
     shifts = np.full((3, TRAITS), 0.5)
     for what, work in (
         ("sphere", lambda: display.srgb(sphere.picture([p.at(shifts) for p in parts])[0])),
@@ -49,11 +49,12 @@ def run(data: Path) -> None:
             start = time.perf_counter()
             work()
             taken.append(time.perf_counter() - start)
-        print(f"{what}: {1000 * float(np.median(taken)):.1f} ms a change")
+        print(f"{what}: {1000 * float(np.median(taken)):.1f} ms per change")
 
 
 def table(basis: Basis) -> str:
-    """Factors that each quantity of core/appearance/trait_words.py takes for one deviation."""
+    """Return a table of the factors of each quantity in core/appearance/trait_words.py, for one
+    standard deviation of each component."""
     import numpy as np
 
     from patina.core.appearance.trait_words import effects, words

@@ -1,9 +1,8 @@
-"""How soon a rendered viewport shows an edit of the measured material or of a lamp.
+"""Measure how soon a rendered viewport shows an edit of the measured material or of a lamp.
 
-A window cannot be had where bpy is a module; what a viewport does after an edit is what a render
-with persistent data does: it lets the extension's handlers run, syncs what changed, builds the
-shader anew, and traces a first sample. The viewport's first picture is a coarse one; its pixels are
-COARSE times as large.
+The bpy module has no windows. A render with persistent data does the same as a viewport after an
+edit: it calls the handlers of the extension, synchronises changes, compiles the shader and traces
+the first sample. The first picture of a viewport is coarse; its pixels are COARSE times as large.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 WIDTH, HEIGHT = 960, 540
-COARSE = 8  # times, per side
+COARSE = 8  # per side
 REPEATS = 7
 
 
@@ -36,7 +35,7 @@ def run(data: Path) -> None:
     scene = bpy.context.scene
     scene.render.resolution_y = HEIGHT
     scene.render.use_persistent_data = True
-    relight.light_by(scene, relight.shipped_worlds()["forest"])
+    relight.light_with(scene, relight.shipped_worlds()["forest"])
     lamp = cycles_sphere.sun(np.array([0.5, 0.3, 0.8]))
     files = osl_files.ensure_files(brdf)
     material = material_nodes.create_material(
@@ -81,20 +80,22 @@ def run(data: Path) -> None:
                     scene.render.resolution_percentage = percentage
                     bpy.ops.render.render()
                     drawn.append([_seconds(edit, k) for k in range(REPEATS)])
-                (told, first), (_, full) = np.median(drawn, axis=1)
-                print(f"| {name} | {told:.3f} s | {told + first:.2f} s | {told + full:.2f} s |")
+                (update, first), (_, full) = np.median(drawn, axis=1)
+                print(
+                    f"| {name} | {update:.3f} s | {update + first:.2f} s | {update + full:.2f} s |"
+                )
     finally:
         lamp_inputs.unregister()
         world_inputs.unregister()
 
 
 def _seconds(edit: Callable[[int], None], step: int) -> tuple[float, float]:
-    """(until Blender and its handlers know of the edit, until the picture is there)."""
+    """Return seconds of (depsgraph update and handlers, render) after an edit."""
     import bpy
 
-    since = time.perf_counter()
+    start = time.perf_counter()
     edit(step)
     bpy.context.view_layer.update()
-    told = time.perf_counter()
+    updated = time.perf_counter()
     bpy.ops.render.render()
-    return told - since, time.perf_counter() - told
+    return updated - start, time.perf_counter() - updated

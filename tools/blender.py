@@ -1,7 +1,7 @@
-"""A Blender that is on this machine already: found, questioned, and given the extension.
+"""Find an installed Blender, test whether it is suitable, and install the extension for it.
 
-The extension goes into a folder of ours in the cache. The user's own Blender, its add-ons and
-its preferences are neither read nor changed.
+The extension is installed into a separate user folder in the cache. The add-ons and preferences of
+the user's Blender are neither read nor changed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .staging import source_hash
 from .wheels import PYTHONS
 
 PACKAGE = "bl_ext.user_default.patina"
-OLDEST = (4, 2)
+OLDEST = (4, 2)  # Blender version with extensions
 MARK = "PATINA-PROBE "
 PROBE = f"""
 import bpy, json, sys
@@ -44,22 +44,22 @@ class Blender:
 
     @property
     def label(self) -> str:
-        """How the version is written."""
+        """The version as text."""
         return ".".join(map(str, self.version))
 
     @property
     def home(self) -> Path:
-        """The user folder in the cache that this Blender is given."""
+        """The user folder of this Blender in the cache."""
         return cache_dir() / f"blender-{self.version[0]}.{self.version[1]}-{self.python}"
 
     @property
     def extension_tool(self) -> ExtensionTool:
-        """Its `extension` command."""
+        """The `extension` command of this Blender."""
         return ExtensionTool((str(self.program), "--command", "extension"))
 
 
 def probe(program: str) -> Blender | str:
-    """Ask a Blender what it is; a str says why it will not do."""
+    """Run a Blender and return its version and Python, or the reason why it cannot be used."""
     try:
         done = subprocess.run(
             [program, "-b", "--factory-startup", "--python-expr", PROBE],
@@ -68,18 +68,18 @@ def probe(program: str) -> Blender | str:
             timeout=120,
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        return f"it does not run ({error})"
+        return f"it cannot be started ({error})"
     answers = [line for line in done.stdout.splitlines() if line.startswith(MARK)]
     if not answers:
-        last = (done.stderr.strip() or done.stdout.strip() or "it said nothing").splitlines()[-1]
-        return f"it does not answer ({last})"
+        last = (done.stderr.strip() or done.stdout.strip() or "no output").splitlines()[-1]
+        return f"it cannot run a script ({last})"
     version, python, numpy = json.loads(answers[0].removeprefix(MARK))
     tag = f"cp{python[0]}{python[1]}"
     label = ".".join(map(str, version))
     if tuple(version) < OLDEST:
-        return f"it is Blender {label}, and 4.2 or later is needed"
+        return f"found Blender {label}, expected 4.2 or later"
     if tag not in PYTHONS:
-        return f"its Python is {python[0]}.{python[1]}, and our libraries are for 3.11 and 3.13"
+        return f"its Python is {python[0]}.{python[1]}, expected 3.11 or 3.13"
     if numpy is None:
         return "its Python has no numpy (Debian: install python3-numpy)"
     return Blender(Path(program), (version[0], version[1], version[2]), tag)
@@ -88,7 +88,7 @@ def probe(program: str) -> Blender | str:
 def find_blender() -> Blender | None:
     """Return the Blender to use: PATINA_BLENDER, else one on PATH, else None.
 
-    PATINA_BLENDER=wheel asks for the bpy wheel although a Blender is there.
+    PATINA_BLENDER=wheel selects the bpy wheel even if a Blender is installed.
     """
     own = os.environ.get("PATINA_BLENDER")
     if own == "wheel":
@@ -106,27 +106,27 @@ def find_blender() -> Blender | None:
 
 
 def private(home: Path) -> dict[str, str]:
-    """Return an environment in which Blender knows no user folder but this one."""
+    """Return environment variables with which Blender uses only this user folder."""
     env = {key: value for key, value in os.environ.items() if not key.startswith("BLENDER_USER_")}
     env["BLENDER_USER_RESOURCES"] = str(home)
     return env
 
 
 def install(blender: Blender, archive: Path, home: Path) -> None:
-    """Install a zip and enable it, as a user would, into the given user folder."""
+    """Install and enable a zip in the given user folder. Raises Failure."""
     home.mkdir(parents=True, exist_ok=True)
     command = [
         blender.program, "--command", "extension", "install-file",
         "--repo", "user_default", "--enable", archive,
     ]  # fmt: skip
-    told = quietly(command, f"installing {archive.name}", env=private(home))
+    output = quietly(command, f"installing {archive.name}", env=private(home))
     inside = list(home.glob("extensions/user_default/patina/blender_manifest.toml"))
-    if not inside:  # Blender's exit code is 0 even where it refuses a zip
-        raise Failure(f"Blender did not install {archive.name}:\n{told.strip()}", 1)
+    if not inside:  # Blender's exit code is 0 even if it rejects a zip
+        raise Failure(f"Blender did not install {archive.name}:\n{output.strip()}", 1)
 
 
 def prepare(blender: Blender) -> Path:
-    """Return the private user folder with the extension as it is in this checkout."""
+    """Install the extension of this checkout if it changed, and return its user folder."""
     stamp = blender.home / "patina-sources.txt"
     with one_at_a_time(blender.home.name):
         wanted = source_hash(blender.label, str(ROOT))
@@ -154,7 +154,7 @@ def run_script(blender: Blender, home: Path, script: Path, arguments: Sequence[s
 
 @contextlib.contextmanager
 def scratch_home() -> Iterator[Path]:
-    """Make an empty user folder and remove it afterwards."""
+    """Create an empty user folder and remove it afterwards."""
     home = cache_dir() / f"home-{os.getpid()}"
     shutil.rmtree(home, ignore_errors=True)
     try:

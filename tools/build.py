@@ -1,4 +1,4 @@
-"""`run.py build`: the zips that are given away."""
+"""`run.py build`: build the zips of the extension."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ DIST = ROOT / "dist"
 
 
 def extension_tool() -> ExtensionTool:
-    """Return the Blender at hand's tool, or the copy of it that lies in the bpy wheel."""
+    """Return the extension tool of an installed Blender, or its copy in the bpy wheel."""
     if blender := find_blender():
         return blender.extension_tool
     python = bpy_python()
@@ -25,19 +25,24 @@ def extension_tool() -> ExtensionTool:
         tags = folder / "modules/_bpy_internal/extensions/tags.py"
         if script.exists() and tags.exists():
             return ExtensionTool((str(python), str(script)), tags)
-    raise Failure("this bpy wheel has no extension tool", 1)
+    raise Failure("found no extension tool in the bpy wheel", 1)
 
 
 def main(arguments: Sequence[str]) -> int:
-    """`run.py build`: every platform's zip, or one."""
+    """`run.py build`: build the zips of all or of the given platforms."""
     parser = argparse.ArgumentParser(prog="run.py build", description=__doc__)
-    parser.add_argument("--platform", choices=PLATFORMS, action="append", help="default: all")
     parser.add_argument(
-        "--raw", action="store_true", help="with camera RAW (rawpy); the zips go to dist/raw"
+        "--platform",
+        choices=PLATFORMS,
+        action="append",
+        help="platform to build for; can be repeated (default: all)",
     )
-    told = parser.parse_args(arguments)
-    asked, out = told.platform or PLATFORMS, DIST / "raw" if told.raw else DIST
-    for archive in pack(extension_tool(), asked, PYTHONS, out, told.raw):
+    parser.add_argument(
+        "--raw", action="store_true", help="include camera RAW support (rawpy); write to dist/raw"
+    )
+    options = parser.parse_args(arguments)
+    platforms, out = options.platform or PLATFORMS, DIST / "raw" if options.raw else DIST
+    for archive in pack(extension_tool(), platforms, PYTHONS, out, options.raw):
         say(f"{archive.name}: {megabytes([archive])}, validated")
         print(archive)
     return 0

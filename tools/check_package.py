@@ -1,10 +1,10 @@
-"""The Python package as its users get it: `pip install .` into empty environments, without bpy.
+"""Check the Python package after `pip install .` into empty environments, without bpy.
 
     python3 -m tools.check_package
 
-For Python 3.11 and 3.13, as far as they are found here, the package is installed from a copy of the
-checkout and used from an empty folder: the command line on a scan, mistakes of the user's, and once
-the examples of the API and of the tutorial. The last line counts the checks as pytest does.
+For each installed Python 3.11 and 3.13, the package is installed from a copy of the checkout and
+used in an empty folder: the command line on a scan, wrong input, and (for the newest Python) the
+examples of the API and of the tutorial. The last line counts the checks as pytest does.
 """
 
 from __future__ import annotations
@@ -37,33 +37,33 @@ BLOCK = re.compile(r"^```python\n(.*?)^```$", re.M | re.S)
 
 @dataclass
 class Report:
-    """What was checked, across all Pythons."""
+    """Results of the checks of all Pythons."""
 
     passed: list[str] = field(default_factory=list)
     failed: list[str] = field(default_factory=list)
     skipped: list[str] = field(default_factory=list)
 
     def check(self, what: str, holds: bool, detail: str = "") -> None:
-        """Count one check; a failure is printed with its detail."""
+        """Count one check; print a failure with its details."""
         (self.passed if holds else self.failed).append(what)
         if not holds:
             print(f"FAILED {what}\n{detail}", flush=True)
 
     def skip(self, what: str) -> None:
-        """Count what cannot be checked here."""
+        """Count and print a check that is not possible on this machine."""
         self.skipped.append(what)
         print(f"SKIPPED {what}", flush=True)
 
     @property
     def last_line(self) -> str:
-        """Counts, as pytest prints them."""
+        """The counts in the format of pytest."""
         counts = {"failed": self.failed, "passed": self.passed, "skipped": self.skipped}
         words = [f"{len(some)} {name}" for name, some in counts.items() if some]
         return ", ".join(words) or "nothing checked"
 
 
 def find_pythons() -> dict[tuple[int, int], Interpreter]:
-    """Return an interpreter of each version that is here, also those of pyenv."""
+    """Return an interpreter of each installed version, including those of pyenv."""
     versions = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
     names = [*candidates(), *map(str, sorted(versions.glob("3.1[13].*/bin/python")))]
     found: dict[tuple[int, int], Interpreter] = {}
@@ -76,7 +76,7 @@ def find_pythons() -> dict[tuple[int, int], Interpreter]:
 
 @contextmanager
 def clean_copy() -> Iterator[Path]:
-    """A copy of the checkout's own files, so that building leaves nothing behind in it."""
+    """Yield a copy of the files of the checkout, so that building does not change the checkout."""
     listed = subprocess.run(
         ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
         cwd=ROOT, capture_output=True, text=True, check=True,
@@ -91,17 +91,17 @@ def clean_copy() -> Iterator[Path]:
 
 
 def scan_to_fit(report: Report) -> Path:
-    """The capture of the reference data, or the demo where that is not here."""
+    """Return the capture of the reference data, or the demo without reference data."""
     scan = Path(os.environ.get("PATINA_SHARED", ROOT.parent / "shared")) / SCAN
     if scan.is_file():
         return scan
-    report.skip(f"a fit of {SCAN.parent.name}: no reference data here; the demo is fitted instead")
+    report.skip(f"a fit of {SCAN.parent.name}: no reference data; the demo is fitted instead")
     return DEMO
 
 
 @dataclass(frozen=True)
 class Installed:
-    """An environment that the package was installed into, and an empty folder to work in."""
+    """An environment with the installed package, and an empty working folder."""
 
     label: str
     python: Path
@@ -109,7 +109,7 @@ class Installed:
     report: Report
 
     def run(self, *words: str | Path) -> subprocess.CompletedProcess[str]:
-        """Run the environment's Python; the checkout is not on its path."""
+        """Run the Python of the environment, without the checkout on its path."""
         env = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
         return subprocess.run(
             [str(self.python), *map(str, words)],
@@ -132,7 +132,7 @@ class Installed:
 
 
 def check_import(installed: Installed) -> None:
-    """The package imports alone, says its version and holds no code that needs bpy or a scene."""
+    """The package can be imported, has the right version and contains no code that needs bpy."""
     code = (
         "import importlib.util as u, json, sys, patina; early = sorted(sys.modules); "
         "patina.fit; print(json.dumps([patina.__version__, u.find_spec('bpy') is None, "
@@ -146,14 +146,14 @@ def check_import(installed: Installed) -> None:
     version, no_bpy, numpy_early, file, foreign = json.loads(done.stdout)
     manifest = (ROOT / "blender_manifest.toml").read_text("utf-8")
     installed.check("the manifest's version", done, f'\nversion = "{version}"\n' in manifest)
-    installed.check("no bpy there", done, no_bpy)
+    installed.check("no bpy in the environment", done, no_bpy)
     installed.check("import patina loads no numpy", done, not numpy_early)
     installed.check("imported from the environment", done, str(installed.python.parents[1]) in file)
-    installed.check("nothing for Blender or developers inside", done, foreign == [])
+    installed.check("no modules for Blender or developers", done, foreign == [])
 
 
 def check_fit(installed: Installed, capture: Path) -> None:
-    """`patina fit` leaves all but scene.blend, and its result goes on to other commands."""
+    """`patina fit` writes all files but scene.blend, and other commands can read its result."""
     done = installed.command("fit", capture, "--out", "fitted")
     installed.check("patina fit", done, done.returncode == 0)
     if done.returncode:
@@ -164,10 +164,10 @@ def check_fit(installed: Installed, capture: Path) -> None:
     names = {path.name for path in out.iterdir()}
     installed.check("the files of a fit", done, names == {"result.json", "report", *tables})
     installed.check("the report", done, (out / "report" / "index.html").is_file())
-    said = [line for line in done.stdout.splitlines() if "Blender" in line]
-    installed.check("one line about scene.blend", done, len(said) == 1)
-    held = [material["held_out"]["typical"] for material in result["materials"]]
-    installed.check("held-out photos are predicted", done, max(held) < 0.2)
+    blender_lines = [line for line in done.stdout.splitlines() if "Blender" in line]
+    installed.check("one line about scene.blend", done, len(blender_lines) == 1)
+    errors = [material["held_out"]["typical"] for material in result["materials"]]
+    installed.check("held-out photos are predicted", done, max(errors) < 0.2)
     formats = ("mitsuba", "pbrt", "binary", "exr", "npz")  # mtlx takes a minute: tests/core
     done = installed.command("material", "fitted", "--to", *formats, "--out", "exported")
     installed.check("patina material", done, done.returncode == 0)
@@ -184,7 +184,7 @@ def check_fit(installed: Installed, capture: Path) -> None:
 
 
 def check_mistakes(installed: Installed) -> None:
-    """What is wrong, and what needs Blender, is one line and exit code 2."""
+    """Wrong input, and commands that need Blender, give one line and exit code 2."""
     for words in (
         ("fit", "missing.toml", "--out", "nothing"),
         ("fit", "missing.toml"),
@@ -201,13 +201,13 @@ def check_mistakes(installed: Installed) -> None:
         if words[0] in ("import", "render", "material"):
             installed.check(f"`{what}` names Blender", done, "blender -b" in done.stderr)
     installed.report.check(
-        f"Python {installed.label}: mistakes leave nothing",
+        f"Python {installed.label}: wrong input writes no files",
         not (installed.folder / "nothing").exists(),
     )
 
 
 def check_doctests(installed: Installed) -> None:
-    """The examples in the docstrings of api.py."""
+    """The doctests of api.py run without errors."""
     code = (
         "import doctest, sys, patina.api; found = doctest.testmod(patina.api); "
         "print(found); sys.exit(found.failed > 0 or found.attempted < 10)"
@@ -228,12 +228,14 @@ def check_documents(installed: Installed) -> None:
     installed.check("the tutorial docs/guide/python.md", done, enough)
 
 
-def install(interpreter: Interpreter, source: Path, room: Path, report: Report) -> Installed | None:
-    """Make an empty environment and install the package into it."""
+def install(
+    interpreter: Interpreter, source: Path, workspace: Path, report: Report
+) -> Installed | None:
+    """Create an environment and install the package; None if that fails."""
     label = ".".join(map(str, interpreter.version))
-    venv, folder = room / f"venv-{label}", room / f"work-{label}"
+    venv, folder = workspace / f"venv-{label}", workspace / f"work-{label}"
     folder.mkdir()
-    copy = room / f"source-{label}"  # two builds in one folder would meet
+    copy = workspace / f"source-{label}"  # builds in one folder would interfere
     shutil.copytree(source, copy)
     for words in (
         [interpreter.program, "-m", "venv", venv],
@@ -252,13 +254,13 @@ def install(interpreter: Interpreter, source: Path, room: Path, report: Report) 
 def check_one(
     interpreter: Interpreter,
     source: Path,
-    room: Path,
+    workspace: Path,
     report: Report,
     capture: Path,
     examples: Sequence[Callable[[Installed], None]],
 ) -> None:
-    """All checks with one Python, and some of the examples."""
-    installed = install(interpreter, source, room, report)
+    """Run all checks with one Python, and some of the examples."""
+    installed = install(interpreter, source, workspace, report)
     if installed is None:
         return
     check_import(installed)
@@ -269,13 +271,13 @@ def check_one(
 
 
 def main() -> int:
-    """Check every Python that is here; 1 where anything failed or none was found."""
+    """Check every installed Python; return 1 if a check failed or no Python was found."""
     start, report = time.monotonic(), Report()
     found = find_pythons()
     for version in PYTHONS:
         if version not in found:
-            report.skip(f"Python {version[0]}.{version[1]}: not found here")
-    report.check("a Python 3.11 or 3.13 is here", bool(found))
+            report.skip(f"Python {version[0]}.{version[1]}: not found")
+    report.check("a Python 3.11 or 3.13 is installed", bool(found))
     capture = scan_to_fit(report)
     oldest, newest = min(found, default=None), max(found, default=None)
     examples = {version: list[Callable[[Installed], None]]() for version in found}
@@ -284,11 +286,11 @@ def main() -> int:
         examples[oldest].append(check_documents)
     with (
         clean_copy() as source,
-        tempfile.TemporaryDirectory(prefix="patina-package-") as room,
+        tempfile.TemporaryDirectory(prefix="patina-package-") as workspace,
         ThreadPoolExecutor(2) as pool,
     ):
         running = [
-            pool.submit(check_one, one, source, Path(room), report, capture, examples[version])
+            pool.submit(check_one, one, source, Path(workspace), report, capture, examples[version])
             for version, one in found.items()
         ]
         for one in running:

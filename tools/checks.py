@@ -1,4 +1,4 @@
-"""`run.py test`: everything that must hold before a change is good."""
+"""`run.py test`: run the linter, the type checker and the tests."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def lint(python: Path) -> int:
 def types(python: Path) -> int:
     """Run mypy over core and the Python API.
 
-    Its imports are relative, so it is a package only under a parent; the checkout may have any
-    name, so mypy is shown it as `patina` through a link in an empty folder.
+    The imports are relative, so that core needs a parent package. The folder of the checkout can
+    have any name; mypy therefore sees it as `patina`, a link in a temporary folder.
     """
     with tempfile.TemporaryDirectory(dir=cache_dir(), prefix="mypy-") as folder:
         seen = Path(folder) / "patina"
         try:
             seen.symlink_to(ROOT, target_is_directory=True)
-        except OSError:  # Windows without the right to make links
+        except OSError:  # Windows without the permission to create links
             for room in ("core", "commands"):
                 shutil.copytree(ROOT / room, seen / room)
             for file in ("__init__.py", "api.py"):
@@ -48,7 +48,7 @@ def types(python: Path) -> int:
 
 
 def python_tests(python: Path, arguments: Sequence[str]) -> int:
-    """Run pytest; without arguments of the user's on the folders named in pyproject.toml."""
+    """Run pytest on the given paths, or else on tests/core, tests/wheel and tests/hunt."""
     folders = [
         path
         for path in (ROOT / "tests/core", ROOT / "tests/wheel", ROOT / "tests/hunt")
@@ -64,10 +64,12 @@ def python_tests(python: Path, arguments: Sequence[str]) -> int:
 
 
 def blender_tests() -> int:
-    """Build this platform's zip, install it into an empty Blender, run tests/blender there."""
+    """Build the zip of this platform, install it in an empty user folder, run tests/blender."""
     blender = find_blender()
     if blender is None:
-        raise Failure("--blender needs a Blender >= 4.2 on PATH or in PATINA_BLENDER")
+        raise Failure(
+            "found no Blender; --blender requires Blender >= 4.2 on PATH or in PATINA_BLENDER"
+        )
     archive = pack(blender.extension_tool, [this_platform()], PYTHONS, DIST)[0]
     with scratch_home() as home:
         install(blender, archive, home)
@@ -76,17 +78,19 @@ def blender_tests() -> int:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run the stages one after the other; every one is run, and any failure is the result."""
+    """Run all stages, even after a failure; return 1 if any of them failed."""
     parser = argparse.ArgumentParser(
-        prog="run.py test", description=__doc__, epilog="Everything else is handed to pytest."
+        prog="run.py test", description=__doc__, epilog="All other arguments are passed to pytest."
     )
     parser.add_argument(
-        "--blender", action="store_true", help="also test this platform's zip in a real Blender"
+        "--blender",
+        action="store_true",
+        help="also test the zip of this platform in a real Blender",
     )
-    parser.add_argument("--only-blender", action="store_true", help="nothing but that")
-    asked, rest = parser.parse_known_args(arguments)
+    parser.add_argument("--only-blender", action="store_true", help="run only the tests in Blender")
+    options, rest = parser.parse_known_args(arguments)
     stages: list[tuple[str, Callable[[], int]]] = []
-    if not asked.only_blender:
+    if not options.only_blender:
         python = test_python()
         stages = [
             ("ruff", lambda: lint(python)),
@@ -94,16 +98,16 @@ def main(arguments: Sequence[str]) -> int:
             ("imports", lambda: check_imports(python)),
             ("pytest", lambda: python_tests(python, rest)),
         ]
-    if asked.blender or asked.only_blender:
+    if options.blender or options.only_blender:
         stages.append(("blender", blender_tests))
-    refused = []
+    failed = []
     for name, stage in stages:
         start = time.monotonic()
         code = stage()
-        told = "fine" if code == 0 else f"NOT fine (exit code {code})"
-        say(f"{name}: {told}, {time.monotonic() - start:.1f} s")
+        outcome = "passed" if code == 0 else f"FAILED (exit code {code})"
+        say(f"{name}: {outcome}, {time.monotonic() - start:.1f} s")
         if code:
-            refused.append(name)
-    if refused:
-        say(f"not fine: {', '.join(refused)}")
-    return 1 if refused else 0
+            failed.append(name)
+    if failed:
+        say(f"failed: {', '.join(failed)}")
+    return 1 if failed else 0

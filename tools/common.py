@@ -1,4 +1,4 @@
-"""Where things lie, how progress is told, and how a step that fails says so."""
+"""Folders, progress messages, subprocesses and the error class of the development tools."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-"""The checkout, which is also the extension."""
+"""Root folder of the checkout, which is also the extension."""
 
 
 class Failure(Exception):
-    """Something the user should read in one line; `code` is the exit code."""
+    """An error that is printed as one line; `code` is the exit code."""
 
     def __init__(self, message: str, code: int = 2) -> None:
         super().__init__(message)
@@ -23,12 +23,12 @@ class Failure(Exception):
 
 
 def say(message: str) -> None:
-    """Tell one line of progress, on stderr: stdout belongs to the command that is run."""
+    """Print one line of progress on stderr; stdout is for the output of the command."""
     print(f"patina: {message}", file=sys.stderr, flush=True)
 
 
 def cache_dir() -> Path:
-    """Return the folder for everything we download or set up; it may be deleted at any time."""
+    """Return the folder for downloads and environments; it may be deleted at any time."""
     if own := os.environ.get("PATINA_CACHE"):
         folder = Path(own).expanduser().resolve()
     elif sys.platform == "win32":
@@ -42,7 +42,7 @@ def cache_dir() -> Path:
 
 
 def this_platform() -> str:
-    """Return this machine's platform in Blender's words; a Failure where we have no wheels."""
+    """Return the platform as Blender names it. Raises Failure if there are no wheels for it."""
     machine = platform.machine().lower()
     system = {"linux": "linux", "win32": "windows", "darwin": "macos"}.get(
         sys.platform, sys.platform
@@ -50,15 +50,15 @@ def this_platform() -> str:
     name = f"{system}-{'x64' if machine in ('x86_64', 'amd64') else machine}"
     if name not in ("linux-x64", "windows-x64", "macos-arm64"):
         raise Failure(
-            f"no libraries for {name}: Patina runs on linux-x64, windows-x64 and macos-arm64"
+            f"found the platform {name}; Patina runs on linux-x64, windows-x64 and macos-arm64"
         )
     return name
 
 
 def call(command: Sequence[str | Path], *, env: Mapping[str, str] | None = None) -> int:
-    """Run a command on the user's terminal and return its exit code.
+    """Run a command in the user's terminal and return its exit code.
 
-    Ctrl-C reaches the command too: it is given a moment to tidy up, then ended.
+    Ctrl-C reaches the command too; it has 5 seconds to clean up before it is killed.
     """
     process = subprocess.Popen([str(word) for word in command], env=env and dict(env))
     try:
@@ -71,34 +71,37 @@ def call(command: Sequence[str | Path], *, env: Mapping[str, str] | None = None)
         if process.poll() is None:
             process.kill()
             process.wait()
-    return code if code >= 0 else 128 - code  # ended by a signal, as a shell says it
+    return code if code >= 0 else 128 - code  # ended by a signal: the exit code of a shell
 
 
 def quietly(
     command: Sequence[str | Path], what: str, *, env: Mapping[str, str] | None = None
 ) -> str:
-    """Run a command out of sight and return its stdout; if it fails, show its end and say what."""
+    """Run a command without output and return its stdout.
+
+    If it fails, print the end of its output and raise Failure; what: subject of the message.
+    """
     done = subprocess.run(
         [str(word) for word in command], env=env and dict(env), capture_output=True, text=True
     )
     if done.returncode:
         lines = (done.stdout + done.stderr).strip().splitlines()
-        told = [line for line in lines if not line.startswith("WARNING: Location ")]
-        print("\n".join(told[-15:]), file=sys.stderr)
+        shown = [line for line in lines if not line.startswith("WARNING: Location ")]
+        print("\n".join(shown[-15:]), file=sys.stderr)
         raise Failure(f"{what} failed (exit code {done.returncode}, see above)", 1)
     return done.stdout
 
 
 def megabytes(paths: Sequence[Path]) -> str:
-    """Return the size of some files as people say it."""
+    """Return the total size of files as text, in MB."""
     return f"{sum(path.stat().st_size for path in paths) / 1e6:.0f} MB"
 
 
 @contextlib.contextmanager
 def one_at_a_time(name: str) -> Iterator[None]:
-    """Hold a lock in the cache, so that two runs do not set up the same folder together.
+    """Hold a lock in the cache, so that two processes do not set up the same folder.
 
-    The operating system drops it when the process ends, however it ends.
+    The operating system releases it when the process ends for any reason.
     """
     with (cache_dir() / f"{name}.lock").open("a+b") as handle:
         if sys.platform == "win32":

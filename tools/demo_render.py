@@ -1,4 +1,4 @@
-"""The demo capture's renders: Cycles under one distant lamp, direct light and cast shadows only."""
+"""Renders of the demo capture: Cycles with one distant lamp, direct light and cast shadows only."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ CLAY = {
     "Diffuse Roughness": 0.6,
     "Specular IOR Level": 0.25,
 }
-"""The two materials, as inputs of Blender's Principled BSDF (GGX); the rest are its defaults."""
+"""The two materials: inputs of Blender's Principled BSDF (GGX), others at their defaults."""
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole in COLMAP's terms: x right, y down, z forward, pixel centres at +0.5.
+    """A pinhole camera as in COLMAP: x right, y down, z forward, pixel centres at +0.5.
 
     `rotation` (3, 3) and `translation` (3,) take the scan's frame to the camera's; `focal` and
     `centre` (2,) are in pixels, `size` is (width, height).
@@ -49,12 +49,12 @@ class Camera:
 
     @property
     def position(self) -> Array:
-        """The centre of projection in the scan's frame."""
+        """The centre of projection in the frame of the scan."""
         return -self.rotation.T @ self.translation
 
     @property
     def to_world(self) -> Array:
-        """(4, 4) from Blender's camera (x right, y up, looking down −z) to the scan's frame."""
+        """(4, 4) from Blender's camera (x right, y up, view along −z) to the frame of the scan."""
         pose = np.eye(4)
         pose[:3, :3] = self.rotation.T @ np.diag([1.0, -1.0, -1.0])
         pose[:3, 3] = self.position
@@ -62,12 +62,12 @@ class Camera:
 
     def project(self, points: Array) -> Array:
         """Return pixel coordinates (n, 2) of points (n, 3)."""
-        seen = points @ self.rotation.T + self.translation
-        return self.focal * seen[:, :2] / seen[:, 2:] + np.array(self.centre)
+        in_camera = points @ self.rotation.T + self.translation
+        return self.focal * in_camera[:, :2] / in_camera[:, 2:] + np.array(self.centre)
 
 
 def decimated(surface: Surface, faces: int) -> Surface:
-    """Return a mesh with about that many triangles, small where it bends (Blender's collapse)."""
+    """Return a mesh with about that many triangles, smaller at high curvature (Decimate)."""
     mesh = bpy.data.meshes.new("decimated")
     mesh.from_pydata(surface.points.tolist(), [], surface.triangles.tolist())
     thing = bpy.data.objects.new("decimated", mesh)
@@ -85,18 +85,18 @@ def decimated(surface: Surface, faces: int) -> Surface:
 
 
 class Occluder:
-    """A mesh that rays may hit."""
+    """A mesh for ray casts."""
 
     def __init__(self, surface: Surface) -> None:
         self.tree = BVHTree.FromPolygons(surface.points.tolist(), surface.triangles.tolist())
 
     def free(self, start: Array, direction: Array) -> bool:
-        """Return whether a ray meets nothing."""
+        """Return whether a ray hits nothing."""
         return self.tree.ray_cast(Vector(start), Vector(direction))[0] is None
 
 
 class Studio:
-    """A Cycles scene with one object in it; it photographs."""
+    """A Cycles scene with one object, to render photos of it."""
 
     def __init__(self, samples: int = 128) -> None:
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -126,7 +126,7 @@ class Studio:
         self.body: bpy.types.Object | None = None
 
     def show(self, surface: Surface, glazed: Array) -> None:
-        """Put a mesh before the camera, instead of what was there; `glazed` is per point."""
+        """Replace the object by a mesh; `glazed` (v,) is per point."""
         if self.body is not None:
             bpy.data.objects.remove(self.body)
         mesh = bpy.data.meshes.new("body")
@@ -139,18 +139,18 @@ class Studio:
         self.scene.collection.objects.link(self.body)
 
     def dress(self, material: bpy.types.Material) -> None:
-        """Give the object a material."""
+        """Assign a material to the object."""
         self.body.data.materials.clear()
         self.body.data.materials.append(material)
 
     def light(self, direction: Array, irradiance: float) -> None:
-        """Let the sun shine from `direction` (surface → light)."""
+        """Set the direction (surface → light) and irradiance of the sun."""
         self.lamp.data.energy = irradiance
         self.lamp.rotation_mode = "QUATERNION"
         self.lamp.rotation_quaternion = Vector(direction).to_track_quat("Z", "Y")
 
     def photograph(self, camera: Camera) -> Array:
-        """Return linear RGBA (height, width, 4), row 0 on top, alpha the object's coverage."""
+        """Render linear RGBA (height, width, 4), row 0 on top; alpha: coverage by the object."""
         width, height = camera.size
         lens, render = self.lens.data, self.scene.render
         lens.sensor_fit, lens.sensor_width = "HORIZONTAL", 36.0
@@ -204,13 +204,13 @@ def pottery() -> bpy.types.Material:
 
 
 def identity() -> bpy.types.Material:
-    """Return a material whose red is the glaze's coverage of a pixel and green the clay's."""
+    """Return a material with the coverage by glaze in red and by clay in green."""
     kind = "ShaderNodeEmission"
     return _split("identity", ((kind, {"Color": (0.0, 1.0, 0.0)}), (kind, {"Color": (1.0, 0, 0)})))
 
 
 def lambertian() -> bpy.types.Material:
-    """Return a white Lambertian surface, for the check of the irradiance's convention."""
+    """Return a white Lambertian material, for the check of the irradiance."""
     white = ("ShaderNodeBsdfDiffuse", {"Color": (1.0, 1.0, 1.0), "Roughness": 0.0})
     return _split("white", (white, white))
 

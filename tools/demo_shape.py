@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 Field = Callable[[Array], Array]
 
 LOW, HIGH = np.array([-0.50, -0.42, -0.03]), np.array([0.50, 0.42, 1.03])
-"""The box that holds the object."""
+"""Bounding box of the object."""
 
 PROFILE = (
     (0.000, 0.208), (0.036, 0.212), (0.046, 0.206), (0.058, 0.190), (0.075, 0.187),
@@ -39,7 +39,7 @@ RUNS = (
     (0.35, 0.052, 0.15), (1.28, 0.030, 0.11), (2.15, 0.060, 0.17), (2.75, 0.026, 0.10),
     (3.70, 0.046, 0.13), (4.45, 0.064, 0.16), (5.05, 0.028, 0.10), (5.75, 0.040, 0.14),
 )  # fmt: skip
-"""Runs of glaze over the clay: where (radians around), how long, how wide."""
+"""Runs of glaze over the clay: azimuth (radians), length, width."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def blend(a: Array, b: Array, width: float) -> Array:
 
 
 def ellipsoid(p: Array, centre: tuple, radii: tuple, pitch: float = 0.0) -> Array:
-    """Return about the distance to an ellipsoid, turned by `pitch` degrees nose-up (along +x)."""
+    """Return the approximate distance to an ellipsoid, rotated by `pitch` degrees (+x upwards)."""
     c, s = np.cos(np.radians(pitch)), np.sin(np.radians(pitch))
     q = (p - np.array(centre)) @ np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
     r = np.array(radii)
@@ -93,7 +93,7 @@ def _densely(line: Array, step: float) -> Array:
 
 
 class Turned:
-    """The solid of revolution: a signed distance on an (r, z) grid, its creases rounded off."""
+    """The solid of revolution: a signed distance on an (r, z) grid, with rounded creases."""
 
     step = 0.0015
 
@@ -113,7 +113,9 @@ class Turned:
         outline = _densely(np.stack([radius, z], -1)[radius >= 0], self.step / 10)
         at = np.stack(np.meshgrid(r, z, indexing="ij"), -1)
         distance = cKDTree(outline).query(at)[0] * np.where(r[:, None] <= radius, -1.0, 1.0)
-        mirrored = np.concatenate([distance[:0:-1], distance])  # so that the axis is no border
+        mirrored = np.concatenate(
+            [distance[:0:-1], distance]
+        )  # so that the axis is not a border of the grid
         rounded = gaussian_filter(mirrored, rounding / self.step)[len(r) - 1 :]
         self.spline = spline_filter(rounded, mode="mirror")
         self.start = z[0]
@@ -124,7 +126,7 @@ class Turned:
 
 
 def glaze_depth(p: Array) -> Array:
-    """Return how far above the glaze's lower edge a point lies; below 0 the clay is bare.
+    """Return the height of a point above the lower edge of the glaze; bare clay below 0.
 
     The edge waves and has runs of glaze in irregular places, as on a dipped pot.
     """
@@ -137,7 +139,10 @@ def glaze_depth(p: Array) -> Array:
 
 
 def make_field() -> Field:
-    """Return the object's signed distance (about; exact on the surface), points (..., 3)."""
+    """Return the signed distance function of the object for points (..., 3).
+
+    The distance is approximate away from the surface.
+    """
     turned = Turned()
 
     def field(p: Array) -> Array:
@@ -169,13 +174,13 @@ def make_field() -> Field:
 
 
 def gradient(field: Field, p: Array, step: float = 5e-4) -> Array:
-    """Return the field's gradient by central differences, (n, 3)."""
+    """Return the gradient (n, 3) of the field by central differences."""
     offsets = np.eye(3) * step
     return np.stack([field(p + o) - field(p - o) for o in offsets], axis=-1) / (2 * step)
 
 
 def mesh_of(field: Field, cell: float) -> Surface:
-    """Return the zero surface by surface nets on a grid, drawn onto the field by Newton steps."""
+    """Return the zero surface: surface nets on a grid, then Newton steps onto the surface."""
     axes = [np.arange(low, high + cell, cell) for low, high in zip(LOW, HIGH, strict=True)]
     shape = tuple(len(axis) for axis in axes)
     values = np.empty(shape)
@@ -209,7 +214,7 @@ def mesh_of(field: Field, cell: float) -> Surface:
         quads.append(quad)
     quad = np.concatenate(quads)
 
-    for _ in range(12):  # even out along the surface, then back onto it
+    for _ in range(12):  # smooth along the surface, then project back onto it
         total, degree = np.zeros_like(points), np.zeros(len(points))
         for a, b in ((0, 1), (1, 2), (2, 3), (3, 0)):
             for i, j in ((quad[:, a], quad[:, b]), (quad[:, b], quad[:, a])):

@@ -1,4 +1,4 @@
-"""MkDocs hook: the JSON Schemas of assets/schemas appear in the site as reference/schemas/NAME."""
+"""MkDocs hook: publish the JSON Schemas of assets/schemas as reference/schemas/NAME."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SCHEMAS = Path(__file__).parents[1] / "assets" / "schemas"
 
 
 def on_files(files: Any, config: Any) -> Any:
-    """Add every schema to the files of the site; pages link to schemas/NAME.schema.json."""
+    """Add all schemas to the files of the site; pages link to schemas/NAME.schema.json."""
     for schema in sorted(SCHEMAS.glob("*.schema.json")):
         name = f"reference/schemas/{schema.name}"
         files.append(File.generated(config, name, abs_src_path=str(schema)))

@@ -1,4 +1,4 @@
-"""A Python of our own with bpy in it: Blender as a module, for machines without Blender."""
+"""Create a Python environment with bpy (Blender as a module), for machines without Blender."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from .common import Failure, cache_dir, one_at_a_time, quietly, say, this_platfo
 from .wheels import requirements
 
 BPY = {(3, 11): "5.0.1", (3, 13): "5.2.3"}
-"""Python version → the bpy wheel made for it (each wheel works with one Python only)."""
+"""Python version → version of bpy (each wheel supports one Python version only)."""
 
 TEST_TOOLS = [
     "pytest==8.4.2",
     "hypothesis==6.140.3",
-    "rawpy==0.28.0",  # camera RAW is optional: the zips do not carry it
-    "trimesh==5.2.0",  # writes meshes that are not ours
-    "usd-core==26.11",  # these three judge what is exported
+    "rawpy==0.28.0",  # camera RAW is optional and not part of the zips
+    "trimesh==5.2.0",  # writes meshes independently of Patina
+    "usd-core==26.11",  # these three validate exported files
     "MaterialX==1.39.5",
     "mitsuba==3.9.1",
     "ruff==0.13.3",
     "mypy==1.18.2",
     "import-linter==2.17",
-    "jsonschema==4.25.1",  # validates what is written against assets/schemas
+    "jsonschema==4.25.1",  # validates written files against assets/schemas
 ]
 
 PROBE = """
@@ -39,27 +39,27 @@ print(json.dumps([sys.executable, list(sys.version_info[:2]), sys.maxsize > 2**3
 
 @dataclass(frozen=True)
 class Interpreter:
-    """A Python that can carry bpy: its program and its (major, minor) version."""
+    """A Python for which there is a bpy wheel: its program and (major, minor) version."""
 
     program: Path
     version: tuple[int, int]
 
 
 def probe(program: str | Path) -> Interpreter | str:
-    """Ask a Python what it is; a str says why it will not do.
+    """Run a Python and return its version, or the reason why it cannot be used.
 
-    A name on PATH proves nothing (pyenv puts shims there for versions that are not installed,
-    Debian ships Pythons without venv), so the program is run.
+    The name on PATH is not sufficient: pyenv has shims for versions that are not installed, and
+    Debian has Pythons without venv.
     """
     try:
         done = subprocess.run(
             [str(program), "-c", PROBE], capture_output=True, text=True, timeout=60
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        return f"{program} does not run ({error})"
+        return f"{program} cannot be started ({error})"
     if done.returncode:
         reason = (done.stderr.strip().splitlines() or ["no message"])[-1]
-        return f"{program} cannot make an environment ({reason.strip()})"
+        return f"{program} cannot create an environment ({reason.strip()})"
     executable, version, wide = json.loads(done.stdout)
     if tuple(version) not in BPY or not wide:
         return f"{program} is Python {version[0]}.{version[1]}"
@@ -67,7 +67,7 @@ def probe(program: str | Path) -> Interpreter | str:
 
 
 def candidates() -> list[str]:
-    """Return the Pythons worth asking: the one at hand, then those on PATH by name."""
+    """Return the Pythons to test: the running one, then those on PATH by name."""
     found = [sys.executable]
     names = [f"python{major}.{minor}" for major, minor in BPY]
     for name in names:
@@ -77,37 +77,37 @@ def candidates() -> list[str]:
                 found.append(program)
     if launcher := shutil.which("py") if sys.platform == "win32" else None:
         for major, minor in BPY:
-            asked = [launcher, f"-{major}.{minor}", "-c", "import sys; print(sys.executable)"]
-            done = subprocess.run(asked, capture_output=True, text=True)
+            command = [launcher, f"-{major}.{minor}", "-c", "import sys; print(sys.executable)"]
+            done = subprocess.run(command, capture_output=True, text=True)
             if done.returncode == 0:
                 found.append(done.stdout.strip())
     return found
 
 
 def find_interpreter() -> Interpreter:
-    """Return the first Python that can carry bpy; a Failure tells what was looked at."""
-    refused = []
+    """Return the first suitable Python. Raises Failure, which lists the tested Pythons."""
+    rejected = []
     for program in candidates():
         result = probe(program)
         if isinstance(result, Interpreter):
             return result
-        refused.append(result)
+        rejected.append(result)
     raise Failure(
-        "no Blender >= 4.2 with numpy on PATH and no Python 3.11 or 3.13 with venv "
-        f"({'; '.join(refused)}): install Blender, or python3.11 with python3.11-venv"
+        "found no Blender >= 4.2 with numpy on PATH and no Python 3.11 or 3.13 with venv "
+        f"({'; '.join(rejected)}); install Blender, or python3.11 with python3.11-venv"
     )
 
 
 def venv_python(folder: Path) -> Path:
-    """Return the program of an environment."""
+    """Return the Python program of an environment."""
     return folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
 
 
 def bpy_python() -> Path:
-    """Return the Python of our environment, made on the first call and reused after.
+    """Return the Python of the environment with bpy, which the first call creates.
 
-    The folder's name holds a hash of its requirements, and it is made under another name and
-    renamed when whole: a half-made one is never used.
+    The name of the folder contains a hash of the requirements. It is created under another name and
+    renamed when complete, so that an incomplete environment is never used.
     """
     this_platform()
     interpreter = find_interpreter()
@@ -124,7 +124,7 @@ def bpy_python() -> Path:
             shutil.rmtree(making, ignore_errors=True)
             shutil.rmtree(folder, ignore_errors=True)
             say(f"setting up Python {tag} with bpy in {folder}")
-            quietly([interpreter.program, "-m", "venv", making], "making an environment")
+            quietly([interpreter.program, "-m", "venv", making], "creating an environment")
             say(f"installing bpy {bpy} (Blender as a module, about 400 MB, once) ...")
             pip_install(making, wanted[:1])
             say(f"installing {', '.join(requirements())} (about 100 MB, once) ...")
@@ -134,7 +134,7 @@ def bpy_python() -> Path:
 
 
 def test_python() -> Path:
-    """Return the same Python, with the tools that the tests need beside bpy."""
+    """Return the Python of the same environment, after installing the test tools in it."""
     python = bpy_python()
     folder = python.parent.parent
     stamp = folder / "test-tools.txt"
@@ -148,7 +148,7 @@ def test_python() -> Path:
 
 
 def pip_install(folder: Path, what: list[str]) -> None:
-    """Install into an environment, from wheels only: nothing is ever compiled."""
+    """Install packages into an environment, only from wheels, so that nothing is compiled."""
     quietly(
         [
             venv_python(folder), "-m", "pip", "install", "--quiet",

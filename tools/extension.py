@@ -1,4 +1,4 @@
-"""Blender's own `extension` command, and the zips it makes: one per platform, validated."""
+"""Build and validate the zips of the extension with Blender's `extension` command."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from .wheels import download, wheel_names
 
 @dataclass(frozen=True)
 class ExtensionTool:
-    """How `extension build` and `extension validate` are called here.
+    """How to call `extension build` and `extension validate`.
 
-    `command` is the program and its first words; `tags` the list of allowed tags, which the
-    script inside the bpy wheel must be told and Blender knows.
+    command: program and first arguments. tags: file with the allowed tags, which the script in the
+    bpy wheel requires; None for Blender itself.
     """
 
     command: tuple[str, ...]
     tags: Path | None = None
 
     def run(self, what: str, *arguments: str | Path) -> str:
-        """Run one command and return what it printed."""
+        """Run one command and return its output."""
         tags = ["--valid-tags", str(self.tags)] if self.tags else []
         return quietly([*self.command, what, *arguments, *tags], f"extension {what}")
 
@@ -38,7 +38,7 @@ def pack(
 ) -> list[Path]:
     """Build and validate the zips for these platforms; return them in the same order.
 
-    raw: with the library for camera RAW.
+    raw: include the library for camera RAW. Raises Failure.
     """
     download(wheel_names(platforms, pythons, raw))
     out.mkdir(parents=True, exist_ok=True)
@@ -50,7 +50,7 @@ def pack(
         name = f"{about['id']}-{about['version']}-{platform.replace('-', '_')}.zip"
         archive = out / name
         if not archive.exists():
-            raise Failure(f"Blender made no {name}", 1)
+            raise Failure(f"Blender did not write {name}", 1)
         tool.run("validate", archive)
         check_wheels(archive, wheel_names([platform], pythons, raw))
         archives.append(archive)
@@ -58,9 +58,9 @@ def pack(
 
 
 def check_wheels(archive: Path, expected: Sequence[str]) -> None:
-    """Make sure that a zip holds the wheels of its own platform and no others."""
+    """Raise Failure unless a zip contains exactly the expected wheels."""
     with zipfile.ZipFile(archive) as opened:
         inside = {Path(name).name for name in opened.namelist() if name.endswith(".whl")}
     if inside != set(expected):
         wrong = ", ".join(sorted(inside ^ set(expected)))
-        raise Failure(f"{archive.name}: missing or foreign wheels: {wrong}", 1)
+        raise Failure(f"{archive.name}: missing or unexpected wheels: {wrong}", 1)

@@ -1,4 +1,4 @@
-"""`run.py headless` and `run.py demo`: headless.py in whatever Blender is at hand."""
+"""`run.py headless` and `run.py demo`: run headless.py in Blender, or with the bpy wheel."""
 
 from __future__ import annotations
 
@@ -21,6 +21,6 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def demo(arguments: Sequence[str]) -> int:
-    """Run the whole job on the embedded capture, into ./patina-demo unless told otherwise."""
-    told = any(word.split("=")[0] == "--out" for word in arguments)
-    return main(["demo", *([] if told else ["--out", "patina-demo"]), *arguments])
+    """Run the command `demo`; write to ./patina-demo unless --out is given."""
+    has_out = any(word.split("=")[0] == "--out" for word in arguments)
+    return main(["demo", *([] if has_out else ["--out", "patina-demo"]), *arguments])

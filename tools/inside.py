@@ -1,4 +1,4 @@
-"""Programs of this folder that need the libraries and trimesh: run by the Python of the tests."""
+"""Run modules of this folder in the test environment, which has all libraries and trimesh."""
 
 from __future__ import annotations
 
@@ -10,6 +10,6 @@ from .environment import test_python
 
 
 def main(module: str, arguments: Sequence[str]) -> int:
-    """Run `python -m MODULE ...` in the environment of the tests and return its exit code."""
+    """Run `python -m MODULE ...` in the test environment and return its exit code."""
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
     return call([test_python(), "-m", module, *arguments], env=env)

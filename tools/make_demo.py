@@ -1,7 +1,7 @@
-"""Make the demo capture in assets/demo: `python -m tools.make_demo [FOLDER]`, with bpy's wheel.
+"""Create the demo capture in assets/demo: `python -m tools.make_demo [FOLDER]`, with the bpy wheel.
 
-A modelled jar (demo_shape) is photographed in Cycles (demo_render); noise of a camera is added, and
-the errors of a reconstruction to the mesh and the poses. The same seed gives the same capture.
+A modelled jar (demo_shape) is rendered in Cycles (demo_render). Noise is added to the photos, and
+reconstruction errors to the mesh and the poses. The same seed gives the same capture.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from .demo_shape import (
 
 SEED = 2018
 IRRADIANCE = float(np.pi)
-"""Of every lamp on a surface that faces it: a white Lambertian surface then has radiance 1."""
+"""Irradiance of every lamp at normal incidence: a white Lambertian surface has radiance 1."""
 
 LAMPS = {
     "key": (84.0, 28.0, ("view_03.jpg", "view_20.jpg")),
@@ -53,28 +53,28 @@ LAMPS = {
     "rim": (168.0, 22.0, ("view_08.jpg", "view_02.jpg")),
     "back": (330.0, 10.0, ("view_13.jpg", "view_06.jpg")),
 }
-"""Azimuth and elevation of each lamp in degrees, and the two cameras that take a photo under it:
-those that see much of what it lights, at about 25°, 60°, 95° and 130° from it."""
+"""Lamp → azimuth and elevation in degrees, and the cameras of its two photos, which see much of the
+lit side, at about 25°, 60°, 95° and 130° from the lamp."""
 
 SIZE, FOCAL, CENTRE = (384, 430), 1243.0, (196.3, 210.8)
 MIDDLE = np.array([0.0, 0.0, 0.492])
-POSE_ERROR = 0.07  # pixels, each of turning and shifting the camera
+POSE_ERROR = 0.07  # pixels, both of rotation and of translation of the camera
 SHOT, READ = 0.010, 0.0015  # noise: sqrt((SHOT²)·L·0.5 + READ²) at radiance L, so 1 % at L = 0.5
 SCAN_FACES, SCAN_CELL, TRUE_CELL = 25000, 0.007, 0.005
-MARGIN = 6  # pixels around the object; beyond, photos are black: that keeps the files small
+MARGIN = 6  # pixels around the object; photos are black outside, for small files
 SCAN_NOISE = 0.00036  # scan units, standard deviation of the mesh's error along the normal
 
 
 @dataclass(frozen=True)
 class Shot:
-    """A lit photo: which camera took it, and under which lamp."""
+    """A lit photo: its camera and lamp."""
 
     camera: str
     lamp: str
 
 
 def on_sphere(azimuth: float, elevation: float) -> Array:
-    """Return a unit vector of the object's frame from angles in degrees."""
+    """Return a unit vector in the frame of the object, from angles in degrees."""
     a, e = np.radians([azimuth, elevation])
     return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
 
@@ -105,11 +105,11 @@ def scan_cameras(rng: np.random.Generator, turn: Array) -> dict[str, Camera]:
 
 
 def reconstructed(rng: np.random.Generator, mesh: Surface) -> Array:
-    """Return the mesh's points as dense stereo gives them: creases duller, smooth noise on top."""
+    """Return the points of the mesh with errors of dense stereo: smoothed creases, smooth noise."""
     points = mesh.points.copy()
     pairs = np.concatenate([mesh.triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
     degree = np.bincount(pairs[:, 0], minlength=len(points))
-    for weight in (0.45, -0.30):  # Taubin: the creases go, the volume stays
+    for weight in (0.45, -0.30):  # Taubin smoothing, which keeps the volume
         total = [np.bincount(pairs[:, 0], points[pairs[:, 1], d], len(points)) for d in range(3)]
         points = points + weight * (np.stack(total, -1) / degree[:, None] - points)
     waves = 600
@@ -123,7 +123,7 @@ def reconstructed(rng: np.random.Generator, mesh: Surface) -> Array:
 
 
 def normal_errors(field: Field, points: Array, triangles: Array, count: int = 40000) -> Array:
-    """Return the angles in degrees between a mesh's smooth normals and the object's, by area."""
+    """Return angles in degrees between smooth normals of a mesh and of the object, by area."""
     rng = np.random.default_rng(0)
     a, b, c = (points[triangles[:, i]] for i in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=-1)
@@ -162,7 +162,7 @@ def disturbed(rng: np.random.Generator, camera: Camera) -> Camera:
 def write_colmap(
     rng: np.random.Generator, folder: Path, cameras: Mapping[str, Camera], mesh: Surface
 ) -> None:
-    """Write a sparse model: the cameras, and points of the mesh where three or more see them."""
+    """Write a sparse model: the cameras, and points of the mesh that three or more cameras see."""
     model = pycolmap.Reconstruction()
     width, height = SIZE
     model.add_camera_with_trivial_rig(
@@ -171,12 +171,12 @@ def write_colmap(
         )
     )
     occluder = Occluder(mesh)
-    chosen = rng.choice(len(mesh.points), 900, replace=False)
+    selected = rng.choice(len(mesh.points), 900, replace=False)
     keypoints: dict[str, list[Array]] = {name: [] for name in cameras}
-    tracks: list[list[tuple[str, int]]] = [[] for _ in chosen]
+    tracks: list[list[tuple[str, int]]] = [[] for _ in selected]
     for name, camera in cameras.items():
-        pixels = camera.project(mesh.points[chosen])
-        for track, index, pixel in zip(tracks, chosen, pixels, strict=True):
+        pixels = camera.project(mesh.points[selected])
+        for track, index, pixel in zip(tracks, selected, pixels, strict=True):
             point, normal = mesh.points[index], mesh.normals[index]
             away = camera.position - point
             away /= np.linalg.norm(away)
@@ -193,7 +193,7 @@ def write_colmap(
         )
         pose = pycolmap.Rigid3d(pycolmap.Rotation3d(camera.rotation), camera.translation)
         model.add_image_with_trivial_frame(image, pose)
-    for track, index in zip(tracks, chosen, strict=True):
+    for track, index in zip(tracks, selected, strict=True):
         if len(track) >= 3:
             elements = [pycolmap.TrackElement(ids[name], i) for name, i in track]
             glazed = glaze_depth((mesh.points[index] @ scan_turn())[None])[0] > 0
@@ -205,15 +205,15 @@ def write_colmap(
 
 
 def scan_turn() -> Array:
-    """Return the rotation object → scan: structure from motion knows no up."""
+    """Return the rotation object → scan, arbitrary as in structure from motion."""
     return Rotation.from_euler("xyz", [-118.0, 17.0, 41.0], degrees=True).as_matrix()
 
 
 def exposed(rng: np.random.Generator, radiance: Array) -> Array:
-    """Return what a camera records: shot and read noise, then steps of half of it or less.
+    """Return the radiance with shot and read noise, quantised to half of the noise or less.
 
-    The steps are powers of two, as in a camera's compressed raw files; they make the files small
-    and their rounding is a seventh of the noise or less.
+    The steps are powers of two, as in compressed raw files of cameras. They make the files small;
+    their rounding error is at most a seventh of the noise.
     """
     noise = np.sqrt(SHOT**2 * 0.5 * np.maximum(radiance, 0) + READ**2)
     seen = radiance + noise * rng.normal(size=radiance.shape)
@@ -227,17 +227,17 @@ def write_exr(path: Path, pixels: Array) -> None:
 
 
 def write_mask(path: Path, inside: Array) -> None:
-    """Write a boolean (height, width) as an 8-bit PNG, white = in."""
+    """Write a boolean (height, width) as an 8-bit PNG, white = inside."""
     write_image(path, (inside * np.uint8(255))[..., None], "uint8")
 
 
 def write_image(path: Path, pixels: Array, kind: str) -> None:
-    """Write (height, width, channels); EXR without loss."""
+    """Write (height, width, channels); EXR is compressed without loss."""
     height, width, channels = pixels.shape
     spec = oiio.ImageSpec(width, height, channels, kind)
     if path.suffix == ".exr":
         spec.attribute("compression", "zip")
-        spec.attribute("DateTime", "2000:01:01 00:00:00")  # else the clock is written
+        spec.attribute("DateTime", "2000:01:01 00:00:00")  # instead of the current time
     out = oiio.ImageOutput.create(str(path))
     if not out.open(str(path), spec) or not out.write_image(np.ascontiguousarray(pixels)):
         raise OSError(f"{path}: {out.geterror()}")
@@ -245,7 +245,7 @@ def write_image(path: Path, pixels: Array, kind: str) -> None:
 
 
 def masks_of(coverage: Array) -> dict[str, Array]:
-    """Return masks as an artist paints them, from an identity render: clear of every border."""
+    """Return masks like an artist's from an identity render, without pixels near borders."""
     whole = coverage[..., 3] > 0.999
     square = np.ones((3, 3), bool)
     masks = {}
@@ -257,7 +257,7 @@ def masks_of(coverage: Array) -> dict[str, Array]:
 
 
 def toml(lamps: Mapping[str, Array], shots: Sequence[Shot]) -> str:
-    """Return the capture file's text."""
+    """Return the text of the capture file."""
     lines = ["# The demo capture: made by tools/make_demo.py, see README.md beside it.", ""]
     lines += ["[scan]", 'cameras = "sparse"', 'mesh = "mesh.ply"', ""]
     for name, direction in lamps.items():
@@ -274,9 +274,9 @@ def toml(lamps: Mapping[str, Array], shots: Sequence[Shot]) -> str:
 
 
 def truth(lamps: Mapping[str, Array], shots: Sequence[Shot], angles: Sequence[float]) -> str:
-    """Return truth.json's text."""
+    """Return the text of truth.json."""
     model = {"model": "Principled BSDF (Cycles, GGX), other inputs at their defaults"}
-    told = {
+    content = {
         "notice": "For checks only: nothing that fits or diagnoses may read this file.",
         "materials": {"glaze": {**model, **GLAZE}, "clay": {**model, **CLAY}},
         "lights": {name: direction.tolist() for name, direction in lamps.items()},
@@ -292,22 +292,22 @@ def truth(lamps: Mapping[str, Array], shots: Sequence[Shot], angles: Sequence[fl
         "scan_from_object": scan_turn().round(9).tolist(),
         "seed": SEED,
     }
-    return json.dumps(told, indent=1) + "\n"
+    return json.dumps(content, indent=1) + "\n"
 
 
 def check_irradiance(studio: Studio, camera: Camera, direction: Array) -> None:
-    """Refuse to go on unless a white Lambertian plane facing the lamp has radiance E/π."""
+    """Raise RuntimeError unless a white Lambertian plane facing the lamp has radiance E/π."""
     studio.show(plane(direction), np.zeros(4))
     studio.dress(lambertian())
     studio.light(direction, IRRADIANCE)
     middle = studio.photograph(camera)[195:235, 172:212, :3]
     print(f"white plane facing the lamp: {middle.mean():.6f}, E/π = {IRRADIANCE / np.pi:.6f}")
     if abs(middle.mean() - IRRADIANCE / np.pi) > 1e-4:
-        raise RuntimeError("the lamp's irradiance is not what the capture says")
+        raise RuntimeError("the irradiance of the lamp differs from that of the capture")
 
 
 def make(folder: Path) -> None:
-    """Write everything but README.md into `folder`, replacing what was there."""
+    """Write all files but README.md to `folder`, replacing existing ones."""
     for part in ("lit", "masks", "sparse"):
         shutil.rmtree(folder / part, ignore_errors=True)
     for part in ("lit", "masks"):
@@ -321,8 +321,8 @@ def make(folder: Path) -> None:
     coarse = decimated(mesh_of(field, SCAN_CELL), SCAN_FACES)
     points = reconstructed(rng, coarse)
     off = normal_errors(field, points, coarse.triangles)
-    told = ", ".join(f"{q} %: {np.percentile(off, q):.2f}°" for q in (50, 75, 90, 95))
-    print(f"scan: {len(coarse.triangles)} faces, normals off by ({told})")
+    percentiles = ", ".join(f"{q} %: {np.percentile(off, q):.2f}°" for q in (50, 75, 90, 95))
+    print(f"scan: {len(coarse.triangles)} faces, percentiles of normal errors ({percentiles})")
     write_ply(folder / "mesh.ply", points @ turn.T, coarse.triangles)
     noisy = {name: disturbed(rng, camera) for name, camera in cameras.items()}
     scanned = Surface(points @ turn.T, coarse.triangles, coarse.normals @ turn.T)

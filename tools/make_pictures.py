@@ -1,8 +1,8 @@
-"""`run.py pictures`: docs/images/demo.jpg, from the embedded capture and nothing else, and
-diagnosis.jpg (hunt/picture.py).
+"""`run.py pictures`: render docs/images/demo.jpg from the embedded capture, and diagnosis.jpg
+(hunt/picture.py).
 
-From left to right: a lit photo, the prediction of it, the signed difference, and the measured
-materials under a sky they were not photographed in (Cycles, OSL).
+From left to right: a lit photo, its prediction, the signed difference, and the fitted materials
+under another environment (Cycles, OSL).
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from .common import ROOT
 from .package import load_patina
 
 TARGET = ROOT / "docs" / "images" / "demo.jpg"
-PHOTO = 0  # of the capture: the key light from the front
-GAP = 12
-SAMPLES = 1024
+PHOTO = 0  # index in the capture: the key light from the front
+GAP = 12  # pixels between panels
+SAMPLES = 1024  # per pixel
 
 
 def main() -> int:
-    """Fit, render, compose; returns the exit code."""
+    """Fit, render and compose; return the exit code."""
     patina = load_patina()
     patina.register()
     from patina.commands.demo import CAPTURE
@@ -56,7 +56,7 @@ def main() -> int:
 
 
 def relit(blend: Path, folder: Path, box: tuple[slice, slice]) -> np.ndarray:
-    """(h, w, 3) the materials in Blender's own studio world, cropped as the report's pictures."""
+    """Render (h, w, 3) the materials under a world of Blender, cropped like the other panels."""
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     scene = bpy.context.scene
     for lamp in [o for o in scene.objects if o.type == "LIGHT"]:
@@ -74,7 +74,7 @@ def relit(blend: Path, folder: Path, box: tuple[slice, slice]) -> np.ndarray:
     tree.links.new(sky.outputs["Color"], background.inputs["Color"])
     background.inputs["Strength"].default_value = 1.0
     scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, False
-    # not film_transparent: rays that left through a portal would count as transparent film too
+    # film_transparent stays off: rays that pass through portals would become transparent too
     scene.render.image_settings.file_format = "PNG"
     scene.render.filepath = str(folder / "relit.png")
     bpy.ops.render.render(write_still=True)
@@ -82,7 +82,7 @@ def relit(blend: Path, folder: Path, box: tuple[slice, slice]) -> np.ndarray:
 
 
 def with_gaps(panels: Sequence[np.ndarray], axis: int) -> np.ndarray:
-    """Panels (h, w, 3), alike along the other axis, with white between."""
+    """Join panels (h, w, 3) of equal size along the other axis, with white gaps."""
     shape = list(panels[0].shape)
     shape[axis] = GAP
     strip = [np.full(shape, 255, np.uint8)] * (2 * len(panels) - 1)
@@ -91,12 +91,12 @@ def with_gaps(panels: Sequence[np.ndarray], axis: int) -> np.ndarray:
 
 
 def read(path: Path) -> np.ndarray:
-    """(h, w, 3) 8-bit pixels."""
+    """Read (h, w, 3) 8-bit pixels."""
     return oiio.ImageBuf(str(path)).get_pixels(oiio.UINT8)[..., :3]
 
 
 def write(path: Path, pixels: np.ndarray) -> None:
-    """Write a JPEG for the docs."""
+    """Write a JPEG file for the docs."""
     spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "uint8")
     spec.attribute("Compression", "jpeg:88")
     out = oiio.ImageOutput.create(str(path))

@@ -1,4 +1,4 @@
-"""The checkout as the package `patina`, whatever its folder is called."""
+"""Import the checkout as the package `patina`, independent of the name of its folder."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from .common import ROOT
 
 
 def load_patina() -> ModuleType:
-    """Import the repository root as `patina`; `import patina.core...` works from then on.
+    """Import the repository root as `patina`, so that `import patina.core...` works.
 
-    Inside Blender the same files are `bl_ext.user_default.patina`, which is why every import in
-    them is relative. Nothing of bpy is touched until `patina.register()` is called.
+    In Blender the same files are `bl_ext.user_default.patina`; therefore all imports in them are
+    relative. bpy is not used before `patina.register()` is called.
     """
     if "patina" in sys.modules:
         return sys.modules["patina"]

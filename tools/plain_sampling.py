@@ -1,5 +1,5 @@
-"""The plain way to take samples, to measure the program's against: all pixels of a photo at once,
-in float64, the lens asked for every pixel, a frame built for every angle."""
+"""Simple implementation of sampling, for comparison: all pixels of a photo at once in float64, the
+lens evaluated for every pixel, a local frame for every angle."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import binary_dilation, generate_binary_structure
 
-JUMP = 12.0  # footprints a pixel
-LIFT = 5e-4
+JUMP = 12.0  # depth difference at an outline, in pixel footprints
+LIFT = 5e-4  # offset of shadow rays, fraction of the mesh size
 
 
 def sample_plainly(rays: Any, camera: Any, light: Any, radiance: np.ndarray, margins: Any) -> Any:
-    """The SampleTable of one photo with one material, distant light."""
+    """Return the SampleTable of one photo with one material and a distant light."""
     from patina.core.geometry.curvature import mean_curvature
     from patina.core.geometry.rays import Hits
     from patina.core.samples import SampleTable

@@ -1,6 +1,6 @@
-"""Capture files for the real photographs in ../shared/data/real, written into a folder of choice.
+"""Write capture files for the real photographs in ../shared/data/real to a given folder.
 
-The photographs stay where they are: the captures name them.
+The captures refer to the photographs, which are not copied.
 """
 
 from __future__ import annotations
@@ -10,11 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
-CHART_CORNERS = [[928, 880], [922, 480], [1160, 472], [1168, 880]]  # read off the photo, pixels
+CHART_CORNERS = [
+    [928, 880],
+    [922, 480],
+    [1160, 472],
+    [1168, 880],
+]  # measured by hand in the photo, pixels
 
 
 def rodin(data: Path, folder: Path, chart: bool, refine: bool) -> Path:
-    """The museum bronze: 16 flash photos; with or without tone from the chart and flash refined."""
+    """Write the Rodin bronze: 16 flash photos. chart: tone curve from the colour chart; refine:
+    refine the position of the flash. Returns the capture file."""
     source = (data / "real" / "rodin_bronze").resolve()
     photo = source / "colorchecker" / "231016_miaEURO_9505.jpg"
     lines = ["[scan]", f'cameras = "{source / "cameras.xml"}"', f'mesh = "{source / "mesh.ply"}"']
@@ -29,10 +35,10 @@ def rodin(data: Path, folder: Path, chart: bool, refine: bool) -> Path:
 
 
 def ball(data: Path, folder: Path) -> Path:
-    """DiLiGenT's ball: a sphere seen along z without perspective, 24 distant lights.
+    """Write the DiLiGenT ball: a sphere in orthographic view along z, with 24 distant lights.
 
-    One unit is one pixel; x right, y up, z to the camera as in its own files. Its intensities are
-    relative to each other: the BRDF is known up to one scale.
+    One unit is one pixel; x right, y up, z to the camera, as in its files. Intensities are relative
+    to each other, so that the BRDF is known up to a scale. Returns the capture file.
     """
     source = (data / "real" / "diligent_ball").resolve()
     from patina.core.photo import read_mask  # the package is loaded by the caller
@@ -69,7 +75,7 @@ def _write(path: Path, lines: list[str]) -> Path:
 
 
 def _write_sphere(path: Path, radius: float) -> None:
-    """A finely divided sphere around the origin: the hull of a Fibonacci lattice, as ASCII PLY."""
+    """Write a fine sphere around the origin: the convex hull of a Fibonacci lattice, ASCII PLY."""
     from scipy.spatial import ConvexHull
 
     count = 40_000

@@ -1,4 +1,4 @@
-"""The folder that Blender packs: the extension's own files, and only the wheels asked for."""
+"""Stage the folder that Blender packs: the extension's files and the requested wheels."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .common import ROOT, cache_dir
 from .wheels import FOLDER, manifest_list, wheel_names
 
 MANIFEST = "blender_manifest.toml"
-CRUMBS = shutil.ignore_patterns("__pycache__", "*.py[co]", ".*", "*~", "*.blend1")
+IGNORED = shutil.ignore_patterns("__pycache__", "*.py[co]", ".*", "*~", "*.blend1")
 
 
 def manifest() -> dict:
-    """Return blender_manifest.toml as it stands."""
+    """Return the content of blender_manifest.toml."""
     return tomllib.loads((ROOT / MANIFEST).read_text(encoding="utf-8"))
 
 
@@ -30,20 +30,20 @@ def shipped() -> list[Path]:
         for pattern in manifest()["build"]["paths_exclude_pattern"]
         if pattern.startswith("/")
     }
-    left_out = anchored | CRUMBS(str(ROOT), os.listdir(ROOT))
+    excluded = anchored | IGNORED(str(ROOT), os.listdir(ROOT))
     return sorted(
-        path for path in ROOT.iterdir() if path.name not in left_out and path.suffix != ".zip"
+        path for path in ROOT.iterdir() if path.name not in excluded and path.suffix != ".zip"
     )
 
 
 def source_hash(*extra: str) -> str:
-    """Return a hash over everything that would be shipped, and over what else decides."""
+    """Return a hash of all files that are shipped, and of the strings ``extra``."""
     digest = hashlib.sha256("\n".join(extra).encode())
     for top in shipped():
         files = sorted(path for path in top.rglob("*") if path.is_file()) if top.is_dir() else [top]
         for path in files:
             inside = path.relative_to(ROOT)
-            if CRUMBS(str(path.parent), list(inside.parts)):
+            if IGNORED(str(path.parent), list(inside.parts)):
                 continue
             digest.update(f"\n{inside.as_posix()}\n".encode())
             digest.update(path.read_bytes())
@@ -51,7 +51,7 @@ def source_hash(*extra: str) -> str:
 
 
 def filtered_manifest(platforms: Sequence[str], pythons: Sequence[str], raw: bool) -> str:
-    """Return the manifest's text with only these platforms, and their wheels for these Pythons."""
+    """Return the text of the manifest, reduced to these platforms, Pythons and their wheels."""
     text = (ROOT / MANIFEST).read_text(encoding="utf-8")
     wheels = manifest_list(wheel_names(platforms, pythons, raw))
     words = ", ".join(f'"{platform}"' for platform in platforms)
@@ -61,14 +61,14 @@ def filtered_manifest(platforms: Sequence[str], pythons: Sequence[str], raw: boo
 
 @contextlib.contextmanager
 def staged(platforms: Sequence[str], pythons: Sequence[str], raw: bool = False) -> Iterator[Path]:
-    """Lay out a folder for `extension build`; the wheels must have been downloaded."""
+    """Yield a temporary folder for `extension build`; requires downloaded wheels."""
     folder = cache_dir() / f"staging-{os.getpid()}"
     shutil.rmtree(folder, ignore_errors=True)
     try:
         (folder / "wheels").mkdir(parents=True)
         for path in shipped():
             if path.is_dir():
-                shutil.copytree(path, folder / path.name, ignore=CRUMBS)
+                shutil.copytree(path, folder / path.name, ignore=IGNORED)
             else:
                 shutil.copy2(path, folder)
         for name in wheel_names(platforms, pythons, raw):

@@ -1,10 +1,10 @@
-"""The libraries that travel inside the extension: pinned, named, downloaded and checked.
+"""The libraries in the extension: pinned versions, file names, download and checksums.
 
-Blender runs Python 3.11 (4.2 to 5.0) or 3.13 (5.1 on), so every library is shipped for both.
-numpy is never among them: Blender brings its own, and two of them in one process do not mix.
-OpenImageIO stays below 3.1, which wants numpy 2 while Blender up to 5.0 has 1.26. It also writes
-our EXR files: the OpenEXR wheel exports its symbols, Blender's own OpenEXR library takes their
-place, and writing a file then crashes (seen in Blender 4.3 on Linux).
+Blender uses Python 3.11 (4.2 to 5.0) or 3.13 (from 5.1), so that every library is shipped for both.
+numpy is not shipped: Blender contains it, and two versions in one process conflict. OpenImageIO is
+below 3.1, which requires numpy 2, because Blender up to 5.0 has numpy 1.26. It also writes the EXR
+files: the OpenEXR wheel exports its symbols, so that Blender's own OpenEXR library replaces them,
+and writing a file crashes (observed in Blender 4.3 on Linux).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ PINS = {
 }
 
 OPTIONAL = {"rawpy": "0.28.0"}
-"""Camera RAW: only in the zips of `run.py build --raw`, too large for the extension site."""
+"""Camera RAW: only in the zips of `run.py build --raw`; too large for the extension site."""
 
 TAGS = {
     "pycolmap": ("manylinux_2_28_x86_64", "win_amd64", "macosx_14_0_arm64"),
@@ -50,19 +50,19 @@ TAGS = {
     "tomlkit": None,
     "rawpy": ("manylinux_2_27_x86_64.manylinux_2_28_x86_64", "win_amd64", "macosx_11_0_arm64"),
 }
-"""Per library the platform part of its wheels' names, in the order of PLATFORMS; None: pure Python.
+"""Library → platform tags of its wheels, in the order of PLATFORMS; None: pure Python.
 
-scipy has a wheel for macOS 14 too; the one for macOS 12 is taken because it runs on both.
+scipy also has a wheel for macOS 14; the one for macOS 12 runs on both.
 """
 
-PURE = {"defusedxml": "py2.py3"}  # the Python part of a pure wheel's name, where it is not py3
+PURE = {"defusedxml": "py2.py3"}  # Python tag of a pure wheel, if not py3
 
 FOLDER = ROOT / "wheels"
 SUMS = Path(__file__).with_name("wheels.sha256")
 
 
 def requirements() -> list[str]:
-    """Return the pins as pip reads them."""
+    """Return the pinned versions in the syntax of pip."""
     return [f"{name}=={version}" for name, version in PINS.items()]
 
 
@@ -88,23 +88,23 @@ def wheel_names(
         for library in (*PINS, *(OPTIONAL if raw else ()))
         for python in pythons
     )
-    return list(dict.fromkeys(names))  # a pure wheel serves them all
+    return list(dict.fromkeys(names))  # a pure wheel is valid for all
 
 
 def manifest_list(names: Sequence[str] | None = None) -> str:
     """Return the `wheels = [...]` entry of blender_manifest.toml."""
-    chosen = wheel_names() if names is None else names
-    return "wheels = [\n" + "".join(f'  "./wheels/{name}",\n' for name in chosen) + "]"
+    listed = wheel_names() if names is None else names
+    return "wheels = [\n" + "".join(f'  "./wheels/{name}",\n' for name in listed) + "]"
 
 
 def checksums() -> dict[str, str]:
-    """Return file name → SHA-256, as written in wheels.sha256."""
+    """Return file name → SHA-256 of wheels.sha256."""
     pairs = (line.split() for line in SUMS.read_text(encoding="utf-8").splitlines() if line)
     return {name: digest for digest, name in pairs}
 
 
 def is_whole(path: Path, digest: str) -> bool:
-    """Say whether the file is there and is the one that was pinned."""
+    """Return whether the file exists and has this SHA-256."""
     if not path.is_file():
         return False
     with path.open("rb") as handle:
@@ -112,7 +112,10 @@ def is_whole(path: Path, digest: str) -> bool:
 
 
 def pip_command() -> list[str]:
-    """Return how to call pip: this Python's own, or one in a small environment in the cache."""
+    """Return a command for pip: of this Python, or of a small environment in the cache.
+
+    Raises Failure if neither is possible.
+    """
     own = [sys.executable, "-m", "pip"]
     if subprocess.run([*own, "--version"], capture_output=True).returncode == 0:
         return own
@@ -127,13 +130,13 @@ def pip_command() -> list[str]:
     made = subprocess.run([sys.executable, "-m", "venv", "--clear", folder], capture_output=True)
     if made.returncode:
         raise Failure(
-            f"{sys.executable} has neither pip nor venv: install one (Debian: python3-pip)"
+            f"found neither pip nor venv in {sys.executable}; install one (Debian: python3-pip)"
         )
     return small
 
 
 def download(names: Sequence[str], folder: Path = FOLDER) -> list[Path]:
-    """Put these wheels into the folder, verified; those already there and whole are kept."""
+    """Download and verify wheels that the folder does not contain yet. Raises Failure."""
     sums = checksums()
     folder.mkdir(parents=True, exist_ok=True)
     missing = [name for name in names if not is_whole(folder / name, sums[name])]
@@ -143,29 +146,31 @@ def download(names: Sequence[str], folder: Path = FOLDER) -> list[Path]:
         for name in missing:
             fetch_one(pip, name, folder)
             if not is_whole(folder / name, sums[name]):
-                raise Failure(f"{name}: not the file that was pinned (SHA-256 differs)", 1)
+                raise Failure(
+                    f"{name}: the SHA-256 differs from the pinned one in wheels.sha256", 1
+                )
         say(f"downloaded {megabytes([folder / name for name in missing])}")
     return [folder / name for name in names]
 
 
 def fetch_one(pip: Sequence[str], name: str, folder: Path) -> None:
-    """Download one wheel, asking pip for exactly its tags."""
+    """Download one wheel with pip, requesting exactly its tags."""
     library, version, python, abi, tags = name.removesuffix(".whl").split("-")
-    asked = ["--implementation", "cp", "--python-version", python[2:], "--abi", abi]
-    asked += [word for tag in tags.split(".") for word in ("--platform", tag)]
+    target = ["--implementation", "cp", "--python-version", python[2:], "--abi", abi]
+    target += [word for tag in tags.split(".") for word in ("--platform", tag)]
     if abi == "none":
-        asked = []
+        target = []
     quietly(
         [
             *pip, "download", "--quiet", "--disable-pip-version-check", "--no-deps",
-            "--only-binary=:all:", *asked, "--dest", folder, f"{library}=={version}",
+            "--only-binary=:all:", *target, "--dest", folder, f"{library}=={version}",
         ],
         f"downloading {name}",
     )  # fmt: skip
 
 
 def write_manifest() -> None:
-    """Write the list of wheels into blender_manifest.toml: `python3 -m tools.wheels`."""
+    """Write the list of wheels to blender_manifest.toml: `python3 -m tools.wheels`."""
     path = ROOT / "blender_manifest.toml"
     text = path.read_text(encoding="utf-8")
     listed = re.sub(r"^wheels = \[.*?^\]", lambda _: manifest_list(), text, flags=re.M | re.S)

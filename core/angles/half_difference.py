@@ -1,10 +1,10 @@
 """Half/difference angles (Rusinkiewicz 1998, "A new change of variables for efficient BRDF
-representation"), both ways, without a tangent frame.
+representation"), in both directions, without a tangent frame.
 
-For an isotropic BRDF the azimuth of the half vector carries nothing, so three angles remain:
-θh (normal to half vector), θd (half vector to light) and φd (azimuth of the light around the half
-vector, 0 where the light leans away from the normal). Swapping light and view (Helmholtz
-reciprocity) turns φd by π: φd lives on [0, π).
+An isotropic BRDF does not depend on the azimuth of the half vector, so three angles remain: θh
+(normal to half vector), θd (half vector to light) and φd (azimuth of the light around the half
+vector, 0 where the light leans away from the normal). Exchanging light and view (Helmholtz
+reciprocity) rotates φd by π, so φd is folded to [0, π).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from .vectors import cross, dot, length
 
 Array = NDArray[np.floating]
-POLE = 1e-9  # sin θh below it is 0
+POLE = 1e-9  # sin θh below it counts as 0
 
 
 class Angles(NamedTuple):
@@ -37,13 +37,12 @@ def fold_phi_d(phi_d: Array) -> Array:
 def half_difference(normal: Array, light: Array, view: Array) -> Angles:
     """Angles of unit vectors (..., 3) that point AWAY from the surface, in any common frame.
 
-    Exact at the poles, in float32 too: atan2 of cross and dot products, never acos. Where θh = 0
-    the azimuth of the half vector is undefined, and φd is 90°, the value that treats light and view
-    alike: the angles of a pair of vectors do not depend on the frame they are given in. Where
-    θd = 0, φd is 0.
+    Exact at the poles, also in float32: atan2 of cross and dot products, never acos. Where θh = 0
+    the azimuth of the half vector is undefined; φd is then 90°, the value that is symmetric in
+    light and view, so that the angles do not depend on the frame. Where θd = 0, φd is 0.
 
-    With H = l + v and its length H, the binormal b of n and H and the tangent t = b × H:
-    l·b = n·(v × l)/|n × H| and l·t = H (n·v − n·l)/(2 |n × H|). Neither frame is needed.
+    With H = l + v, the binormal b of n and H, and the tangent t = b × H: l·b = n·(v × l)/|n × H|
+    and l·t = |H| (n·v − n·l)/(2 |n × H|). No frame is needed.
     """
     half = light + view
     size = length(half[..., 0], half[..., 1], half[..., 2])
@@ -66,7 +65,8 @@ def half_difference(normal: Array, light: Array, view: Array) -> Angles:
 
 
 def light_view(theta_h: Array, theta_d: Array, phi_d: Array) -> tuple[Array, Array]:
-    """Unit vectors (light, view), each (..., 3), with normal = +z and the half vector in x-z."""
+    """Unit vectors (light, view), each (..., 3), in the frame with the normal = +z and the half
+    vector in the x-z plane."""
     theta_h, theta_d, phi_d = np.broadcast_arrays(theta_h, theta_d, phi_d)
     sh, ch, sd, cd = np.sin(theta_h), np.cos(theta_h), np.sin(theta_d), np.cos(theta_d)
     half = np.stack([sh, np.zeros_like(sh), ch], axis=-1)
@@ -78,7 +78,7 @@ def light_view(theta_h: Array, theta_d: Array, phi_d: Array) -> tuple[Array, Arr
 
 
 def cosines(theta_h: Array, theta_d: Array, phi_d: Array) -> tuple[Array, Array]:
-    """(cos θi, cos θo) of light and view against the normal; negative below the horizon."""
+    """(cos θi, cos θo) of light and view; negative below the horizon."""
     base = np.cos(theta_h) * np.cos(theta_d)
     lean = np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)
     return base - lean, base + lean

@@ -1,6 +1,7 @@
-"""The MERL grid (Matusik et al. 2003): 90 × 90 × 180 cells over (θh, θd, φd), θh on a square root.
+"""The MERL grid (Matusik et al. 2003): 90 × 90 × 180 cells over (θh, θd, φd), spaced in the square
+root of θh.
 
-Index order is (θh, θd, φd), φd fastest. Cell (ih, id, ip) spans θh from 90°·(ih/90)² to
+Index order is (θh, θd, φd), φd fastest. Cell (ih, id, ip) covers θh from 90°·(ih/90)² to
 90°·((ih+1)/90)², θd from id° to id+1°, φd from ip° to ip+1°.
 """
 
@@ -16,7 +17,7 @@ HALF_PI = np.pi / 2
 
 
 def index(angles: Angles) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Cell (ih, id, ip) that holds each direction; angles in radians, φd folded to [0, π)."""
+    """Cell (ih, id, ip) that contains each direction; angles in radians, φd is folded to [0, π)."""
     ih = np.floor(90.0 * np.sqrt(np.clip(angles.theta_h / HALF_PI, 0.0, None))).astype(np.intp)
     idx = np.floor(np.degrees(angles.theta_d)).astype(np.intp)
     ip = np.floor(np.degrees(fold_phi_d(angles.phi_d))).astype(np.intp)
@@ -24,10 +25,10 @@ def index(angles: Angles) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[n
 
 
 def node_angles(offset: float = 0.5) -> Angles:
-    """Angles of all cells, each array (90, 90, 180) float64.
+    """Angles of all cells, each array (90, 90, 180) float64, radians.
 
-    offset 0.5 gives cell centres, as every table we write holds them; 0 the lower edges, as the
-    neural encodings of Sztrajman et al. were sampled.
+    offset: 0.5 for cell centres, as in all tables that Patina writes; 0 for the lower edges, where
+    the neural encodings of Sztrajman et al. were sampled.
     """
     theta_h = HALF_PI * ((np.arange(90) + offset) / 90.0) ** 2
     theta_d = np.radians(np.arange(90) + offset)

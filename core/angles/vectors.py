@@ -1,7 +1,7 @@
 """Products of vectors along the last axis, component by component.
 
-Written out instead of left to a matrix product: the result of a row is then the same bits whatever
-rows it is computed with, and float32 stays float32.
+Written out instead of as a matrix product: the result of a row is then bit-identical whatever rows
+it is computed with, and float32 stays float32.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ def cross(a: Array, b: Array) -> tuple[Array, Array, Array]:
 
 
 def tangents(axis: Array) -> tuple[Array, Array]:
-    """Two units (n, 3) square to unit vectors (n, 3) and to each other: axis = first × second.
-    float64."""
+    """Two unit vectors (n, 3) perpendicular to unit vectors (n, 3) and to each other, float64: axis
+    = first × second."""
     helper = np.where(np.abs(axis[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
     first = np.cross(axis, helper)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
@@ -39,7 +39,7 @@ def tangents(axis: Array) -> tuple[Array, Array]:
 
 
 def length(x: Array, y: Array, z: Array) -> Array:
-    """(...) lengths of vectors given by components."""
+    """(...) lengths of vectors given by their components."""
     total: Array = x * x
     total += y * y
     total += z * z

@@ -1,1 +1,2 @@
-"""From a BRDF to what Blender can show and other programs can read."""
+"""From a BRDF to representations for Blender and other programs: OSL shader, Principled BSDF, lobe
+stack, tables for sampling."""

@@ -1,10 +1,10 @@
-"""A BRDF as closures that Cycles samples towards lights, and a rest that it does not.
+"""Split a BRDF into closures that Cycles samples towards lights and a rest that it does not.
 
-A ray portal carries any BRDF, but knows no lights: it finds a small bright sun by chance alone. So
-for every direction of view the largest part goes to closures of Cycles' own, a ramp over cos θi and
-three GGX lobes, and only what is left, of either sign, to the portal. The sum is the BRDF whatever
-the weights are; they are chosen such that the absolute rest, which is what the portal's noise grows
-with, is smallest.
+A ray portal can carry any BRDF, but is not sampled towards lights: it finds a small bright sun by
+chance alone. So for every direction of view the largest part is assigned to Cycles' own closures, a
+ramp over cos θi and three GGX lobes, and only the rest, of either sign, to the portal. The sum is
+the BRDF for any weights; they are chosen to minimise the absolute rest, which determines the
+portal's noise.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ Array = NDArray[np.floating]
 KNOTS = 8  # of OSL's diffuse_ramp
 LOBES = 3
 VIEWS = 24  # directions of view, evenly over θo
-GRAZING = np.radians(89.0)
-CELLS = (48, 16)  # of half vectors
-ALPHAS = np.geomspace(0.006, 0.8, 16)
-ROUNDS = 6  # of weighted least squares, towards the least power 1.5 of the absolute rest
-FEW = (2, 8, 14, 19)  # views that choose the lobes' widths
+GRAZING = np.radians(89.0)  # the most grazing direction of view
+CELLS = (48, 16)  # of half vectors, over θh and φh
+ALPHAS = np.geomspace(0.006, 0.8, 16)  # candidates for the lobes
+ROUNDS = 6  # of reweighted least squares, towards the minimum of |rest|^1.5
+ALPHA_VIEWS = (2, 8, 14, 19)  # views from which the lobes' alphas are chosen
 
 
 @dataclass(frozen=True)
 class ClosureSplit:
-    """theta_o: (v,) radians, directions of view. alpha: (LOBES,) of the GGX lobes. ramp:
-    (v, KNOTS, 3) of ρ·cos θi at cos θi = 0 … 1. lobes: (v, LOBES, 3) weights of the GGX lobes.
-    rest: share of the reflected light that is left to the portal, absolute, mean over views."""
+    """theta_o: (v,) radians, directions of view. alpha: (LOBES,) of the GGX lobes. ramp: (v, KNOTS,
+    3) of ρ·cos θi at cos θi = 0 … 1. lobes: (v, LOBES, 3) weights of the GGX lobes. rest: fraction
+    of the reflected light left to the portal, in absolute value, mean over views."""
 
     theta_o: Array
     alpha: Array
@@ -45,7 +45,7 @@ class ClosureSplit:
 
 
 def view_angles(count: int = VIEWS) -> Array:
-    """(count,) θo in radians, from the normal to all but the horizon."""
+    """(count,) θo in radians, from 0 to 89°."""
     return np.linspace(0.0, GRAZING, count)
 
 
@@ -54,9 +54,9 @@ def split(evaluate: Callable[[Angles], Array]) -> ClosureSplit:
     theta_o = view_angles()
     spheres = [Hemisphere.of(t, *CELLS) for t in theta_o]
     reflected = [np.asarray(evaluate(s.angles), float) * s.cos_i[:, None] for s in spheres]
-    few = [(spheres[i], reflected[i].mean(axis=1, keepdims=True)) for i in FEW]
+    few = [(spheres[i], reflected[i].mean(axis=1, keepdims=True)) for i in ALPHA_VIEWS]
     chosen: list[float] = []
-    for place in (*range(LOBES), *range(LOBES)):  # one after the other, then each once more
+    for place in (*range(LOBES), *range(LOBES)):  # greedy, then each is chosen once more
         kept = chosen[:place] + chosen[place + 1 :] if len(chosen) == LOBES else list(chosen)
         trials = [
             (sum(float(_least_rest(s, y, (*kept, a))[1][0]) for s, y in few), a)
@@ -77,7 +77,7 @@ def split(evaluate: Callable[[Angles], Array]) -> ClosureSplit:
 
 
 def closures(sphere: Hemisphere, alpha: tuple[float, ...]) -> Array:
-    """(n, KNOTS + lobes) what each closure of weight 1 reflects, ρ·cos θi."""
+    """(n, KNOTS + lobes) ρ·cos θi of each closure with weight 1."""
     at = sphere.cos_i * (KNOTS - 1)
     low = np.minimum(at.astype(int), KNOTS - 2)
     columns = np.zeros((at.size, KNOTS + len(alpha)))
@@ -91,7 +91,8 @@ def closures(sphere: Hemisphere, alpha: tuple[float, ...]) -> Array:
 
 
 def _least_rest(sphere: Hemisphere, y: Array, alpha: tuple[float, ...]) -> tuple[Array, Array]:
-    """(weights (KNOTS + lobes, c) ≥ 0, rest (c,)): least ∫|y − Σ weight × closure| over light."""
+    """(weights (KNOTS + lobes, c) ≥ 0, rest (c,)) that minimise ∫|y − Σ weight × closure| over the
+    light's directions, by iteratively reweighted non-negative least squares."""
     matrix = closures(sphere, alpha)
     kept = sphere.solid > 0
     matrix, y, solid = matrix[kept], y[kept], sphere.solid[kept]

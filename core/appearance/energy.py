@@ -1,8 +1,8 @@
-"""How much of the light a BRDF gives back, for each direction of view; and what to do above one.
+"""Directional albedo of a BRDF, and a limit where it exceeds 1.
 
-A measured BRDF can reflect more than it receives: an irradiance that was guessed, or directions
-near the horizon that no photo saw. Path tracing must not make light, so the material is held to
-one.
+A measured BRDF can reflect more light than it receives: the irradiance was estimated, or directions
+near the horizon have no samples. Path tracing must not create energy, so the material is scaled to
+an albedo of at most 1.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from .hemisphere import Hemisphere
 
 Array = NDArray[np.floating]
 
-CELLS = (96, 24)
+CELLS = (96, 24)  # of half vectors, over θh and φh
 
 
 @dataclass(frozen=True)
 class Hemispheres:
     """Directions of light for several views, one after the other.
 
-    angles: (views · n,); weight: (views, n) cos θi times the solid angle that each stands for.
+    angles: (views · n,); weight: (views, n) cos θi times the solid angle of each direction, sr.
     """
 
     angles: Angles
@@ -46,11 +46,13 @@ class Hemispheres:
 
 
 def directional_albedo(evaluate: Callable[[Angles], Array], theta_o: Array) -> Array:
-    """(v, 3) ∫ρ cos θi dωi of ``evaluate(angles) -> (n, 3)`` seen from each θo (radians)."""
+    """(v, 3) ∫ρ cos θi dωi of ``evaluate(angles) -> (n, 3)``, ρ in 1/sr, for each view θo (v,)
+    (radians)."""
     hemispheres = Hemispheres.of(theta_o)
     return hemispheres.albedo(evaluate(hemispheres.angles))
 
 
 def limit(albedo: Array) -> Array:
-    """Factor ≤ 1 for each direction of view, one for all channels: hues stay."""
+    """Factor ≤ 1 for each direction of view, the same for all channels, so that hues are preserved;
+    albedo: (v, 3)."""
     return np.asarray(1.0 / np.maximum(albedo.max(axis=-1), 1.0))

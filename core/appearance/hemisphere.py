@@ -1,8 +1,8 @@
-"""Directions of light for one view, dense where a lobe is: the cells of half vectors.
+"""Directions of light for one view, dense where lobes are: a grid of half vectors.
 
-Half vectors stand on a grid of θh (on a logarithm, as lobes are sharp) and azimuth φh from the
-plane of view and normal, of which one half is enough for an isotropic BRDF. Every direction of
-light above the horizon belongs to one half vector.
+Half vectors are on a grid of θh (spaced logarithmically, since lobes are narrow) and azimuth φh
+from the plane of view and normal, of which one half suffices for an isotropic BRDF. Every direction
+of light above the horizon has exactly one half vector.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .principled import Configuration
 
 Array = NDArray[np.floating]
 
-KNEE = np.radians(0.4)
+KNEE = np.radians(0.4)  # θh is spaced linearly below, logarithmically above
 
 
 def theta_edges(count: int) -> Array:
@@ -27,16 +27,16 @@ def theta_edges(count: int) -> Array:
 
 
 def view_at(theta_o: float) -> Array:
-    """(3,) the view so far from the normal, +z, in the plane of x and z."""
+    """(3,) the view at this angle from the normal, +z, in the x-z plane."""
     return np.array([np.sin(theta_o), 0.0, np.cos(theta_o)])
 
 
 @dataclass(frozen=True)
 class Hemisphere:
-    """Points of a grid of (θh, φh) for one view; several a cell.
+    """Points of a grid of (θh, φh) for one view; several per cell.
 
     angles: of each point; cos_i: (n,) of the light, 0 where it is below the horizon or behind the
-    half vector; solid: (n,) sr of light that each stands for (both halves of φh), 0 likewise;
+    half vector; solid: (n,) sr of light that each represents (both halves of φh), 0 likewise;
     half_solid: (n,) sr of half vectors; where: the same points as cosines.
     """
 
@@ -49,7 +49,7 @@ class Hemisphere:
 
     @classmethod
     def of(cls, theta_o: float, n_h: int, n_p: int, inside: int = 1) -> Hemisphere:
-        """inside: points along each side of a cell; the order is (θh cell, point, φh cell, point),
+        """inside: points along each side of a cell. The order is (θh cell, point, φh cell, point),
         C order."""
         edges = theta_edges(n_h * inside)
         # uniform in solid angle inside a cell: 1 − cos θ = 2 sin²(θ/2), exact near the pole

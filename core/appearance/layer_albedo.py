@@ -1,11 +1,11 @@
-"""The albedo by which Cycles darkens what lies under a dielectric layer.
+"""The albedo by which Cycles attenuates what lies below a dielectric layer.
 
-Blender's Principled scales its diffuse base by 1 − albedo of the specular layer, and takes that
-albedo from a table of 16 × 16 × 16 numbers. With s the Fresnel reflectance rescaled so that 0 is
-normal incidence and 1 is total, the table holds the mean of s over the visible GGX normals (Heitz
-2018) whose mirror direction stays above the horizon; masking of the light is left out. The mean
-is taken here by quadrature. Whether it is what Cycles does is asserted against renders in
-tests/wheel/test_principled_cycles.py.
+Blender's Principled BSDF scales its diffuse base by 1 − albedo of the specular layer, and reads
+that albedo from a table of 16 × 16 × 16 numbers. With s the Fresnel reflectance rescaled so that 0
+is normal incidence and 1 total reflection, the table holds the mean of s over the visible GGX
+normals (Heitz 2018) whose mirror direction is above the horizon; masking of the light is neglected.
+Here the mean is computed by quadrature. tests/wheel/test_principled_cycles.py compares it with
+renders of Cycles.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating]
 
 NODES = 16
-SQUARE = 64  # points a side on the square that the visible normals are drawn from
+SQUARE = 64  # points per side of the square from which visible normals are sampled
 
 
 def fresnel_dielectric(cos_d: Array, ior: float) -> Array:
@@ -43,13 +43,14 @@ def ior_from_f0(f0: float) -> float:
 
 
 def rescaled_fresnel(cos_d: Array, ior: float) -> Array:
-    """s in [0, 1]: how far Fresnel has gone from its value at normal incidence towards 1."""
+    """s in [0, 1]: Fresnel reflectance, rescaled from its value at normal incidence (0) to total
+    reflection (1)."""
     f0 = f0_from_ior(ior)
     return np.clip((fresnel_dielectric(cos_d, ior) - f0) / (1.0 - f0), 0.0, 1.0)
 
 
 def rescaled_albedo(roughness: float, cos_view: Array, ior: float) -> Array:
-    """s averaged over the lobe, shape of cos_view; the layer's albedo is f0 + (1 − f0)·s."""
+    """s averaged over the lobe, in the shape of cos_view; the layer's albedo is f0 + (1 − f0)·s."""
     table = _table()
     z = np.sqrt(abs((ior - 1.0) / (ior + 1.0)))
     slab = _between(table, np.float64(z))  # (cos, roughness)
@@ -58,7 +59,7 @@ def rescaled_albedo(roughness: float, cos_view: Array, ior: float) -> Array:
 
 
 def _between(values: Array, at: np.float64) -> Array:
-    """Linear interpolation along axis 0, its nodes spread over [0, 1]."""
+    """Linear interpolation along axis 0, with nodes evenly over [0, 1]."""
     u = np.clip(at, 0.0, 1.0) * (NODES - 1)
     low = min(int(u), NODES - 2)
     return values[low] + (u - low) * (values[low + 1] - values[low])
@@ -82,7 +83,8 @@ def _table() -> NDArray[np.float64]:
 
 
 def _visible_normals(mu: float, alpha: float, x: Array, y: Array) -> tuple[Array, Array]:
-    """View · normal, and whether the reflected ray stays above, for normals drawn from the disk."""
+    """(view · normal, whether the reflected ray is above the horizon) for visible normals sampled
+    from points of the unit disk."""
     sin = np.sqrt(1.0 - mu * mu)
     length = np.hypot(alpha * sin, mu)
     side, up = alpha * sin / length, mu / length

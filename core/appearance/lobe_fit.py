@@ -1,9 +1,9 @@
-"""Fit a lobe stack to a BRDF: as few lobes as say nearly as much, and as plain as does.
+"""Fit a lobe stack to a BRDF, with as few lobes and as simple as the accuracy allows.
 
-What is made small is what the Principled fit makes small (closeness.py). A plain stack first: one
-lobe from several starts; each further lobe starts as a sharper or a wider companion of those found,
-and stays where it lowers the error by more than a twentieth. Then the same with colours that change
-towards the silhouette, from there.
+The objective is that of the Principled fit (closeness.py). A plain stack is fitted first: one lobe
+from several starts; each further lobe starts as a sharper or wider copy of an existing one and is
+kept where it lowers the error by more than 5 %. From there the same is done with colours that
+change towards the silhouette.
 """
 
 from __future__ import annotations
@@ -16,30 +16,30 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from . import lobe_model
-from .closeness import Closeness
+from .closeness import FitObjective
 from .cube_root import COARSE, Evaluate, Target
 from .lobe_model import PLAIN_BASE, PLAIN_EACH
-from .lobe_stack import MOST_LOBES, LobeStack
+from .lobe_stack import MAX_LOBES, LobeStack
 from .principled import MIN_ROUGHNESS
 
 Array = NDArray[np.floating]
 
-WORTH_A_LOBE = 0.95  # a further lobe must bring the error below this fraction
-WORTH_TURNING = 0.97  # and so must colours that change towards the silhouette
-NEAR_ENOUGH = 5e-4  # nothing more is tried where the error is smaller than this
-FIRST = (0.08, 0.2, 0.45, 0.8)  # roughness of the first lobe to start from
-COMPANIONS = (0.4, 2.0)  # of a further lobe, as a multiple of one there is
-ROUGH_STEPS, FINE_STEPS = 12, 30
+LOBE_GAIN = 0.95  # a further lobe must reduce the error below this fraction
+TURNING_GAIN = 0.97  # the same for colours that change towards the silhouette
+NEGLIGIBLE = 5e-4  # error below which no further lobe or colour is tried
+FIRST = (0.08, 0.2, 0.45, 0.8)  # start values of the roughness of the first lobe
+COMPANIONS = (0.4, 2.0)  # roughness of a further lobe relative to an existing one
+ROUGH_STEPS, FINE_STEPS = 12, 30  # evaluations for comparing starts, and for the best
 
 
 @dataclass(frozen=True)
 class LobeStackFit:
-    """The lobe stack nearest to a BRDF.
+    """The lobe stack closest to a BRDF.
 
-    plain: the nearest with colours that do not change towards the silhouette, for what knows no
-    others (MaterialX). error, plain_error: relative cube-root error, as PrincipledFit has it. psnr,
-    plain_psnr: dB, in the pictures of random_light.py. errors: what was made small (closeness.py),
-    for each number of lobes tried, plain.
+    plain: the closest with colours that do not change towards the silhouette, for formats that do
+    not support such colours (MaterialX). error, plain_error: relative cube-root error, as in
+    PrincipledFit. psnr, plain_psnr: dB, of the pictures of random_light.py. errors: number of lobes
+    tried → square root of the objective (closeness.py), of plain stacks.
     """
 
     stack: LobeStack
@@ -51,34 +51,32 @@ class LobeStackFit:
     errors: Mapping[int, float]
 
 
-def fit_lobe_stack(
-    evaluate: Evaluate, most: int = MOST_LOBES, turning: bool = True
-) -> LobeStackFit:
-    """The stack of at most ``most`` lobes nearest to ``evaluate(angles) -> (n, 3)`` in 1/sr.
+def fit_lobe_stack(evaluate: Evaluate, most: int = MAX_LOBES, turning: bool = True) -> LobeStackFit:
+    """The stack of at most ``most`` lobes closest to ``evaluate(angles) -> (n, 3)``, ρ in 1/sr.
 
     turning: colours may change towards the silhouette.
     """
-    goal = Closeness.of(evaluate, COARSE)
+    goal = FitObjective.of(evaluate, COARSE)
     found: dict[int, Array] = {}
     starts = _first(goal.target)
     for count in range(1, most + 1):
         tried = [_descend(goal, x, ROUGH_STEPS, plain=True) for x in starts]
         best = min(tried, key=lambda x: _error(goal, x))
         found[count] = _descend(goal, best, FINE_STEPS, plain=True)
-        if _error(goal, found[count]) < NEAR_ENOUGH:
+        if _error(goal, found[count]) < NEGLIGIBLE:
             break
         starts = _further(found[count])
     errors = {count: _error(goal, x) for count, x in found.items()}
     chosen = min(found)
     for count in found:
-        if errors[count] < WORTH_A_LOBE * errors[chosen]:
+        if errors[count] < LOBE_GAIN * errors[chosen]:
             chosen = count
     plain = best = found[chosen]
-    if turning and errors[chosen] > NEAR_ENOUGH:
+    if turning and errors[chosen] > NEGLIGIBLE:
         for count in range(chosen, max(found) + 1):
             x = _descend(goal, found[count], FINE_STEPS, plain=False)
-            worth = WORTH_TURNING if best is plain else WORTH_A_LOBE
-            if _error(goal, x) < worth * _error(goal, best):
+            gain = TURNING_GAIN if best is plain else LOBE_GAIN
+            if _error(goal, x) < gain * _error(goal, best):
                 best = x
     f, f_plain = _reflectance(goal, best), _reflectance(goal, plain)
     return LobeStackFit(
@@ -92,21 +90,23 @@ def fit_lobe_stack(
     )
 
 
-def _reflectance(goal: Closeness, x: Array) -> Array:
+def _reflectance(goal: FitObjective, x: Array) -> Array:
+    """f (n, 3) in 1/sr of the stack with unknowns x, at the directions of the objective."""
     return lobe_model.stack_of(x).at(goal.where)
 
 
-def _error(goal: Closeness, x: Array) -> float:
+def _error(goal: FitObjective, x: Array) -> float:
+    """Square root of the objective of the stack with unknowns x."""
     return goal.cost(_reflectance(goal, x)) ** 0.5
 
 
 def _whole(plain: Array) -> Array:
-    """All unknowns of a plain stack."""
+    """All unknowns of a plain stack, from its reduced ones."""
     return plain[lobe_model.tied((len(plain) - PLAIN_BASE) // PLAIN_EACH)]
 
 
 def _plain(x: Array) -> Array:
-    """The unknowns of a plain stack, from all of it."""
+    """The reduced unknowns of a plain stack, from all of them."""
     places = lobe_model.tied((len(x) - lobe_model.BASE) // lobe_model.EACH)
     part = np.zeros(places.max() + 1)
     part[places] = x
@@ -114,7 +114,7 @@ def _plain(x: Array) -> Array:
 
 
 def _first(target: Target) -> list[Array]:
-    """Stacks of one lobe: a dielectric of each width, and a metal of the hue."""
+    """Stacks of one lobe: a dielectric of several roughnesses, and a metal of the BRDF's hue."""
     root = np.sqrt(np.clip(target.lambertian(), 0.01, 0.95))
     hue = 0.9 * root / root.max()
     edge = np.full(3, 0.7)
@@ -130,7 +130,8 @@ def _first(target: Target) -> list[Array]:
 
 
 def _further(x: Array) -> list[Array]:
-    """Stacks of one lobe more: each lobe gets a companion and shares what it reflects with it."""
+    """Stacks with one lobe more: a lobe is split into two of different roughness that share its
+    reflectance."""
     plain, starts = _plain(x), []
     for k in range((len(plain) - PLAIN_BASE) // PLAIN_EACH):
         place = slice(PLAIN_BASE + PLAIN_EACH * k, PLAIN_BASE + PLAIN_EACH * (k + 1))
@@ -149,7 +150,8 @@ def _further(x: Array) -> list[Array]:
     return starts
 
 
-def _descend(goal: Closeness, start: Array, most_steps: int, plain: bool) -> Array:
+def _descend(goal: FitObjective, start: Array, most_steps: int, plain: bool) -> Array:
+    """Least squares from a start; plain: over the reduced unknowns of a plain stack."""
     lobes = (len(start) - lobe_model.BASE) // lobe_model.EACH
     low, high = lobe_model.bounds(lobes)
     places = lobe_model.tied(lobes) if plain else np.arange(len(start))

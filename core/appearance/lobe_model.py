@@ -1,9 +1,9 @@
-"""A lobe stack as a vector of unknowns, its reflectance and its derivatives by them.
+"""A lobe stack as a vector of unknowns, its reflectance and its derivatives.
 
-Unknowns: square root of the diffuse albedo facing, midway and at the edge (9), diffuse roughness,
-then for each lobe √f90 (3), √(f0/f90) facing, midway and at the edge (9), and the roughness.
-Everything lies in [0, 1], steps are even in what the eye sees, and f0 ≤ f90 ≤ 1 needs no further
-constraint. A plain stack has fewer: the three values of a colour are one.
+Unknowns: square root of the diffuse albedo facing the viewer, midway and at the edge (9), diffuse
+roughness, then for each lobe √f90 (3), √(f0/f90) facing, midway and at the edge (9), and the
+roughness. All lie in [0, 1], steps are perceptually even, and f0 ≤ f90 ≤ 1 needs no further
+constraint. A plain stack has fewer unknowns: the three values of a colour are one.
 """
 
 from __future__ import annotations
@@ -17,28 +17,28 @@ from .principled import MIN_ROUGHNESS, Configuration
 
 Array = NDArray[np.floating]
 
-BASE, EACH = 10, 13  # unknowns of the diffuse base, and of a lobe
-PLAIN_BASE, PLAIN_EACH = 4, 7
-STEP = 1e-4  # for the derivatives by roughness
+BASE, EACH = 10, 13  # number of unknowns of the diffuse base, and of a lobe
+PLAIN_BASE, PLAIN_EACH = 4, 7  # the same of a plain stack
+STEP = 1e-4  # of the finite differences by roughness and diffuse colour
 
 
 def bounds(lobes: int) -> tuple[Array, Array]:
-    """(lowest, highest) of every unknown of a stack with this many lobes."""
+    """(lower, upper) bounds of the unknowns of a stack with this many lobes."""
     low, high = np.zeros(BASE + EACH * lobes), np.ones(BASE + EACH * lobes)
     low[BASE + EACH - 1 :: EACH] = MIN_ROUGHNESS
     return low, high
 
 
 def tied(lobes: int) -> NDArray[np.intp]:
-    """(unknowns,) the place of each among those of a plain stack: diffuse (3), its roughness, then
-    for each lobe √f90 (3), √(f0/f90) (3), roughness."""
+    """(unknowns,) index of each into the reduced unknowns of a plain stack: diffuse (3), its
+    roughness, then for each lobe √f90 (3), √(f0/f90) (3), roughness."""
     base = [0, 1, 2] * 3 + [3]
     lobe = [0, 1, 2] + [3, 4, 5] * 3 + [6]
     return np.array(base + [PLAIN_BASE + PLAIN_EACH * k + i for k in range(lobes) for i in lobe])
 
 
 def stack_of(x: Array) -> LobeStack:
-    """The stack that the unknowns stand for, plain where its three values agree."""
+    """The stack with these unknowns; a colour whose three values agree is stored as one."""
     facing, mid, edge = x[:9].reshape(3, 3) ** 2
     return LobeStack(
         diffuse=facing,
@@ -62,10 +62,10 @@ def reflectance_and_derivatives(x: Array, where: Configuration) -> tuple[Array, 
         g[:, None] * lobe.fresnel(where.cos_d, where.cos_o)
         for g, lobe in zip(shapes, stack.lobes, strict=True)
     ]
-    passed = [lobe.passed(where.cos_o) for lobe in stack.lobes]
+    transmission = [lobe.transmission(where.cos_o) for lobe in stack.lobes]
     # below[k]: the reflectance of lobe k and all below, without what lies above
     below: list[Array] = [base]
-    for reflected, part in zip(reversed(own), reversed(passed), strict=True):
+    for reflected, part in zip(reversed(own), reversed(transmission), strict=True):
         below.insert(0, np.asarray(reflected + part[:, None] * below[0], np.float64))
     above = np.ones(len(base))
     for k, lobe in enumerate(stack.lobes):
@@ -74,7 +74,7 @@ def reflectance_and_derivatives(x: Array, where: Configuration) -> tuple[Array, 
         at_0, at_90 = albedo_fit(where.cos_o, lobe.roughness**2)
         ratio = sum(s[:, None] * v**2 for s, v in zip(shares, a, strict=True))
         brightest = np.argmax(u**2 * (ratio * at_0[:, None] + at_90[:, None]), axis=1)
-        rest = np.where(passed[k] > 0, above, 0.0)[:, None] * below[k + 1]
+        rest = np.where(transmission[k] > 0, above, 0.0)[:, None] * below[k + 1]
         shape, flat = above * shapes[k], 1 - schlick
         for c in range(3):
             decides = (brightest == c)[:, None] * rest
@@ -87,9 +87,9 @@ def reflectance_and_derivatives(x: Array, where: Configuration) -> tuple[Array, 
         h = STEP if lobe.roughness < 0.5 else -STEP
         moved = Lobe(lobe.f0, lobe.f90, lobe.roughness + h, lobe.f0_mid, lobe.f0_edge)
         reflected = where.ggx(moved.roughness)[:, None] * moved.fresnel(where.cos_d, where.cos_o)
-        change = reflected + moved.passed(where.cos_o)[:, None] * below[k + 1] - below[k]
+        change = reflected + moved.transmission(where.cos_o)[:, None] * below[k + 1] - below[k]
         derivatives[start + 12] = above[:, None] * change / h
-        above = above * passed[k]
+        above = above * transmission[k]
     step = np.where(colour < 0.5, STEP, -STEP)
     by_colour = above[:, None] * (_diffuse(colour + step, x[9], where) - base) / step
     for j, share in enumerate(shares):
@@ -101,6 +101,7 @@ def reflectance_and_derivatives(x: Array, where: Configuration) -> tuple[Array, 
 
 
 def _lobe(p: Array) -> Lobe:
+    """The lobe with unknowns p (EACH,)."""
     f90 = p[:3] ** 2
     facing, mid, edge = f90 * p[3:12].reshape(3, 3) ** 2
     return Lobe(
@@ -113,4 +114,5 @@ def _lobe(p: Array) -> Lobe:
 
 
 def _diffuse(color: Array, roughness: float, where: Configuration) -> Array:
+    """f (n, 3) in 1/sr of the diffuse base alone."""
     return oren_nayar(color, roughness, where.cos_i, where.cos_o, where.cos_io)

@@ -1,16 +1,17 @@
-"""A stack of GGX lobes over a rough diffuse base: what one Principled BSDF cannot hold.
+"""A stack of GGX lobes over a rough diffuse base, for BRDFs that one Principled BSDF cannot
+represent.
 
 Each lobe is a generalised Schlick on GGX with Smith's height-correlated masking, α = roughness²,
-as MaterialX's `generalized_schlick_bsdf` (single scattering); the base is Oren–Nayar as Cycles has
-it. A lobe darkens all below it by 1 − the largest channel of its directional albedo towards the
-viewer, as Cycles does, so the stack is not quite reciprocal and never gains energy. The albedo is
-MaterialX's rational fit (`mx_ggx_dir_albedo_analytic`): a formula that Blender's nodes can
-repeat, so that numpy, scene/material/lobe_group.py and MaterialX compute one model.
+like MaterialX's `generalized_schlick_bsdf` (single scattering); the base is Cycles' Oren–Nayar. As
+in Cycles, a lobe attenuates everything below it by 1 − the largest channel of its directional
+albedo towards the viewer, so the stack is not quite reciprocal and never gains energy. The albedo
+is MaterialX's rational fit (`mx_ggx_dir_albedo_analytic`): a formula that Blender's nodes can
+evaluate, so that numpy, scene/material/lobe_group.py and MaterialX compute one model.
 
 Measured surfaces change their colour towards the silhouette in ways that no Fresnel term follows.
 So the diffuse colour and a lobe's f0 may have three values: facing the viewer, midway and at the
 edge, blended over y = (1 − cosθ of the view)² by the quadratic Bernstein polynomials. MaterialX has
-no such lobe: a stack with one value each is `plain`.
+no such lobe; a stack with one value each is `plain`.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ from .principled import Configuration, LayeredModel
 
 Array = NDArray[np.floating]
 
-MOST_LOBES = 3
-# Rational quadratic fit in x = cosθ, y = α: columns are the numerators of what multiplies f0 and
-# f90, then their denominators; rows the terms 1, x, y, xy, x², y², x²y, xy², x²y²
+MAX_LOBES = 3
+# Rational quadratic fit in x = cosθ, y = α. Columns: numerators of the factors of f0 and f90, then
+# their denominators; rows: the terms 1, x, y, xy, x², y², x²y, xy², x²y²
 ALBEDO_FIT = (
     (0.1003, 0.9345, 1.0, 1.0),
     (-0.6303, -2.323, -1.765, 0.2281),
@@ -45,10 +46,10 @@ ALBEDO_FIT = (
 @dataclass(frozen=True)
 class Lobe:
     """One GGX lobe. f0, f90: (3,) linear RGB in [0, 1], f0 ≤ f90: reflectance at normal and at
-    grazing incidence; roughness in [MIN_ROUGHNESS, 1]; f0_mid, f0_edge: f0 where the surface turns
-    away from the viewer (None: the same).
+    grazing incidence; roughness in [MIN_ROUGHNESS, 1]; f0_mid, f0_edge: f0 midway and at the
+    silhouette (None: the same).
 
-    exponent is Schlick's 5, always: the only one that Blender's nodes have.
+    exponent is always Schlick's 5, the only one that Blender's nodes support.
     """
 
     f0: Array
@@ -59,8 +60,8 @@ class Lobe:
     exponent: ClassVar[float] = 5.0
 
     def fresnel(self, cos_d: Array, cos_o: Array) -> Array:
-        """Generalised Schlick (..., 3) at the angle between light and half vector, towards a viewer
-        at cos_o."""
+        """Generalised Schlick (..., 3) at the angle between light and half vector, for a viewer at
+        cos_o."""
         s = np.clip(1.0 - cos_d, 0.0, 1.0)[..., None] ** self.exponent
         f0 = blended(cos_o, self.f0, self.f0_mid, self.f0_edge)
         return f0 + (np.asarray(self.f90, float) - f0) * s
@@ -71,16 +72,16 @@ class Lobe:
         f0 = blended(cos, self.f0, self.f0_mid, self.f0_edge)
         return f0 * at_0[..., None] + np.asarray(self.f90, float) * at_90[..., None]
 
-    def passed(self, cos_o: Array) -> Array:
-        """The part (...) in [0, 1] that it leaves of what lies below."""
+    def transmission(self, cos_o: Array) -> Array:
+        """The fraction (...) in [0, 1] of the light from below that passes the lobe."""
         return np.clip(1.0 - self.albedo(cos_o).max(axis=-1), 0.0, 1.0)
 
 
 @dataclass(frozen=True)
 class LobeStack(LayeredModel):
-    """diffuse: (3,) albedo in [0, 1]; diffuse_roughness in [0, 1] as the Diffuse BSDF has it;
-    lobes: topmost first, at most MOST_LOBES; diffuse_mid, diffuse_edge: diffuse where the surface
-    turns away from the viewer (None: the same)."""
+    """diffuse: (3,) albedo in [0, 1]; diffuse_roughness in [0, 1] as in the Diffuse BSDF; lobes:
+    topmost first, at most MAX_LOBES; diffuse_mid, diffuse_edge: diffuse midway and at the
+    silhouette (None: the same)."""
 
     diffuse: Array
     diffuse_roughness: float
@@ -90,7 +91,7 @@ class LobeStack(LayeredModel):
 
     @property
     def plain(self) -> bool:
-        """No colour changes towards the silhouette beyond Fresnel's."""
+        """Whether no colour changes towards the silhouette, apart from the Fresnel term."""
         turned = [self.diffuse_mid, self.diffuse_edge]
         turned += [f0 for lobe in self.lobes for f0 in (lobe.f0_mid, lobe.f0_edge)]
         return all(color is None for color in turned)
@@ -98,18 +99,18 @@ class LobeStack(LayeredModel):
     def at(self, where: Configuration) -> Array:
         """f (..., 3) in 1/sr."""
         total = np.zeros((*where.cos_i.shape, 3))
-        below = np.ones(where.cos_i.shape)  # what the lobes above leave
+        below = np.ones(where.cos_i.shape)  # transmission of the lobes above
         for lobe in self.lobes:
             shape = below * where.ggx(lobe.roughness)
             total += shape[..., None] * lobe.fresnel(where.cos_d, where.cos_o)
-            below = below * lobe.passed(where.cos_o)
+            below = below * lobe.transmission(where.cos_o)
         color = blended(where.cos_o, self.diffuse, self.diffuse_mid, self.diffuse_edge)
         base = oren_nayar(color, self.diffuse_roughness, where.cos_i, where.cos_o, where.cos_io)
         return np.where(where.seen[..., None], total + below[..., None] * base, 0.0)
 
 
 def blending(cos_o: Array) -> tuple[Array, Array, Array]:
-    """Shares of the values facing the viewer, midway and at the edge; their sum is 1."""
+    """Weights of the values facing the viewer, midway and at the edge; their sum is 1."""
     y = (1.0 - np.clip(cos_o, 0.0, 1.0)) ** 2
     return (1.0 - y) ** 2, 2.0 * y * (1.0 - y), y**2
 
@@ -126,7 +127,7 @@ def blended(cos_o: Array, facing: Array, mid: Array | None, edge: Array | None) 
 
 
 def albedo_fit(cos: Array, alpha: float) -> tuple[Array, Array]:
-    """What multiplies f0 and f90 in a GGX lobe's directional albedo, each of the shape of cos."""
+    """Factors of f0 and f90 in a GGX lobe's directional albedo, each in the shape of cos."""
     x, y = np.clip(cos, 0.0, 1.0), float(alpha)
     one = np.ones_like(x)
     terms = np.stack([one, x, y * one, x * y, x**2, y**2 * one, x**2 * y, x * y**2, x**2 * y**2])

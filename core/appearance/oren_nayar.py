@@ -1,9 +1,9 @@
 """The rough diffuse reflection of Cycles: Fujii's improved Oren–Nayar with multiple scattering.
 
 Single scattering: Fujii 2012, "Improved Oren-Nayar" (A and B, no trigonometric functions). Multiple
-scattering: OpenPBR's energy-preserving term, separable and reciprocal. What Cycles 4.3 and later
-compute (4.2 has no multiple scattering; EEVEE takes every diffuse surface for a Lambertian one).
-Asserted against renders in tests/wheel.
+scattering: OpenPBR's energy-preserving term, separable and reciprocal. Cycles 4.3 and later compute
+this model (4.2 has no multiple scattering; EEVEE renders every diffuse surface as Lambertian).
+Tests in tests/wheel compare it with renders.
 """
 
 from __future__ import annotations
@@ -12,15 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.floating]
-SMOOTH = 1e-5  # below it Cycles takes the surface for a Lambertian one
+SMOOTH = 1e-5  # roughness below which Cycles renders a Lambertian surface
 
 
 def oren_nayar(color: Array, roughness: float, cos_i: Array, cos_o: Array, cos_io: Array) -> Array:
     """f (..., 3) in 1/sr.
 
     color: (3,) or (..., 3) linear RGB; roughness in [0, 1]; cos_i, cos_o: light and view against
-    the normal; cos_io: light against view, all of one shape (...). Below the horizon it means
-    nothing.
+    the normal; cos_io: light against view, all of one shape (...). Undefined below the horizon.
     """
     color = np.asarray(color, float)
     if roughness < SMOOTH:
@@ -39,7 +38,7 @@ def oren_nayar(color: Array, roughness: float, cos_i: Array, cos_o: Array, cos_i
 
 
 def _albedo(a: float, b: float, cos: Array) -> Array:
-    """What single scattering sends back of light (or to a viewer) at this cosine, white surface."""
+    """Single-scattering albedo for light (or a viewer) at this cosine, of a white surface."""
     safe = np.maximum(cos, 1e-6)
     sin = np.sqrt(np.maximum(1 - safe**2, 0))
     g = sin * (np.arccos(safe) - 2 / 3 - sin * safe) + 2 / 3 * (sin / safe) * (1 - sin**3)

@@ -1,14 +1,14 @@
-"""A BRDF as two pictures, so that a shader can look it up.
+"""A BRDF as two pictures for lookup in a shader.
 
 Every azimuth φd of the basis' grid is a block of (θh across, θd down) with a border one texel wide
-that repeats its edge; blocks of all φd stand side by side. A bilinear lookup in two neighbouring
-blocks, blended, is exactly AngleGrid's trilinear interpolation. That is linear in
-ln(ρ·cosMap + ε), so the sum over a hundred components may be done at the nodes, once.
+that repeats its edge; the blocks of all φd are side by side. Bilinear lookups in two neighbouring
+blocks, blended, are exactly AngleGrid's trilinear interpolation. This is linear in ln(ρ·cosMap +
+ε), so a hundred components can be summed at the nodes once.
 
-- The components' picture, one a basis: the first TRAITS components, whose coefficients are the
-  shader's inputs. Rows of blocks hold four of them each in R, G, B, A, as half floats.
-- The remainder's picture, one a material: what is left of the logarithm, R, G and B, as floats. It
-  is taken from the half floats themselves: their rounding costs nothing at the measured
+- The components' picture, one per basis: the first TRAITS components, whose coefficients are inputs
+  of the shader. A row of blocks holds four of them in R, G, B, A, as half floats.
+- The remainder's picture, one per material: the rest of the logarithm, R, G and B, as floats. It is
+  the difference to the half floats themselves, so their rounding has no effect at the measured
   coefficients.
 """
 
@@ -25,20 +25,19 @@ from ..basis import AngleGrid, Basis, PrincipalBRDF
 from ..errors import InputError
 from ..photo import write_exr
 
-TRAITS = 8
-BORDER = 1
+TRAITS = 8  # coefficients that are inputs of the shader
+BORDER = 1  # texels
 COMPONENTS_PREFIX, REMAINDER_PREFIX = "patina_components_", "patina_brdf_"
 SAMPLING_PREFIX = "patina_sampling_"
 NAME_PATTERN = re.compile(r"patina_(components|brdf|sampling)_[0-9a-f]{12}\.exr")
-"""Every name that components_name, remainder_name and sampling_name make."""
+"""Matches every name that components_name, remainder_name and sampling_name generate."""
 EXR_MAGIC = b"\x76\x2f\x31\x01"  # the first bytes of every OpenEXR file
 MAX_FILE_BYTES = 1 << 27  # several times the largest picture of a basis on MERL's full angle grid
 
 
 def is_own_name(name: object) -> bool:
-    """Whether this is a file name that this module makes. Names that come from a .blend must pass
-    before they are joined to a folder: the pattern has no separator, drive or "..".
-    """
+    """Whether this is a file name that this module generates. Names from a .blend must be checked
+    before they are joined to a folder: the pattern has no separator, drive or ".."."""
     return isinstance(name, str) and NAME_PATTERN.fullmatch(name) is not None
 
 
@@ -48,17 +47,17 @@ def traits(count: int) -> int:
 
 
 def groups(count: int) -> int:
-    """Rows of blocks that ``count`` components take, four a row."""
+    """Rows of blocks for ``count`` components, four per row."""
     return -(-count // 4)
 
 
 def size(grid: AngleGrid, rows: int) -> tuple[int, int]:
-    """(width, height) in texels of a picture of so many rows of blocks."""
+    """(width, height) in texels of a picture with so many rows of blocks."""
     return grid.n_p * (grid.n_h + 2 * BORDER), rows * (grid.n_d + 2 * BORDER)
 
 
 def component_texels(basis: Basis) -> NDArray[np.float16]:
-    """(height, width, 4) float16, row 0 on top: the first components."""
+    """(height, width, 4) float16, row 0 at the top: the first components."""
     count = traits(basis.count)
     slots = np.zeros((4 * groups(count), *basis.grid.shape), np.float16)
     slots[:count] = basis.components[:count]
@@ -66,7 +65,8 @@ def component_texels(basis: Basis) -> NDArray[np.float16]:
 
 
 def remainder_texels(brdf: PrincipalBRDF) -> NDArray[np.float32]:
-    """(height, width, 3) float32: ln(ρ·cosMap + ε) less what the first components bring to it."""
+    """(height, width, 3) float32: ln(ρ·cosMap + ε) minus the contribution of the first
+    components."""
     count = traits(brdf.coefficients.shape[1])
     first = brdf.basis.components[:count].astype(np.float16).reshape(count, -1).astype(np.float64)
     left = brdf.log_table.values.T - brdf.coefficients[:, :count] @ first
@@ -74,7 +74,7 @@ def remainder_texels(brdf: PrincipalBRDF) -> NDArray[np.float32]:
 
 
 def _blocks(slots: NDArray, channels: int) -> NDArray:
-    """(slots, n_h, n_d, n_p) → texels, ``channels`` slots a row of blocks."""
+    """(slots, n_h, n_d, n_p) → texels, ``channels`` slots per row of blocks."""
     pad = [(0, 0), (BORDER, BORDER), (BORDER, BORDER), (0, 0)]
     bordered = np.pad(slots, pad, mode="edge")  # (slot, h, d, p)
     n_h, n_d, n_p = bordered.shape[1:]
@@ -83,17 +83,18 @@ def _blocks(slots: NDArray, channels: int) -> NDArray:
 
 
 def write_components(path: Path, basis: Basis) -> Path:
-    """Write the components' picture; the file appears whole or not at all."""
+    """Write the components' picture, atomically. Raises InputError."""
     return write_picture(path, component_texels(basis), half=True)
 
 
 def write_remainder(path: Path, brdf: PrincipalBRDF) -> Path:
-    """Write the remainder's picture; the file appears whole or not at all."""
+    """Write the remainder's picture, atomically. Raises InputError."""
     return write_picture(path, remainder_texels(brdf))
 
 
 def write_picture(path: Path, pixels: NDArray, half: bool = False) -> Path:
-    """Write an EXR (height, width, channels), row 0 on top; it appears whole or not at all."""
+    """Write an EXR (height, width, channels), row 0 at the top, atomically. Raises InputError where
+    the folder cannot be created."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -103,21 +104,23 @@ def write_picture(path: Path, pixels: NDArray, half: bool = False) -> Path:
 
 
 def components_name(basis: Basis) -> str:
-    """One file serves every material of a basis."""
+    """File name of the components' picture: one file for all materials of a basis."""
     return f"{COMPONENTS_PREFIX}{basis.version}.exr"
 
 
 def remainder_name(brdf: PrincipalBRDF) -> str:
-    """A name of its own for every BRDF: renderers keep what they have read by its name."""
+    """File name of the remainder's picture, unique for every BRDF: renderers cache pictures by
+    name."""
     return f"{REMAINDER_PREFIX}{_digest(brdf)}.exr"
 
 
 def sampling_name(brdf: PrincipalBRDF) -> str:
-    """Likewise, of the picture of sampling_table.py."""
+    """File name of the picture of sampling_table.py, unique for every BRDF."""
     return f"{SAMPLING_PREFIX}{_digest(brdf)}.exr"
 
 
 def _digest(brdf: PrincipalBRDF) -> str:
+    """Hash of a BRDF: its basis and coefficients."""
     digest = hashlib.sha256(brdf.basis.version.encode())
     digest.update(np.ascontiguousarray(brdf.coefficients, np.float64).tobytes())
     return digest.hexdigest()[:12]
@@ -126,8 +129,8 @@ def _digest(brdf: PrincipalBRDF) -> str:
 def lookup(
     atlas: NDArray[np.floating], grid: AngleGrid, u: NDArray[np.floating], group: int
 ) -> NDArray[np.floating]:
-    """(n, channels): what the shader reads at fractional nodes u (n, 3) = (θh, θd, φd); for the
-    tests."""
+    """(n, channels): the value that the shader reads at fractional nodes u (n, 3) = (θh, θd, φd);
+    for tests."""
     block_h, block_d = grid.n_h + 2 * BORDER, grid.n_d + 2 * BORDER
     p0 = np.minimum(np.floor(u[:, 2]).astype(int), grid.n_p - 1)
     blend = (u[:, 2] - p0)[:, None]
@@ -140,7 +143,7 @@ def lookup(
 def _bilinear(
     image: NDArray[np.floating], x: NDArray[np.floating], y: NDArray[np.floating]
 ) -> NDArray[np.floating]:
-    """Between texel centres at whole numbers."""
+    """Bilinear interpolation; texel centres are at whole numbers."""
     x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
     f, g = (x - x0)[:, None], (y - y0)[:, None]
     wide = image.astype(np.float64)

@@ -1,4 +1,4 @@
-"""The OSL source for a number of coefficients as inputs, and the list of all inputs."""
+"""The OSL source with a given number of coefficients as inputs, and the list of all inputs."""
 
 from __future__ import annotations
 
@@ -13,17 +13,18 @@ from . import closure_split, osl_atlas, sampling_table
 from .hemisphere import KNEE as CELL_KNEE
 
 TEMPLATE = Path(__file__).parents[2] / "assets" / "osl" / "patina_brdf.osl"
-LAMPS = 8
-# inputs that name a picture
+LAMPS = 8  # largest number of lamps
+# inputs that are paths of pictures
 COMPONENTS, REMAINDER, SAMPLING = "components", "remainder", "sampling"
 ALPHAS = "alphas"  # of the lobes that Cycles samples
-# the world's table, and the rows of the rotation from world space to its picture
+# the table of the world, and the rows of the rotation from world space to its picture
 WORLD = ("world", "world_x", "world_y", "world_z")
 
 
 @dataclass(frozen=True)
 class Input:
-    """One input of the shader. kind: string, float, int, vector or color; hidden: written by us."""
+    """One input of the shader. kind: string, float, int, vector or color; hidden: set by Patina,
+    not by the user."""
 
     name: str
     label: str
@@ -38,7 +39,7 @@ def coefficient_name(component: int) -> str:
 
 
 def coefficient_inputs(count: int) -> list[Input]:
-    """R, G and B of every component's coefficient, as the X, Y and Z of a vector."""
+    """The coefficient of every component, R, G and B as the X, Y and Z of a vector."""
     return [
         Input(coefficient_name(i), f"Coefficient {i + 1}", "vector", (0.0, 0.0, 0.0))
         for i in range(count)
@@ -46,7 +47,7 @@ def coefficient_inputs(count: int) -> list[Input]:
 
 
 def lamp_inputs() -> list[Input]:
-    """The table of lamps, six inputs a lamp (see the shader's lamp_light)."""
+    """The table of lamps, six inputs per lamp (see lamp_light in the shader)."""
     parts = (("kind", "int", 0), ("at", "vector", (0.0,) * 3), ("power", "color", (0.0,) * 3),
              ("axis", "vector", (0.0,) * 3), ("side", "vector", (0.0,) * 3),
              ("form", "vector", (0.0,) * 3))  # fmt: skip
@@ -114,6 +115,7 @@ def source(basis: Basis, count: int) -> str:
 
 
 def _parameters(listed: list[Input]) -> str:
+    """OSL declarations of some inputs."""
     lines = []
     for i in listed:
         zero = "0" if i.kind == "int" else f"{i.kind}(0)"

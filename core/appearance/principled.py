@@ -1,10 +1,10 @@
-"""Blender's Principled BSDF as a BRDF: what Cycles 4.2 to 5.x computes with distribution 'GGX'.
+"""Blender's Principled BSDF as a BRDF, as Cycles 4.2 to 5.x computes it with distribution 'GGX'.
 
-Layers from the top: coat (dielectric GGX), metal (GGX with F82 tint, Kutz et al. 2021) mixed with a
-dielectric of GGX over Oren–Nayar. Every layer darkens what lies below by 1 − its albedo seen from
-the viewer, so the model is not quite reciprocal. α = roughness², Smith's height-correlated masking
-(Heitz 2014). Left out: transmission, subsurface, sheen, thin film, anisotropy, multiple scattering
-(distribution 'MULTI_GGX').
+Layers from the top: coat (dielectric GGX), then metal (GGX with F82 tint, Kutz et al. 2021) mixed
+with a dielectric of GGX over Oren–Nayar. Every layer attenuates those below by 1 − its albedo
+towards the viewer, so the model is not quite reciprocal. α = roughness², Smith's height-correlated
+masking (Heitz 2014). Not modelled: transmission, subsurface, sheen, thin film, anisotropy, multiple
+scattering (distribution 'MULTI_GGX').
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from .layer_albedo import (
 from .oren_nayar import oren_nayar
 
 Array = NDArray[np.floating]
-# Below it Cycles 4.2 takes the lobe for a mirror and evaluates nothing (its test: α² > 5e-7)
+# below it Cycles 4.2 treats the lobe as a mirror and does not evaluate it (its test: α² > 5e-7)
 MIN_ROUGHNESS = 0.03
 
 
 class LayeredModel(ABC):
-    """A BRDF that layers make: it tells light from view."""
+    """A BRDF of layers; not reciprocal, so light and view are not interchangeable."""
 
     def evaluate(self, angles: Angles) -> Array:
         """f (..., 3) in 1/sr at half/difference angles (radians) of any shape."""
@@ -50,11 +50,11 @@ class LayeredModel(ABC):
 
 @dataclass(frozen=True)
 class Principled(LayeredModel):
-    """Inputs of the Principled BSDF node, by the names of its sockets.
+    """Inputs of the Principled BSDF node, named as its sockets.
 
     base_color, specular_tint, coat_tint: (3,) linear RGB. roughness, diffuse_roughness, metallic,
-    coat_weight, coat_roughness in [0, 1]; specular_ior_level 0.5 leaves the reflectance at normal
-    incidence as ior has it. Blender 4.2 has no diffuse roughness.
+    coat_weight, coat_roughness in [0, 1]; with specular_ior_level 0.5 the reflectance at normal
+    incidence is that of ior. Blender 4.2 has no diffuse roughness.
     """
 
     base_color: Array = field(default_factory=lambda: np.full(3, 0.8))
@@ -72,7 +72,7 @@ class Principled(LayeredModel):
     def at(self, where: Configuration) -> Array:
         """f (..., 3) in 1/sr."""
         total = np.zeros((*where.cos_i.shape, 3))
-        below = np.ones((*where.cos_i.shape, 1))  # what the layers above leave
+        below = np.ones((*where.cos_i.shape, 1))  # transmission of the layers above
         if self.coat_weight > 0:
             lobe = where.ggx(self.coat_roughness)
             fresnel = fresnel_dielectric(where.cos_d, self.coat_ior)
@@ -92,13 +92,15 @@ class Principled(LayeredModel):
         return np.where(where.seen[..., None], total, 0.0)
 
     def _through_coat(self, cos_o: Array) -> Array:
-        """What the coat's colour leaves (..., 3): absorption along the refracted ray out."""
+        """Transmission of the coat's tint (..., 3): absorption along the refracted ray towards the
+        viewer."""
         tint = np.asarray(self.coat_tint, float)
         sine2 = (1.0 - np.minimum(cos_o, 1.0) ** 2) / self.coat_ior**2
         depth = 1.0 / np.sqrt(np.maximum(1.0 - sine2, 1e-9))
         return 1.0 + self.coat_weight * (tint ** depth[..., None] - 1.0)
 
     def _dielectric(self, where: Configuration, lobe: Array, tint: Array) -> Array:
+        """f (..., 3) in 1/sr of the specular layer over the diffuse base."""
         ior, scalar_f0 = self.ior, f0_from_ior(self.ior)
         if self.specular_ior_level != 0.5:
             scalar_f0 *= 2.0 * self.specular_ior_level
@@ -106,7 +108,7 @@ class Principled(LayeredModel):
         diffuse = oren_nayar(
             self.base_color, self.diffuse_roughness, where.cos_i, where.cos_o, where.cos_io
         )
-        if ior == 1.0:  # Cycles makes no specular lobe at all
+        if ior == 1.0:  # Cycles has no specular lobe then
             return diffuse
         f0 = np.clip(scalar_f0 * tint, 0.0, 1.0)
         s = rescaled_fresnel(where.cos_d, ior)[..., None]
@@ -118,8 +120,8 @@ class Principled(LayeredModel):
 
 @dataclass(frozen=True)
 class Configuration:
-    """Pairs of directions, reduced to cosines of one shape: light, view and half vector against
-    the normal (i, o, h), and light against half vector (d)."""
+    """Pairs of directions, reduced to cosines of one shape: light, view and half vector against the
+    normal (i, o, h), and light against half vector (d)."""
 
     cos_i: Array
     cos_o: Array
@@ -145,7 +147,7 @@ class Configuration:
         return cls(light[..., 2], view[..., 2], half[..., 2], cos_d)
 
     def followed_by(self, other: Configuration) -> Configuration:
-        """Both, one after the other."""
+        """Both sets of directions, one after the other."""
         return Configuration(
             *(
                 np.concatenate([getattr(part, name) for part in (self, other)])
@@ -160,7 +162,7 @@ class Configuration:
 
     @cached_property
     def seen(self) -> NDArray[np.bool_]:
-        """Light and view both above the horizon."""
+        """Whether light and view are both above the horizon."""
         return (self.cos_i > 0) & (self.cos_o > 0)
 
     def ggx(self, roughness: float) -> Array:

@@ -1,4 +1,5 @@
-"""Fit the Principled BSDF to a BRDF: near in pictures, and in the cube root (closeness.py)."""
+"""Fit the Principled BSDF to a BRDF, by rendered pictures and the cube-root metric
+(closeness.py)."""
 
 from __future__ import annotations
 
@@ -10,41 +11,42 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from .closeness import Closeness
+from .closeness import FitObjective
 from .cube_root import COARSE, NODES, Evaluate
 from .layer_albedo import ior_from_f0
 from .principled import MIN_ROUGHNESS, Principled
 
 Array = NDArray[np.floating]
 
-SIMPLER = 1.05  # a pure dielectric or metal may be this much farther off than a mixture
-METALLIC, PINNED = 3, 1e-3
-COAT_GAIN = 0.97  # a coat must bring the error below this fraction of what goes without it
-COAT_FROM = 0.003  # and is not worth having where it is smaller than this already
-TINT_GAIN = 0.97  # a specular tint must bring it below this fraction of what goes without
+PURE_TOLERANCE = 1.05  # allowed error of a pure dielectric or metal relative to a mixture
+METALLIC, PINNED = 3, 1e-3  # index of the unknown; half the interval when it is fixed
+COAT_GAIN = 0.97  # a coat must reduce the error below this fraction of that without
+COAT_FROM = 0.003  # no coat is tried where the error is smaller
+TINT_GAIN = 0.97  # a specular tint must reduce the error below this fraction of that without
 F0_OF_GLASS = 0.04  # reflectance at normal incidence of IOR 1.5
-MOST_BY_LEVEL = 2 * F0_OF_GLASS  # the most that the specular level makes of it
+MAX_F0_BY_LEVEL = 2 * F0_OF_GLASS  # largest reflectance that the specular level can set
 
-# unknowns: base colour (as its square root: even steps in what the eye sees), metallic, roughness,
+# unknowns: base colour (square root: perceptually even steps), metallic, roughness,
 # reflectance at normal incidence (square root), diffuse roughness, specular tint, coat weight,
 # coat roughness
 LOWER = np.array([0, 0, 0, 0, MIN_ROUGHNESS, 0, 0, 0, 0, 0, 0, MIN_ROUGHNESS])
 UPPER = np.array([1, 1, 1, 1, 1, 0.7, 1, 1, 1, 1, 1, 1.0])
-COAT = 10
+COAT = 10  # index of the first unknown of the coat
 PLAIN, TINTED, COAT_TOO = tuple(range(7)), tuple(range(10)), (COAT, COAT + 1)
 
 
 @dataclass(frozen=True)
 class PrincipledFit:
-    """The Principled nearest to a BRDF, and how near that is.
+    """The Principled BSDF closest to a BRDF, and its errors.
 
     error: relative cube-root error, ‖∛(f cosθi) − ∛(ρ cosθi)‖ / ‖∛(ρ cosθi)‖.
-    diffuse_error: the same of the best Lambertian, to compare with; lambertian: its albedo (3,).
-    errors: what was made small (closeness.py), of each start: 'diffuse', 'glossy', 'metal',
-        'mirror' (those that lost on a coarser quadrature), 'coated' where it was tried.
-    start: the one that won.
-    clipped: True where the BRDF asks for a base colour above 1 and did not get it.
-    psnr: dB, in the pictures of random_light.py.
+    diffuse_error: the same for the best Lambertian surface, as a reference; lambertian: its albedo
+    (3,).
+    errors: start → square root of the objective (closeness.py): 'diffuse', 'glossy', 'metal',
+    'mirror' (those that lost, on a coarser quadrature), and 'coated' where it was tried.
+    start: the one that was chosen.
+    clipped: True where a base colour above 1 would fit better.
+    psnr: dB, of the pictures of random_light.py.
     """
 
     principled: Principled
@@ -60,19 +62,20 @@ class PrincipledFit:
 def fit_principled(
     evaluate: Evaluate, coat: bool = True, nodes: tuple[int, int, int] = NODES
 ) -> PrincipledFit:
-    """The Principled nearest to ``evaluate(angles) -> (n, 3)``, ρ in 1/sr.
+    """The Principled BSDF closest to ``evaluate(angles) -> (n, 3)``, ρ in 1/sr.
 
-    coat: allow a second lobe where it lowers the error by some percent. A pure dielectric or a
-    pure metal is taken where it comes nearly as near as a mixture: no surface is half a metal.
+    coat: allow a second lobe where it lowers the error by some percent. A pure dielectric or a pure
+    metal is preferred where it fits nearly as well as a mixture: no real surface is half a metal.
+    Raises FitError where evaluate returns another shape or values that are not finite.
     """
-    goal, coarse = Closeness.of(evaluate, nodes), Closeness.of(evaluate, COARSE)
+    goal, coarse = FitObjective.of(evaluate, nodes), FitObjective.of(evaluate, COARSE)
 
     def cost(x: Array) -> float:
         return goal.cost(_principled(x).at(goal.where)) ** 0.5
 
     mean = goal.target.lambertian()
     root = np.sqrt(np.clip(mean, 0.02, 0.95))
-    peak = np.sqrt(np.clip(mean / max(mean.max(), 1e-6), 0.02, 0.95))  # a metal: hue alone
+    peak = np.sqrt(np.clip(mean / max(mean.max(), 1e-6), 0.02, 0.95))  # of a metal: only the hue
     rest = [0.1, 1.0, 1.0, 1.0, 0.0, 0.2]
     starts = {
         "diffuse": [*root, 0.02, 0.7, 0.15, *rest],
@@ -111,13 +114,14 @@ def fit_principled(
 
 
 def _principled(x: Array) -> Principled:
+    """The Principled BSDF with these unknowns."""
     f0 = float(x[5]) ** 2
     return Principled(
         base_color=np.clip(x[:3] ** 2, 0, 1),
         metallic=float(x[METALLIC]),
         roughness=float(x[4]),
-        ior=1.5 if f0 <= MOST_BY_LEVEL else ior_from_f0(f0),
-        specular_ior_level=0.5 * f0 / F0_OF_GLASS if f0 <= MOST_BY_LEVEL else 0.5,
+        ior=1.5 if f0 <= MAX_F0_BY_LEVEL else ior_from_f0(f0),
+        specular_ior_level=0.5 * f0 / F0_OF_GLASS if f0 <= MAX_F0_BY_LEVEL else 0.5,
         specular_tint=np.array(x[7:10]),
         coat_weight=float(x[COAT]),
         coat_roughness=float(x[COAT + 1]),
@@ -126,9 +130,9 @@ def _principled(x: Array) -> Principled:
 
 
 def _descend(
-    goal: Closeness, start: Array, free: Sequence[int], metallic: float | None = None
+    goal: FitObjective, start: Array, free: Sequence[int], metallic: float | None = None
 ) -> Array:
-    """Least squares over the ``free`` unknowns; the others stay as they start, and so does
+    """Least squares over the ``free`` unknowns; the others stay at their start values, and so does
     metallic where it is given."""
     places = list(free)
     low, high = LOWER.copy(), UPPER.copy()
@@ -154,19 +158,19 @@ def _descend(
         ftol=1e-6,
         max_nfev=40,
     )
-    settled = _settle(whole(result.x))
+    settled = _zero_negligible(whole(result.x))
     if metallic is not None:
         settled[METALLIC] = metallic
     return settled
 
 
-def _purest(goal: Closeness, mixed: Array, free: Sequence[int]) -> Array:
-    """The pure dielectric or metal that is nearly as near as the mixture, else the mixture."""
+def _purest(goal: FitObjective, mixed: Array, free: Sequence[int]) -> Array:
+    """The pure dielectric or metal that fits nearly as well as the mixture, else the mixture."""
 
     def cost(x: Array) -> float:
         return goal.cost(_principled(x).at(goal.where)) ** 0.5
 
-    within = SIMPLER * cost(mixed) + 1e-4
+    within = PURE_TOLERANCE * cost(mixed) + 1e-4
     for pure in (0.0, 1.0):
         x = _descend(goal, mixed, free, metallic=pure)
         if cost(x) < within:
@@ -174,8 +178,8 @@ def _purest(goal: Closeness, mixed: Array, free: Sequence[int]) -> Array:
     return mixed
 
 
-def _settle(x: Array) -> Array:
-    """Numbers a hair from 0 become 0: an artist reads 'metallic 0', not 0.0004."""
+def _zero_negligible(x: Array) -> Array:
+    """Set negligible values to 0, so that a user sees 'metallic 0' and not 0.0004."""
     settled = x.copy()
     for i in (METALLIC, 6, COAT):
         if x[i] < 2e-3:

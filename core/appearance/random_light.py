@@ -1,11 +1,11 @@
-"""How far a model is from a BRDF in pictures: points of a sphere under many made-up skies.
+"""Distance of a model from a BRDF in rendered pictures: points of a sphere under many random skies.
 
-A metric over single directions does not know what light does: it adds up, so that errors of
-opposite sign cancel and a lobe's width matters less than what it holds (Bieron and Peers 2020,
-"An adaptive BRDF fitting metric", choose fits by the rendered image for this reason). Here the
-image itself is what is fitted. Views are even over the disc of a sphere; each is lit by skies of a
-broad gradient and patches of light of all widths, made up once and for all; radiance is encoded as
-sRGB, white at the 95th percentile of the true one, and clipped there as in an 8-bit picture.
+A metric over single directions ignores that light is integrated: errors of opposite sign cancel,
+and a lobe's width matters less than its energy (Bieron and Peers 2020, "An adaptive BRDF fitting
+metric", select fits by the rendered image for this reason). Here the image itself is fitted. Views
+are uniform over the disc of a sphere; each is lit by random but fixed skies of a broad gradient and
+patches of light of all widths. Radiance is encoded as sRGB, with white at the 95th percentile of
+the true radiance, and clipped there as in an 8-bit picture.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from .principled import Configuration
 
 Array = NDArray[np.floating]
 
-VIEWS, SKIES = 16, 30  # pixels are lit by so many skies each
-NODES = (26, 8)  # half vectors around the normal: θh on a logarithm, φh over half a turn
-KNEE = np.radians(0.4)
-LIMB = 0.98  # squared distance from the centre of the disc that counts
-PATCHES = 5
+VIEWS, SKIES = 16, 30  # each view is lit by SKIES skies
+NODES = (26, 8)  # half vectors: θh spaced logarithmically, φh over 180°
+KNEE = np.radians(0.4)  # θh is spaced linearly below, logarithmically above
+LIMB = 0.98  # largest squared distance from the centre of the disc
+PATCHES = 5  # patches of light of a sky
 WIDTHS = np.radians([2.0, 35.0])  # of the patches, log-uniform
-SPREAD, SHARE = 1.6, 2.0  # of the patches' light: log-normal, and against the gradient's
-WHITE = 95.0
+SPREAD, SHARE = 1.6, 2.0  # of the patches' flux: log-normal deviation, ratio to the gradient's
+WHITE = 95.0  # percentile of the radiance
 
 
 @dataclass(frozen=True)
 class Pictures:
-    """What to fit. where: n directions, view after view; parts: of each view its place in them and
-    its light (SKIES, n_view), L·cosθ·dω; encoded: (VIEWS·SKIES, 3) the true picture in [0, 1];
-    white: radiance that is 1."""
+    """The target of a fit. where: n directions, view after view; parts: for each view its slice of
+    them and its light (SKIES, n_view), L·cosθ·dω; encoded: (VIEWS·SKIES, 3) the true pictures in
+    [0, 1]; white: radiance that is encoded as 1."""
 
     where: Configuration
     parts: Sequence[tuple[slice, Array]]
@@ -47,17 +47,18 @@ class Pictures:
 
     @classmethod
     def of(cls, evaluate: Evaluate) -> Pictures:
-        """evaluate(angles) -> ρ (n, 3) in 1/sr. Raises FitError where it gives something else."""
+        """evaluate(angles) -> ρ (n, 3) in 1/sr. Raises FitError where the result has another shape
+        or is not finite."""
         angles, where, parts = _light()
         rho = np.asarray(evaluate(angles), float)
         if rho.shape != (len(where.cos_i), 3) or not np.isfinite(rho).all():
-            raise FitError(f"the BRDF gave {rho.shape} numbers, or some that are not finite")
+            raise FitError(f"the BRDF returned {rho.shape} values, or some that are not finite")
         radiance = np.concatenate([light @ np.maximum(rho[part], 0) for part, light in parts])
         white = max(float(np.percentile(radiance, WHITE)), 1e-9)
         return cls(where, parts, encoded(radiance / white)[0], white)
 
     def residual(self, f: Array) -> Array:
-        """(VIEWS·SKIES, 3): encoded picture of a model's f (n, 3) minus the true one."""
+        """(VIEWS·SKIES, 3): encoded pictures of a model's f (n, 3) minus the true ones."""
         return encoded(self._radiance(f) / self.white)[0] - self.encoded
 
     def residual_and_slopes(self, f: Array, slopes: Array) -> tuple[Array, Array]:
@@ -67,15 +68,16 @@ class Pictures:
         return found - self.encoded, change * (slope / self.white)
 
     def psnr(self, f: Array) -> float:
-        """dB of the model's pictures against the true ones."""
+        """PSNR in dB of the model's pictures."""
         return float(-10 * np.log10(max(np.mean(self.residual(f) ** 2), 1e-6)))
 
     def _radiance(self, f: Array) -> Array:
+        """(VIEWS·SKIES, 3) radiance of the pixels for f (n, 3) in 1/sr."""
         return np.concatenate([light @ f[part] for part, light in self.parts])
 
 
 def encoded(radiance: Array) -> tuple[Array, Array]:
-    """sRGB encoding (IEC 61966-2-1) of radiance, 1 is white and clips; and its slope."""
+    """sRGB encoding (IEC 61966-2-1) of radiance, clipped at 1, and its derivative."""
     x = np.clip(radiance, 0.0, 1.0)
     power = np.maximum(x, 0.0031308) ** (1 / 2.4)
     toe = x <= 0.0031308
@@ -86,7 +88,7 @@ def encoded(radiance: Array) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=1)
 def _light() -> tuple[Angles, Configuration, tuple[tuple[slice, Array], ...]]:
-    """Directions and light of all views; the same in every run."""
+    """Directions and light of all views, identical in every run."""
     rng = np.random.default_rng(20)
     n_h, n_p = NODES
     span = np.log1p(np.pi / 2 / KNEE)
@@ -121,7 +123,8 @@ def _light() -> tuple[Angles, Configuration, tuple[tuple[slice, Array], ...]]:
 
 
 def _sky(rng: np.random.Generator, *directions: Array) -> Array:
-    """Sum of a sky's radiance (n,) over directions (n, 3) each; its mean over the sphere is 1."""
+    """Sum of a random sky's radiance (n,) over several directions (n, 3); its mean over the sphere
+    is 1."""
     up = _direction(rng)
     contrast = rng.uniform(0.0, 1.0)
     patches = [
@@ -133,12 +136,13 @@ def _sky(rng: np.random.Generator, *directions: Array) -> Array:
         total += 1.0 + contrast * np.tanh(2.0 * d @ up)
         for centre, width, flux in patches:
             sharp = 1.0 / width**2
-            # von Mises–Fisher: holds as much light as ``flux`` of a uniform sky
+            # von Mises–Fisher: as much light as a uniform sky of radiance ``flux``
             peak = flux * 2.0 * sharp / -np.expm1(-2.0 * sharp)
             total += peak * np.exp(sharp * (d @ centre - 1.0)) / PATCHES * SHARE
     return total / (1.0 + SHARE * np.mean([flux for *_, flux in patches]))
 
 
 def _direction(rng: np.random.Generator) -> Array:
+    """A random unit vector."""
     d = rng.normal(size=3)
     return np.asarray(d / np.linalg.norm(d))

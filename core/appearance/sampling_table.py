@@ -1,8 +1,9 @@
-"""Where the rest of a BRDF sends light: a table to draw half vectors from, for every view.
+"""Importance sampling of the rest of a BRDF: a table from which half vectors are drawn, for every
+view.
 
-Marginal over θh and conditional over φh, as pbrt's tabulated distributions, constant in a cell of
-the grid of hemisphere.py. The density follows the absolute rest that closure_split.py leaves, mean
-over the channels; a little of it goes everywhere, so that no weight runs away.
+Marginal over θh and conditional over φh, like pbrt's tabulated distributions, constant in each cell
+of the grid of hemisphere.py. The density follows the absolute rest of closure_split.py, mean over
+the channels; a small part is uniform, which bounds the sample weights.
 """
 
 from __future__ import annotations
@@ -20,17 +21,17 @@ from .hemisphere import Hemisphere
 
 Array = NDArray[np.floating]
 
-CELLS = (32, 16)
+CELLS = (32, 16)  # over θh and φh
 WIDTH = max(CELLS[1], KNOTS + LOBES + 1)  # of the picture
 INSIDE = 3  # points along each side of a cell
-EVEN = 0.02  # of the probability, evenly over the cells that reflect anything
+UNIFORM_SHARE = 0.02  # of the probability, uniform over the cells that reflect light
 
 
 @dataclass(frozen=True)
 class SamplingTable:
-    """density: (v, n_h, n_p) per sr of half vectors, both halves of φh alike. marginal: (v, n_h)
-    and conditional (v, n_h, n_p): probability up to the end of each cell. keep: (v,) what the BRDF
-    is multiplied by so that it reflects no more than falls on it. Views: those of the split."""
+    """density: (v, n_h, n_p) per sr of half vectors, the same for both halves of φh. marginal: (v,
+    n_h) and conditional: (v, n_h, n_p), cumulative probability at the end of each cell. keep: (v,)
+    factor that limits the albedo of the BRDF to 1. Views: those of the split."""
 
     density: Array
     marginal: Array
@@ -39,7 +40,7 @@ class SamplingTable:
 
 
 def sampling_table(evaluate: Callable[[Angles], Array], split: ClosureSplit) -> SamplingTable:
-    """The table for what ``split`` leaves of ``evaluate(angles) -> (n, 3)``."""
+    """The table for the rest that ``split`` leaves of ``evaluate(angles) -> (n, 3)``."""
     n_h, n_p = CELLS
     views = len(split.theta_o)
     density = np.empty((views, n_h, n_p))
@@ -56,11 +57,11 @@ def sampling_table(evaluate: Callable[[Angles], Array], split: ClosureSplit) -> 
         total = float(inside.sum())
         share = inside / total if total > 0 else np.zeros_like(inside)
         spread = solid * open_ / max(float(np.sum(solid * open_)), 1e-12)
-        even = EVEN if total > 0 else 1.0
+        even = UNIFORM_SHARE if total > 0 else 1.0
         mass[v] = (1 - even) * share + even * spread
         density[v] = mass[v] / solid
     rows = mass.sum(axis=2)
-    # rounding must not lead past 1: the last cell's own probability would be below 0
+    # rounding must not exceed 1: the probability of the last cell would be negative
     marginal = np.minimum(np.cumsum(rows, axis=1), 1.0)
     conditional = np.cumsum(mass, axis=2) / np.maximum(rows, 1e-30)[:, :, None]
     conditional = np.minimum(conditional, 1.0)
@@ -70,8 +71,8 @@ def sampling_table(evaluate: Callable[[Angles], Array], split: ClosureSplit) -> 
 
 
 def texels(split: ClosureSplit, table: SamplingTable) -> NDArray[np.float32]:
-    """(height, width, 3) one picture of both, row 0 on top: a row a view with its ramp, lobes and
-    keep, then a row a view and θh cell, R density, G conditional, B marginal."""
+    """(height, width, 3) picture of both, row 0 at the top: one row per view with its ramp, lobes
+    and keep, then one row per view and θh cell: R density, G conditional, B marginal."""
     views, n_h, n_p = table.density.shape
     weights = np.concatenate([split.ramp, split.lobes], axis=1)
     out = np.zeros((views * (1 + n_h), WIDTH, 3), np.float32)

@@ -1,14 +1,15 @@
-"""What a component does to a material, in words: measured, never guessed.
+"""A short description of the effect of each component on a material, derived from the training set.
 
-Each of the first components is moved by one deviation to either side in every material of the
-training set (in the mean material where the training coefficients are not known), and these are
-followed, as logarithms; the median over the materials stands for the component:
+Each of the first components is moved by one standard deviation in both directions in every material
+of the training set (in the mean material where the training coefficients are unknown). The
+following features are compared, as logarithms; the median over the materials describes the
+component:
 
-- body: reflectance beside the highlight, seen and lit within 45° of the normal;
-- peak: reflectance where the highlight is brightest, light and view 10° from it;
-- width: the half angle at which the highlight has fallen to half its height above the body, of
-  those materials alone whose highlight is more than twice as bright as their body;
-- grazing: reflectance of the highlight with light and view 78° from it, against the peak.
+- body: reflectance away from the highlight, seen and lit within 45° of the normal;
+- peak: reflectance where the highlight is brightest, light and view at 10° from the normal;
+- width: the half angle at which the highlight has fallen to half its height above the body, only of
+  materials whose highlight is more than twice as bright as their body;
+- grazing: reflectance of the highlight with light and view at 78°, relative to the peak.
 """
 
 from __future__ import annotations
@@ -25,8 +26,9 @@ from .osl_atlas import traits
 
 Array = NDArray[np.floating]
 
-SEEN = 0.1  # in a logarithm, for one deviation: less than 10 % is no word's worth
-MAIN = 0.5  # a second word must be this share of the first, each against the largest of its kind
+MIN_EFFECT = 0.1  # in the logarithm, for one standard deviation: smaller effects are not described
+MIN_SECOND_SHARE = 0.5  # least relative effect on a second feature, compared with that on the first
+# (θh, θd, φd) of the features, degrees
 BODY_AT, PEAK_AT, GRAZING_AT = (40.0, 15.0, 90.0), (0.0, 10.0, 90.0), (0.0, 78.0, 90.0)
 WIDTHS = np.geomspace(0.05, 80.0, 200)  # degrees of θh
 WORDS = {
@@ -36,12 +38,12 @@ WORDS = {
     "grazing": ("less at grazing angles", "more at grazing angles"),
 }
 HIGHLIGHT = " highlight"
-NOTHING = "hardly visible"
+NO_EFFECT = "hardly visible"
 
 
 @dataclass(frozen=True)
 class Effect:
-    """What one deviation of a component brings to the logarithm of each, see above."""
+    """Change of the logarithm of each feature for one standard deviation of a component."""
 
     body: float
     peak: float
@@ -50,7 +52,7 @@ class Effect:
 
 
 def effects(basis: Basis) -> list[Effect]:
-    """Of each of the components that can be moved."""
+    """The effect of each of the components that can be moved."""
     known = basis.training
     materials = np.zeros((1, basis.count)) if known is None else known
     profile = [(theta, PEAK_AT[1], PEAK_AT[2]) for theta in WIDTHS]
@@ -72,7 +74,8 @@ def effects(basis: Basis) -> list[Effect]:
 
 
 def _features(rho: Array) -> Array:
-    """(4, materials) of ρ (directions, materials): the logarithms, NaN where there is none."""
+    """(4, materials) logarithms of the features of ρ (directions, materials), NaN where
+    undefined."""
     body, peak, grazing = np.maximum(rho[:3], mapping.EPSILON)
     above = np.maximum(rho[3:] - body, 0.0)
     fallen = above < 0.5 * above[0]
@@ -81,24 +84,28 @@ def _features(rho: Array) -> Array:
 
 
 def words(found: list[Effect]) -> list[str]:
-    """For each component what it does when it is moved up: at most two things, the main one first.
+    """For each component the effect of increasing it: at most two features, the main one first.
 
-    What is main is told against the largest effect of its kind that any component has: highlights
-    change by factors where bodies change by percents.
+    Features are compared relative to the largest effect of any component on them: highlights change
+    by factors where bodies change by percents.
     """
     table = np.array([[getattr(e, f.name) for f in fields(Effect)] for e in found])
-    largest = np.maximum(np.abs(table).max(axis=0), SEEN)
-    return [_said(row, np.abs(row) / largest) for row in table]
+    largest = np.maximum(np.abs(table).max(axis=0), MIN_EFFECT)
+    return [_description(row, np.abs(row) / largest) for row in table]
 
 
-def _said(row: Array, share: Array) -> str:
+def _description(row: Array, share: Array) -> str:
+    """The description of one component; row: (4,) its effect, share: (4,) relative to the largest
+    of any component."""
     names = [f.name for f in fields(Effect)]
-    main = max((s for s, v in zip(share, row, strict=True) if abs(v) >= SEEN), default=0.0)
+    main = max((s for s, v in zip(share, row, strict=True) if abs(v) >= MIN_EFFECT), default=0.0)
     order = [int(i) for i in np.argsort(-share, kind="stable")]
-    chosen = [i for i in order if abs(row[i]) >= SEEN and share[i] >= MAIN * main][:2]
-    told = [WORDS[names[i]][int(row[i] > 0)] for i in chosen]
-    if not told:
-        return NOTHING
-    if len(told) == 2 and all(word.endswith(HIGHLIGHT) for word in told):
-        told[0] = told[0].removesuffix(HIGHLIGHT)
-    return ", ".join(told)
+    chosen = [
+        i for i in order if abs(row[i]) >= MIN_EFFECT and share[i] >= MIN_SECOND_SHARE * main
+    ][:2]
+    phrases = [WORDS[names[i]][int(row[i] > 0)] for i in chosen]
+    if not phrases:
+        return NO_EFFECT
+    if len(phrases) == 2 and all(word.endswith(HIGHLIGHT) for word in phrases):
+        phrases[0] = phrases[0].removesuffix(HIGHLIGHT)
+    return ", ".join(phrases)

@@ -1,8 +1,8 @@
-"""The bright spots of a picture of the world: a table to draw directions from.
+"""The bright spots of a picture of the world: a table from which directions are drawn.
 
-The path that a measured material sends on through a portal knows no lights. Directions of bright
-spots are drawn from this table and in no other way, so that a small sun in an HDR picture does not
-show up as single bright pixels.
+The path that a measured material continues through a portal is not sampled towards lights.
+Directions of bright spots are drawn from this table and in no other way, so that a small sun in an
+HDR picture does not appear as isolated bright pixels.
 """
 
 from __future__ import annotations
@@ -14,21 +14,21 @@ from ..errors import InputError
 
 Array = NDArray[np.floating]
 
-LARGEST = (256, 512)  # rows, columns
-BRIGHT = 3.0  # times the world's mean radiance, anywhere in a cell
+MAX_SIZE = (256, 512)  # rows, columns of the table
+BRIGHT = 3.0  # times the mean radiance of the world, for the brightest pixel of a cell
 
 
 def world_texels(radiance: Array) -> NDArray[np.float32] | None:
-    """(rows, columns, 3) of an equirectangular picture (h, w, 3), both with the zenith in row 0: R
-    density per sr, 0 outside of bright spots, G probability up to the end of the cell in its row,
-    B up to the end of the row. None where no spot is bright. Raises InputError for what is no
-    picture."""
+    """(rows, columns, 3) from an equirectangular picture (h, w, 3), both with the zenith in row 0:
+    R density per sr, 0 outside of bright spots; G cumulative probability at the end of the cell in
+    its row; B at the end of the row. None where there is no bright spot. Raises InputError for an
+    array that is not a picture."""
     if radiance.ndim != 3 or radiance.shape[2] < 3 or min(radiance.shape[:2]) < 2:
-        raise InputError(f"a picture of the world has {radiance.shape} numbers, not rows of RGB")
+        raise InputError(f"a world picture of shape {radiance.shape}; expected (height, width, 3)")
     level = np.nan_to_num(radiance[..., :3].mean(axis=2, dtype=np.float64), posinf=0.0)
     peak = np.maximum(level, 0.0)
-    level = _fewer(_fewer(peak, LARGEST[0], 0, np.add), LARGEST[1], 1, np.add)
-    peak = _fewer(_fewer(peak, LARGEST[0], 0, np.maximum), LARGEST[1], 1, np.maximum)
+    level = _fewer(_fewer(peak, MAX_SIZE[0], 0, np.add), MAX_SIZE[1], 1, np.add)
+    peak = _fewer(_fewer(peak, MAX_SIZE[0], 0, np.maximum), MAX_SIZE[1], 1, np.maximum)
     rows, columns = level.shape
     edges = np.cos(np.linspace(0.0, np.pi, rows + 1))
     solid = (edges[:-1] - edges[1:])[:, None] * 2 * np.pi / columns
@@ -47,7 +47,8 @@ def world_texels(radiance: Array) -> NDArray[np.float32] | None:
 
 
 def _fewer(values: Array, largest: int, axis: int, of: np.ufunc) -> Array:
-    """Means (``of`` np.add) or largest of neighbours on an axis, so that ``largest`` are left."""
+    """Means (``of`` np.add) or maxima of neighbours along an axis, so that at most ``largest``
+    remain."""
     count = values.shape[axis]
     if count <= largest:
         return values

@@ -1,4 +1,4 @@
-"""Principal components of measured reflectance: the embedded default, or one from a MERL folder."""
+"""Principal components of measured reflectance: the embedded basis, or one from a MERL folder."""
 
 from . import storage
 from .basis import Basis

@@ -1,4 +1,7 @@
-"""Principal components of measured reflectance (Ono et al. 2019, equations (1) and (2))."""
+"""A basis of principal components of measured reflectance (Ono et al. 2019, equations (1) and (2)).
+
+The components are computed in training.py and components.py; equation (3) is in principal_brdf.py.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ from ..angles import Angles
 from . import mapping
 from .grid import AngleGrid
 
-CHUNK = 1 << 17
+CHUNK = 1 << 17  # directions evaluated at a time
 Progress = Callable[[str, float], None]
 
 
@@ -22,14 +25,14 @@ Progress = Callable[[str, float], None]
 class Basis:
     """Mean, reference and scaled principal components on the nodes of an AngleGrid.
 
-    mean: (n_h, n_d, n_p) float32, µ of the mapped observations.
-    log_reference: the same shape, ln(ref + ε).
+    mean: (n_h, n_d, n_p) float32, mean µ of the mapped observations.
+    log_reference: the same shape, ln(ref + ε) (mapping.py).
     components: (k, n_h, n_d, n_p) float32, the scaled components Q = V·Σ.
-    explained: fraction of variance of every component, also those not stored.
+    explained: fraction of variance of every component, including those not stored.
     columns: number of training observations (300 for the 100 MERL materials).
-    provenance: what it was computed from, by which command, under which licence.
-    training: (columns, k), row i the coefficients of training column i, R, G and B of a material
-    one after the other; None where they are not known.
+    provenance: data, command and licence from which the basis was computed.
+    training: (columns, k) coefficients of the training columns, R, G and B of each material in
+    turn; None where unknown.
     """
 
     grid: AngleGrid
@@ -53,7 +56,8 @@ class Basis:
 
     @cached_property
     def version(self) -> str:
-        """Short hash of the numbers: two results with one version speak of the same basis."""
+        """Short hash of mean, reference and components: identifies the basis that a result refers
+        to."""
         digest = hashlib.sha256()
         for array in (self.mean, self.log_reference, self.components):
             digest.update(np.ascontiguousarray(array).tobytes())
@@ -61,7 +65,7 @@ class Basis:
 
     @cached_property
     def nodes(self) -> NDArray[np.float32]:
-        """(grid.size, 1 + k): µ + ln(ref + ε), then the components; one row a node."""
+        """(grid.size, 1 + k): µ + ln(ref + ε), then the components; one row per node."""
         centre = (self.mean + self.log_reference).reshape(1, -1)
         flat = self.components.reshape(self.count, -1)
         return np.ascontiguousarray(np.concatenate([centre, flat]).T.astype(np.float32))
@@ -69,18 +73,21 @@ class Basis:
     def rows(
         self, angles: Angles, count: int | None = None
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """(centre (n,), Q̂ (n, count)) at n directions: ln(ρ·cosMap + ε) = centre + Q̂ c."""
+        """Observed rows of the basis, equation (4): (centre (n,), Q̂ (n, count)) at n directions,
+        with ln(ρ·cosMap + ε) = centre + Q̂ c."""
         k = self.count if count is None else min(count, self.count)
         values = self.grid.interpolate(self.nodes[:, : 1 + k], angles)
         return values[:, 0], values[:, 1:]
 
     def mapped(self, rho: NDArray[np.floating], angles: Angles) -> NDArray[np.floating]:
-        """Mapped, centred observations x̂ − µ̂ (n, c) of reflectances ρ (n, c) in 1/sr."""
+        """Mapped, centred observations x̂ − µ̂ (n, c) of reflectances ρ (n, c) in 1/sr, the
+        right-hand side of equation (4)."""
         centre, _ = self.rows(angles, 0)
         return mapping.log_weighted(rho, mapping.cos_map(angles)) - centre[:, None]
 
     def evaluate(self, coefficients: NDArray[np.floating], angles: Angles) -> NDArray[np.float32]:
-        """ρ (..., c) in 1/sr of the BRDFs with coefficients (c, k), at angles of any shape."""
+        """ρ (..., c) in 1/sr of the BRDFs with coefficients (c, k), equation (3), at angles of any
+        shape."""
         c = np.atleast_2d(np.asarray(coefficients, np.float32))
         shape = np.shape(angles.theta_h)
         flat = Angles(*(np.asarray(a).ravel() for a in np.broadcast_arrays(*angles)))
@@ -100,9 +107,10 @@ class Basis:
         count: int | None = None,
         eta: float = 0.0,
     ) -> NDArray[np.float64]:
-        """Coefficients (c, k) that fit many reflectances ρ (n, c) by least squares (ridge eta).
+        """Coefficients (c, k) that fit many reflectances ρ (n, c) in 1/sr by least squares (ridge
+        parameter eta).
 
-        Normal equations are summed over chunks, so memory does not grow with n.
+        The normal equations are summed over chunks, so memory does not grow with n.
         """
         k = self.count if count is None else min(count, self.count)
         gram, right = np.zeros((k, k)), np.zeros((k, rho.shape[1]))

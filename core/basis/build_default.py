@@ -1,8 +1,8 @@
 """Build the embedded basis: ``python run.py headless build-basis NBRDF.npz`` writes assets/basis.
 
 Input: the neural encodings of the 100 MERL materials by Sztrajman et al. 2021 (MIT licence), which
-are not part of this repository. Only the mean, the reference, the components and the encodings'
-coefficients are kept.
+are not part of this repository. Only the mean, the reference, the components and the coefficients
+of the encodings are kept.
 """
 
 from __future__ import annotations
@@ -30,16 +30,18 @@ PROVENANCE = (
 
 @dataclass(frozen=True)
 class NeuralObservations:
-    """Encodings as training columns. weights: (n, 675)."""
+    """Neural encodings as training columns. weights: (n, 675)."""
 
     weights: NDArray[np.float32]
 
     @property
     def columns(self) -> int:
+        """Three for each material."""
         return 3 * len(self.weights)
 
     def cell_blocks(self) -> Iterator[tuple[Angles, NDArray[np.float32], float]]:
-        """The MERL cells in view, at their lower edges: the encodings' own convention."""
+        """The MERL cells above the horizon, at their lower edges, where the encodings were
+        sampled."""
         seen = merl_grid.visible(merl_grid.node_angles(0.5))
         edges = [a[seen] for a in merl_grid.node_angles(0.0)]
         for start in range(0, edges[0].size, BLOCK):
@@ -47,6 +49,7 @@ class NeuralObservations:
             yield part, self.at(part), start / edges[0].size
 
     def at(self, angles: Angles) -> NDArray[np.float32]:
+        """ρ (columns, n) in 1/sr."""
         out = np.empty((self.columns, angles.theta_h.size), np.float32)
         for i, weights in enumerate(self.weights):
             out[3 * i : 3 * i + 3] = nbrdf.evaluate(weights, angles).T
@@ -58,14 +61,20 @@ def build(
     exclude: Sequence[str] = (),
     progress: Progress = lambda stage, fraction: None,
 ) -> Basis:
-    """Basis from an .npz of encodings, leaving out the materials named in ``exclude``."""
+    """The basis of an .npz of encodings, without the materials named in ``exclude``.
+
+    Raises InputError for a file that is not one or has too few materials, ValueError for an unknown
+    name.
+    """
     names, weights = nbrdf.load(encodings)
     unknown = sorted(set(exclude) - set(names))
     if unknown:
-        raise ValueError(f"no such materials: {unknown}")
+        raise ValueError(f"unknown materials: {unknown}; expected names from the encodings")
     if 3 * (len(names) - len(exclude)) <= DEFAULT_COUNT:
         raise InputError(
-            f"{len(names)} materials, too few for {DEFAULT_COUNT} components", file=encodings
+            f"{len(names)} materials; expected enough for {DEFAULT_COUNT} components "
+            "(three columns each)",
+            file=encodings,
         )
     kept = [i for i, name in enumerate(names) if name not in exclude]
     note = f" Without {', '.join(sorted(exclude))}." if exclude else ""
@@ -73,7 +82,8 @@ def build(
 
 
 def write_checksums(table: Path, target: Path) -> int:
-    """Names and SHA-256 sums of the genuine MERL files, from a CSV (file, size, sha256) to JSON."""
+    """Write names and SHA-256 sums of the genuine MERL files, from a CSV (file, size, sha256), as
+    JSON; returns their number."""
     import csv
     import json
 

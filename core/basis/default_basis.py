@@ -13,5 +13,5 @@ DEFAULT_FILE = Path(__file__).parents[2] / "assets" / "basis" / "nbrdf_basis.npz
 
 @lru_cache(maxsize=1)
 def default_basis() -> Basis:
-    """Loaded once; needs neither a network nor a file of the user's."""
+    """The embedded basis, loaded once; needs no network and no file of the user."""
     return load(DEFAULT_FILE)

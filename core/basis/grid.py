@@ -1,9 +1,8 @@
 """Nodes in angle space on which a basis is stored, and trilinear interpolation between them.
 
-θh is spaced on a logarithm, s = ln(1 + θh/a) / ln(1 + 90°/a): a lobe one degree wide gets as many
-nodes as one of thirty. θd is uniform from 0° to 90° inclusive; φd is uniform and periodic on
-[0°, 180°).
-The OSL shader reads the same nodes with the same weights (appearance/osl_atlas).
+θh is spaced logarithmically, s = ln(1 + θh/a) / ln(1 + 90°/a): a lobe of 1° gets as many nodes as
+one of 30°. θd is uniform from 0° to 90° inclusive; φd is uniform and periodic on [0°, 180°). The
+OSL shader reads the same nodes with the same weights (appearance/osl_atlas.py).
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ HALF_PI = np.pi / 2
 
 @dataclass(frozen=True)
 class AngleGrid:
-    """n_h × n_d × n_p nodes; knee is the a of the θh spacing, radians."""
+    """n_h × n_d × n_p nodes; knee: the constant a of the θh spacing, radians."""
 
     n_h: int
     n_d: int
@@ -29,10 +28,12 @@ class AngleGrid:
 
     @property
     def shape(self) -> tuple[int, int, int]:
+        """(n_h, n_d, n_p)."""
         return self.n_h, self.n_d, self.n_p
 
     @property
     def size(self) -> int:
+        """Number of nodes."""
         return self.n_h * self.n_d * self.n_p
 
     def nodes(self) -> Angles:

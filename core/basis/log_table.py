@@ -1,7 +1,7 @@
-"""A BRDF of a basis as one table of logarithms at the grid's nodes.
+"""A BRDF in a basis as one table of logarithms at the grid's nodes.
 
-Interpolation is linear in the logarithm, so ln(ρ·cosMap + ε) = centre + Q̂ c may be summed over the
-components at the nodes first: then a direction costs eight nodes instead of eight rows of Q.
+Interpolation is linear in the logarithm, so ln(ρ·cosMap + ε) = centre + Q̂ c can be summed over the
+components at the nodes first. A direction then needs eight nodes instead of eight rows of Q.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ class LogTable:
 
     @staticmethod
     def of(basis: Basis, coefficients: NDArray[np.floating]) -> LogTable:
-        """Coefficients (c, k) of c channels."""
+        """The table of c channels with coefficients (c, k)."""
         c = np.asarray(coefficients, np.float32)
         nodes = basis.nodes
         return LogTable(basis.grid, nodes[:, :1] + nodes[:, 1 : 1 + c.shape[1]] @ c.T)
 
     def grey(self) -> LogTable:
-        """One channel: the mean reflectance of all."""
+        """A table of one channel: the mean of ρ·cosMap + ε over the channels."""
         top = self.values.max(axis=1, keepdims=True)
         mean = np.exp(self.values - top).mean(axis=1, keepdims=True)
         return LogTable(self.grid, (top + np.log(mean)).astype(np.float32))

@@ -1,8 +1,8 @@
 """Nielsen's log mapping of reflectance (Nielsen, Jensen, Ramamoorthi 2015, section 4).
 
 mapped = ln((ρ·cosMap + ε) / (ref + ε)) with cosMap = clip(cos θi · cos θo, 0.01, 1), ε = 0.001 and
-ref the per-direction median of ρ·cosMap over all training columns. Differences of mapped values are
-log-relative errors, which is what the eye sees, and highlights do not drown the rest.
+ref the median of ρ·cosMap over all training columns, for each direction. Differences of mapped
+values are log-relative errors, which agree with perception, and highlights do not dominate the fit.
 """
 
 from __future__ import annotations
@@ -12,22 +12,22 @@ from numpy.typing import NDArray
 
 from ..angles import Angles, cosines
 
-EPSILON = 1e-3
+EPSILON = 1e-3  # 1/sr, published by Nielsen et al.
 
 
 def cos_map(angles: Angles) -> NDArray[np.floating]:
-    """clip(cos θi · cos θo, 0.01, 1), the shape of the angles."""
+    """clip(cos θi · cos θo, 0.01, 1), in the shape of the angles."""
     cos_i, cos_o = cosines(*angles)
     return np.clip(cos_i * cos_o, 0.01, 1.0)
 
 
 def log_weighted(rho: NDArray[np.floating], weight: NDArray[np.floating]) -> NDArray[np.floating]:
-    """ln(ρ·cosMap + ε) for ρ (n, c) and cosMap (n,). Negative ρ (noise) counts as 0."""
+    """ln(ρ·cosMap + ε) for ρ (n, c) and cosMap (n,). Negative ρ (noise) is set to 0."""
     return np.log(np.maximum(rho, 0.0) * weight[:, None] + EPSILON)
 
 
 def unlog_weighted(
     logarithm: NDArray[np.floating], weight: NDArray[np.floating]
 ) -> NDArray[np.floating]:
-    """ρ (n, c) ≥ 0 from ln(ρ·cosMap + ε); below ln ε there is no reflectance to have, so 0."""
+    """ρ (n, c) ≥ 0 in 1/sr from ln(ρ·cosMap + ε); 0 where the logarithm is below ln ε."""
     return np.maximum(np.exp(logarithm) - EPSILON, 0.0) / weight[:, None]

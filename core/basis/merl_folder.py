@@ -21,21 +21,23 @@ from .basis import Basis, Progress
 from .training import BLOCK, train
 
 CHECKSUMS_FILE = Path(__file__).parents[2] / "assets" / "basis" / "merl_sha256.json"
-VERSION = 2  # raise when train() changes what it computes
+VERSION = 2  # of the cache; increase it when the result of train() changes
 
 
 @dataclass(frozen=True)
 class MerlObservations:
-    """Genuine files as training columns, mapped from disk: memory does not grow with the set."""
+    """Genuine MERL files as training columns, memory-mapped: memory does not grow with their
+    number."""
 
     files: tuple[Path, ...]
 
     @property
     def columns(self) -> int:
+        """Three for each file."""
         return 3 * len(self.files)
 
     def cell_blocks(self) -> Iterator[tuple[Angles, NDArray[np.float32], float]]:
-        """The cells valid in every material, at their centres."""
+        """The cells that are valid in every material, at their centres."""
         tables = self._tables()
         valid = np.ones(merl_file.CELLS, bool)
         for table in tables:
@@ -51,6 +53,7 @@ class MerlObservations:
             yield angles, rho.astype(np.float32), start / cells.size
 
     def at(self, angles: Angles) -> NDArray[np.float32]:
+        """ρ (columns, n) in 1/sr; −1 in all columns where one has no measurement."""
         out = np.empty((self.columns, angles.theta_h.size), np.float32)
         for i, file in enumerate(self.files):
             out[3 * i : 3 * i + 3] = merl_file.read(file).evaluate(angles).T
@@ -58,6 +61,7 @@ class MerlObservations:
         return out
 
     def _tables(self) -> list[NDArray[np.float64]]:
+        """Memory-mapped (3, cells) values of each file, not scaled."""
         return [
             np.memmap(file, merl_file.VALUES, "r", offset=12, shape=(3, merl_file.CELLS))
             for file in self.files
@@ -65,7 +69,7 @@ class MerlObservations:
 
 
 def checksums() -> dict[str, str]:
-    """File name → SHA-256 of the 100 genuine files."""
+    """File name → SHA-256 sum of the 100 genuine files."""
     return dict(json.loads(CHECKSUMS_FILE.read_text("utf-8")))
 
 
@@ -74,13 +78,14 @@ def check_files(
     expected: Mapping[str, str],
     progress: Progress = lambda stage, fraction: None,
 ) -> tuple[Path, ...]:
-    """The files of the database, each there, whole and genuine. Raises InputError otherwise."""
+    """The files of the database. Raises InputError where one is missing, incomplete or not
+    genuine."""
     if not folder.is_dir():
-        raise InputError("no such folder", file=folder, key="--merl")
+        raise InputError("folder not found; expected the MERL database", file=folder, key="--merl")
     missing = [name for name in expected if not (folder / name).is_file()]
     if missing:
         raise InputError(
-            f"{len(missing)} of the {len(expected)} MERL files are missing, first {missing[0]}",
+            f"{len(missing)} of the {len(expected)} MERL files are missing; first {missing[0]}",
             file=folder,
             key="--merl",
         )
@@ -90,11 +95,14 @@ def check_files(
         size = os.path.getsize(path)
         if size != merl_file.SIZE:
             raise InputError(
-                f"{size} bytes, expected {merl_file.SIZE}: the download is not whole", file=path
+                f"{size} bytes; expected {merl_file.SIZE}: the download is incomplete", file=path
             )
         with open(path, "rb") as file:
             if hashlib.file_digest(file, "sha256").hexdigest() != digest:
-                raise InputError("is not the genuine MERL file (its SHA-256 differs)", file=path)
+                raise InputError(
+                    "is not the genuine MERL file (its SHA-256 sum differs); download it again",
+                    file=path,
+                )
     return tuple(folder / name for name in expected)
 
 
@@ -104,7 +112,10 @@ def cached_basis(
     expected: Mapping[str, str] | None = None,
     cache: Path | None = None,
 ) -> Basis:
-    """The basis of a MERL folder; computed once, then read from the user's cache."""
+    """The basis of a MERL folder; computed once, then read from the user's cache.
+
+    expected: file name → SHA-256 sum, None: checksums(). cache: folder, None: user_cache().
+    """
     expected = checksums() if expected is None else expected
     files = check_files(folder, expected, progress)
     key = hashlib.sha256(f"{VERSION} {sorted(expected.items())}".encode()).hexdigest()[:16]
@@ -114,7 +125,7 @@ def cached_basis(
         try:
             return storage.load(stored)
         except InputError:
-            stored.unlink()  # a damaged cache is made anew
+            stored.unlink()  # a damaged cache file is computed anew
     basis = train(
         MerlObservations(files),
         f"Principal components (Nielsen's log mapping) of {len(files)} MERL files "
@@ -123,11 +134,11 @@ def cached_basis(
     )
     cache.mkdir(parents=True, exist_ok=True)
     storage.save(stored, basis)
-    return storage.load(stored)  # rounded as it will be found again: a result names its version
+    return storage.load(stored)  # rounded as in later runs: results record the basis version
 
 
 def user_cache() -> Path:
-    """The user's own cache folder for Patina (PATINA_CACHE, or what the system uses)."""
+    """The user's cache folder for Patina (PATINA_CACHE, or the system's convention)."""
     if chosen := os.environ.get("PATINA_CACHE"):
         return Path(chosen)
     if sys.platform == "win32":

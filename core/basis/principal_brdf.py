@@ -16,15 +16,16 @@ from .log_table import LogTable
 
 @dataclass(frozen=True)
 class PrincipalBRDF:
-    """An isotropic BRDF as coefficients (3, k) in a basis; unitless coefficients, ρ in 1/sr."""
+    """An isotropic BRDF as coefficients (3, k) in a basis (equation (3)); coefficients without
+    unit, ρ in 1/sr."""
 
     basis: Basis
     coefficients: NDArray[np.float64]
 
     @cached_property
     def log_table(self) -> LogTable:
-        """The same BRDF with its components summed at the nodes: evaluating costs no more for a
-        hundred components than for one."""
+        """The same BRDF with its components summed at the nodes: the cost of an evaluation does not
+        depend on the number of components."""
         return LogTable.of(self.basis, self.coefficients)
 
     def evaluate(self, angles: Angles) -> NDArray[np.float32]:
@@ -34,5 +35,5 @@ class PrincipalBRDF:
         return found.reshape(*each[0].shape, found.shape[1])
 
     def table(self) -> TabulatedBRDF:
-        """The BRDF at the MERL cells' centres."""
+        """The BRDF at the centres of the MERL cells."""
         return TabulatedBRDF.from_function(self.evaluate)

@@ -1,8 +1,8 @@
 """A basis on disk: fixed-point numbers, differenced along θh and φd, split into bytes, deflated.
 
 A step of 0.01 in a scaled component is 0.0006 in log reflectance for a coefficient of typical size
-(training coefficients have variance 1/300). The first components keep it, the many faint ones have
-twice that: 0.003 log-relative RMS for all hundred, far below the interpolation error (0.008).
+(training coefficients have variance 1/300). The first components have this step, the many weaker
+ones twice that: 0.003 log-relative RMS for all hundred, far below the interpolation error (0.008).
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from ..files import atomic_path
 from .basis import Basis
 from .grid import AngleGrid
 
-COMPONENT_STEP, FAINT_STEP = 0.01, 0.02
-FINE = 10  # components with the finer step
+COMPONENT_STEP, WEAK_STEP = 0.01, 0.02
+FINE_COUNT = 10  # components with the finer step
 LOG_STEP = 0.0005
-TRAINING_STEP = 1e-4  # of the training coefficients, whose deviation is 0.06
+TRAINING_STEP = 1e-4  # of the training coefficients, whose standard deviation is 0.06
 FORMAT = 2
 
 Steps = Sequence[float] | NDArray[np.floating]
 
 
 def save(path: Path, basis: Basis) -> None:
-    """Write a basis as .npz; the file appears whole or not at all."""
-    steps = np.where(np.arange(basis.count) < FINE, COMPONENT_STEP, FAINT_STEP)
+    """Write a basis as .npz, atomically. Raises OSError."""
+    steps = np.where(np.arange(basis.count) < FINE_COUNT, COMPONENT_STEP, WEAK_STEP)
     arrays: dict[str, NDArray[Any]] = {
         "format": np.array(FORMAT, np.int32),
         "grid": np.array([*basis.grid.shape, basis.grid.knee]),
@@ -56,7 +56,7 @@ def load(path: Path) -> Basis:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
             version = int(data["format"])
             if version not in (1, FORMAT):
-                raise InputError(f"basis format {version}, expected {FORMAT}", file=path)
+                raise InputError(f"basis format {version}; expected {FORMAT} or 1", file=path)
             n_h, n_d, n_p, knee = (float(x) for x in data["grid"])
             components = data["components"]
             grid = AngleGrid(int(n_h), int(n_d), int(n_p), knee)
@@ -80,13 +80,14 @@ def load(path: Path) -> Basis:
         or basis.components.shape[1:] != grid.shape
         or (basis.training is not None and basis.training.shape != (basis.columns, basis.count))
     ):
-        raise InputError("not a Patina basis (arrays that do not fit its grid)", file=path)
+        raise InputError("not a Patina basis (the arrays do not fit its grid)", file=path)
     return basis
 
 
 def _encode(values: NDArray[np.floating], steps: Steps) -> NDArray[np.uint8]:
     """(c, n_h, n_d, n_p) → (2, c, n_h, n_d, n_p): low and high bytes of second differences modulo
-    2¹⁶, small ones of either sign as small numbers. Apart, the bytes deflate to a sixth less."""
+    2¹⁶, zigzag-coded so that small differences of either sign are small numbers. Separated bytes
+    deflate to one sixth less."""
     fixed = np.round(values / np.reshape(steps, (-1, 1, 1, 1))).astype(np.int64)
     if np.abs(fixed).max() > 32767:
         raise ValueError("values exceed the range of the fixed-point step")
@@ -96,8 +97,9 @@ def _encode(values: NDArray[np.floating], steps: Steps) -> NDArray[np.uint8]:
 
 
 def _decode(encoded: NDArray[np.uint8], steps: Steps) -> NDArray[np.float32]:
+    """The inverse of _encode."""
     if encoded.dtype != np.uint8 or encoded.ndim != 5 or len(encoded) != 2:
-        raise ValueError("arrays of another kind")
+        raise ValueError("unexpected type or dimensions of an array")
     out = np.empty(encoded.shape[1:], np.float32)
     for i, (low, high, step) in enumerate(zip(*encoded, steps, strict=True)):
         folded = low | (high.astype(np.uint16) << 8)
@@ -107,13 +109,13 @@ def _decode(encoded: NDArray[np.uint8], steps: Steps) -> NDArray[np.float32]:
 
 
 def _decode_whole(encoded: NDArray[np.int16], steps: Steps) -> NDArray[np.float32]:
-    """Of format 1: second differences, not split."""
+    """The same for format 1: second differences, not split into bytes."""
     if encoded.dtype != np.int16 or encoded.ndim != 4:
-        raise ValueError("arrays of another kind")
+        raise ValueError("unexpected type or dimensions of an array")
     return np.stack([_summed(e, step) for e, step in zip(encoded, steps, strict=True)])
 
 
 def _summed(second: NDArray[np.int16], step: float) -> NDArray[np.float32]:
-    """(n_h, n_d, n_p) from second differences; sums wrap as the differences did."""
+    """(n_h, n_d, n_p) from second differences; the sums wrap around as the differences did."""
     summed = np.cumsum(second, axis=2, dtype=np.int16)
     return np.cumsum(summed, axis=0, dtype=np.int16).astype(np.float32) * np.float32(step)

@@ -1,4 +1,5 @@
-"""Compute a Basis from any set of measured BRDFs that can be evaluated at given directions."""
+"""Compute a basis from measured BRDFs that can be evaluated in given directions (Ono et al. 2019,
+equations (1) and (2))."""
 
 from __future__ import annotations
 
@@ -13,25 +14,27 @@ from . import components, mapping
 from .basis import Basis, Progress
 from .grid import AngleGrid
 
-BLOCK = 1 << 16
-# Measured on the NBRDF set (run.py bench basis): finer nodes gain less than a thousandth
+BLOCK = 1 << 16  # directions evaluated at a time
+# measured on the NBRDF set (run.py bench basis): finer grids gain less than a thousandth
 DEFAULT_GRID = AngleGrid(n_h=84, n_d=46, n_p=30, knee=float(np.radians(0.7)))
-DEFAULT_COUNT = 100  # beyond, held-out materials gain nothing; the paper's fit reads the first 6
+DEFAULT_COUNT = 100  # more do not improve held-out materials; the paper's method uses the first 6
 
 
 class Observations(Protocol):
     """Training columns: one per colour channel of each material."""
 
     @property
-    def columns(self) -> int: ...
+    def columns(self) -> int:
+        """Number of training columns."""
+        ...
 
     def cell_blocks(self) -> Iterator[tuple[Angles, NDArray[np.float32], float]]:
-        """Blocks of the cells that count in the Gram matrix, each once: their angles (n,), ρ
-        (columns, n) in 1/sr, and the fraction of all cells that came before."""
+        """Blocks of the cells of the Gram matrix, each cell once: their angles (n,), ρ (columns, n)
+        in 1/sr, and the fraction of cells before the block."""
         ...
 
     def at(self, angles: Angles) -> NDArray[np.float32]:
-        """ρ (columns, n) in 1/sr; negative where nothing was measured (then in all columns)."""
+        """ρ (columns, n) in 1/sr; negative where there is no measurement (then in all columns)."""
         ...
 
 
@@ -42,7 +45,8 @@ def train(
     grid: AngleGrid = DEFAULT_GRID,
     progress: Progress = lambda stage, fraction: None,
 ) -> Basis:
-    """Basis of the first ``count`` components, stored on ``grid``; streams: memory stays flat."""
+    """Basis of the first ``count`` components, stored on ``grid``. Works in blocks, so memory does
+    not grow with the number of cells."""
     directions, explained = principal(observations, count, progress)
     nodes = Angles(*(a.ravel() for a in grid.nodes()))
     stacked = np.empty((2 + directions.shape[1], grid.size), np.float32)
@@ -68,8 +72,8 @@ def principal(
     count: int,
     progress: Progress = lambda stage, fraction: None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(W (columns, count), explained variance fractions): row i of W is also the coefficients of
-    training column i."""
+    """(W (columns, count), explained variance fractions) of equations (1) and (2). Row i of W is
+    also the coefficients of training column i."""
 
     def centred_blocks() -> Iterator[NDArray[np.float32]]:
         for angles, rho, fraction in observations.cell_blocks():
@@ -84,8 +88,8 @@ def principal(
 def exact_rows(
     observations: Observations, directions: NDArray[np.float64], angles: Angles
 ) -> NDArray[np.float32]:
-    """(2 + k, n): µ, ln(ref + ε) and the scaled components at directions (n,), straight from the
-    observations; µ is NaN where nothing was measured."""
+    """(2 + k, n): µ, ln(ref + ε) and the scaled components at directions (n,), directly from the
+    observations; µ is NaN where there is no measurement."""
     rho = observations.at(angles)
     logs, mean, log_reference = _mapped(rho, angles)
     scaled = directions.T.astype(np.float32) @ (logs - mean)
@@ -105,7 +109,7 @@ def _mapped(
 
 def fill_unmeasured(stacked: NDArray[np.float32]) -> NDArray[np.float32]:
     """Nodes without measurement (NaN mean) take the values of the next smaller θd: interpolation
-    near the horizon needs a value on its far side."""
+    near the horizon needs a value beyond it."""
     missing = np.isnan(stacked[0])
     for j in range(1, stacked.shape[2]):
         hole = missing[:, j]

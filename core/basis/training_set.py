@@ -1,8 +1,8 @@
-"""Training columns kept at hand, so that a basis without some of the materials takes a second.
+"""Precomputed training columns, so that a basis without some of the materials takes a second.
 
-Centring removes the reference: X = C·L with L = ln(ρ·cosMap + ε) and C = I − 11ᵀ/n. So the Gram
-matrix of any subset of columns is C·(L Lᵀ)·C of that subset's block of L Lᵀ, which is summed over
-the MERL cells once; mean and components at the nodes need L at the nodes and nothing else.
+Centring removes the reference: X = C·L with L = ln(ρ·cosMap + ε) and C = I − 11ᵀ/n. The Gram matrix
+of any subset of columns is therefore C·(L Lᵀ)·C of that subset's block of L Lᵀ, which is summed
+over the MERL cells once. Mean and components at the nodes need only L at the nodes.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class TrainedBasis(Basis):
-    """A basis that knows its training columns (``training`` is never None).
+    """A basis with its training columns (``training`` is never None).
 
     materials: names; training column 3m + c is channel c of materials[m].
     """
@@ -37,11 +37,11 @@ class TrainedBasis(Basis):
 
 @dataclass(frozen=True)
 class TrainingSet:
-    """Everything a basis of any subset of the materials is computed from.
+    """The data from which the basis of any subset of the materials is computed.
 
-    materials: names, three columns (R, G, B) each. logs: (columns, grid.size) float32,
-    ln(ρ·cosMap + ε) at the nodes. products: (columns, columns) float64, L Lᵀ summed over the MERL
-    cells (L less each cell's mean over the columns, which centring ignores).
+    materials: names, three columns (R, G, B) each. logs: (columns, grid.size) float32, ln(ρ·cosMap
+    + ε) at the nodes. products: (columns, columns) float64, L Lᵀ summed over the MERL cells (L
+    minus each cell's mean over the columns, which centring removes anyway).
     """
 
     materials: tuple[str, ...]
@@ -58,10 +58,14 @@ class TrainingSet:
         grid: AngleGrid = DEFAULT_GRID,
         progress: Progress = lambda stage, fraction: None,
     ) -> TrainingSet:
-        """From any training columns; reads each observation twice, at the cells and the nodes."""
+        """From any training columns; each observation is evaluated twice, at the cells and at the
+        nodes.
+
+        Raises PatinaError where the columns are not three for each material.
+        """
         if observations.columns != 3 * len(materials):
             raise PatinaError(
-                f"{observations.columns} columns for {len(materials)} materials, expected 3 each"
+                f"{observations.columns} columns for {len(materials)} materials; expected 3 each"
             )
         products = np.zeros((observations.columns, observations.columns))
         for angles, rho, fraction in observations.cell_blocks():
@@ -82,18 +86,19 @@ class TrainingSet:
         return TrainingSet(tuple(materials), grid, filled, products, provenance)
 
     def basis(self, without: Sequence[str] = (), count: int = DEFAULT_COUNT) -> TrainedBasis:
-        """The basis of all materials but those in ``without`` (all three channels of each).
+        """The basis of all materials except those in ``without`` (all three channels of each),
+        equations (1) and (2) of Ono et al. 2019.
 
-        Raises PatinaError for a name that is not in the set, or too few columns for ``count``.
+        Raises PatinaError for an unknown name, or too few columns for ``count`` components.
         """
         unknown = sorted(set(without) - set(self.materials))
         if unknown:
-            raise PatinaError(f"no training material is called {unknown[0]!r}")
+            raise PatinaError(f"unknown training material {unknown[0]!r}")
         kept = [m for m, name in enumerate(self.materials) if name not in set(without)]
         columns = np.array([3 * m + c for m in kept for c in range(3)], np.intp)
         n = len(columns)
         if n <= count:
-            raise PatinaError(f"{n} training columns are too few for {count} components")
+            raise PatinaError(f"{n} training columns; expected more than the {count} components")
         gram = self.products[np.ix_(columns, columns)]
         gram = gram - gram.mean(axis=0) - gram.mean(axis=1)[:, None] + gram.mean()
         directions, explained = components.principal_directions(gram, count)
@@ -121,7 +126,7 @@ class TrainingSet:
         )
 
     def save(self, path: Path) -> None:
-        """Write the set (about 140 MB for MERL's 300 columns); it appears whole or not at all."""
+        """Write the set (about 140 MB for MERL's 300 columns), atomically. Raises OSError."""
         with atomic_path(path) as partial, open(partial, "wb") as file:
             np.savez(
                 file,
@@ -135,11 +140,11 @@ class TrainingSet:
 
     @staticmethod
     def load(path: Path) -> TrainingSet:
-        """Read what :meth:`save` wrote. Raises InputError for anything else."""
+        """Read a set written by :meth:`save`. Raises InputError for anything else."""
         try:
             with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
                 if int(data["format"]) != FORMAT:
-                    raise InputError(f"format {int(data['format'])}, expected {FORMAT}", file=path)
+                    raise InputError(f"format {int(data['format'])}; expected {FORMAT}", file=path)
                 n_h, n_d, n_p, knee = (float(x) for x in data["grid"])
                 grid = AngleGrid(int(n_h), int(n_d), int(n_p), knee)
                 found = TrainingSet(
@@ -153,11 +158,11 @@ class TrainingSet:
             raise InputError(f"not a set of training columns ({error})", file=path) from error
         n = 3 * len(found.materials)
         if found.logs.shape != (n, grid.size) or found.products.shape != (n, n):
-            raise InputError(f"arrays that do not fit {n} columns", file=path)
+            raise InputError(f"the arrays do not fit {n} training columns", file=path)
         return found
 
 
 def _logs(rho: NDArray[np.float32], angles: Angles) -> NDArray[np.float32]:
-    """ln(ρ·cosMap + ε) (columns, n); negative ρ counts as 0."""
+    """ln(ρ·cosMap + ε) (columns, n); negative ρ is set to 0."""
     weighted = np.maximum(rho, 0) * mapping.cos_map(angles).astype(np.float32)
     return np.log(weighted + np.float32(mapping.EPSILON))

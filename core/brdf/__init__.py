@@ -1,4 +1,4 @@
-"""Reflectance as tables, as MERL files, as published encodings and as analytic lobes."""
+"""BRDFs as tables, MERL files and published neural encodings, and error metrics between BRDFs."""
 
 from .table import TabulatedBRDF
 

@@ -1,6 +1,6 @@
 """The MERL ``.binary`` format: three int32 (90, 90, 180), then float64, channel-major R, G, B.
 
-Stored numbers are scaled per channel; negative marks an invalid cell (Matusik et al. 2003).
+Stored numbers are scaled per channel; negative values mark invalid cells (Matusik et al. 2003).
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from ..errors import InputError
 from ..files import atomic_path
 from .table import TabulatedBRDF
 
-SCALE = np.array([1.0, 1.15, 1.66]) / 1500.0
+SCALE = np.array([1.0, 1.15, 1.66]) / 1500.0  # stored numbers → 1/sr, for R, G, B
 HEADER = np.dtype("<i4")
 VALUES = np.dtype("<f8")
 CELLS = 90 * 90 * 180
-SIZE = 12 + 3 * CELLS * 8
+SIZE = 12 + 3 * CELLS * 8  # bytes of a file
 
 
 def read(path: Path) -> TabulatedBRDF:
@@ -33,26 +33,26 @@ def read(path: Path) -> TabulatedBRDF:
             dimensions = tuple(int(n) for n in np.frombuffer(head, HEADER))
             if dimensions != merl_grid.SHAPE:
                 raise InputError(
-                    f"dimensions {dimensions}, expected {merl_grid.SHAPE}: "
+                    f"dimensions {dimensions}; expected {merl_grid.SHAPE}: "
                     "not an isotropic MERL file",
                     file=path,
                 )
             if size != SIZE:
                 raise InputError(
-                    f"{size} bytes, expected {SIZE}: the file is truncated or not a MERL file",
+                    f"{size} bytes; expected {SIZE}: the file is truncated or not a MERL file",
                     file=path,
                 )
             raw = np.frombuffer(file.read(), VALUES).reshape(3, *merl_grid.SHAPE)
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", file=path) from error
     if not np.isfinite(raw).all():
-        raise InputError("holds numbers that are not finite", file=path)
+        raise InputError("contains values that are not finite", file=path)
     values = np.where(raw < 0, -1.0, raw * SCALE[:, None, None, None])
     return TabulatedBRDF(values.astype(np.float32))
 
 
 def write(path: Path, table: TabulatedBRDF) -> None:
-    """Write a table; invalid cells become -1. The file appears whole or not at all."""
+    """Write a table, atomically; invalid cells become -1. Raises OSError."""
     values = table.values.astype(np.float64)
     raw = np.where(values < 0, -1.0, values / SCALE[:, None, None, None])
     with atomic_path(path) as partial, open(partial, "wb") as file:

@@ -1,4 +1,4 @@
-"""How far two BRDFs are apart: the paper's figure and two that agree better with the eye."""
+"""Error metrics between two BRDFs: that of the paper and two that agree better with perception."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from ..angles import Angles, cosines, merl_grid
 from ..errors import PatinaError
 from .table import TabulatedBRDF
 
-EPSILON = 1e-3  # as in Nielsen's mapping: below it reflectance × cosines counts as black
+EPSILON = 1e-3  # 1/sr, as in Nielsen's mapping: smaller ρ·cosMap counts as black
 
 
 @dataclass(frozen=True)
 class Differences:
-    """relative_l2: ‖truth − fit‖ / ‖truth‖ over all cells in view (the paper, Fig. 10; dominated
-    by grazing angles). log_relative_rms: RMS of ln((fit·cosMap + ε)/(truth·cosMap + ε)), light and
-    view within ``limit`` of the normal. cube_root_rms: RMS difference of (ρ·cos θi)^(1/3) in
-    sr^(-1/3), same directions (Fores et al. 2012: predicts the visual match)."""
+    """relative_l2: ‖truth − fit‖ / ‖truth‖ over all cells above the horizon (Ono et al. 2019, Fig.
+    10; dominated by grazing angles). log_relative_rms: RMS of ln((fit·cosMap + ε)/(truth·cosMap +
+    ε)) over light and view within ``limit`` degrees of the normal. cube_root_rms: RMS difference of
+    (ρ·cos θi)^(1/3) in sr^(-1/3) over the same directions (Fores et al. 2012: predicts visual
+    similarity)."""
 
     relative_l2: float
     log_relative_rms: float
@@ -28,11 +29,16 @@ class Differences:
 
 
 def compare(fit: TabulatedBRDF, truth: TabulatedBRDF, limit: float = 80.0) -> Differences:
-    """Differences over the cells valid in both; limit in degrees."""
+    """Differences over the cells valid in both tables; limit in degrees.
+
+    Raises PatinaError where the truth is zero in all of them.
+    """
     centres = merl_grid.node_angles(0.5)
     both = fit.valid & truth.valid
     if not (truth.values[:, both] > 0).any():
-        raise PatinaError("nothing to compare: the truth has no reflectance where the fit has any")
+        raise PatinaError(
+            "nothing to compare: the true BRDF is zero in all cells that are valid in both"
+        )
     angles = Angles(*(a[both] for a in centres))
     a, b = fit.values[:, both].astype(np.float64), truth.values[:, both].astype(np.float64)
     cos_i, cos_o = cosines(*angles)
@@ -48,7 +54,7 @@ def compare(fit: TabulatedBRDF, truth: TabulatedBRDF, limit: float = 80.0) -> Di
 def log_ratio(
     fit: NDArray[np.floating], truth: NDArray[np.floating], cosine_product: NDArray[np.floating]
 ) -> NDArray[np.floating]:
-    """ln((fit·cosMap + ε)/(truth·cosMap + ε)), the last axis over directions."""
+    """ln((fit·cosMap + ε)/(truth·cosMap + ε)); the last axis runs over directions."""
     weight = np.clip(cosine_product, 0.01, 1.0)
     return np.log((fit * weight + EPSILON) / (truth * weight + EPSILON))
 

@@ -1,6 +1,6 @@
 """Decoder of the neural BRDF encodings of Sztrajman et al. 2021, "Neural BRDF Representation and
-Importance Sampling". Used to compute the embedded basis and to check fits; no file ships with us.
-"""
+Importance Sampling". Used to compute the embedded basis and to test fits; no encoding is
+distributed with Patina."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ WEIGHTS = 675  # 6·21 + 21 + 21·21 + 21 + 21·3 + 3
 
 
 def load(path: Path) -> tuple[list[str], NDArray[np.float32]]:
-    """(names, weights (n, 675)) from an .npz of encodings."""
+    """(names, weights (n, 675)) from an .npz of encodings. Raises InputError for anything else."""
     try:
         with open(path, "rb") as file, np.load(file) as data:
             names = [str(n) for n in data["names"]]
@@ -25,7 +25,7 @@ def load(path: Path) -> tuple[list[str], NDArray[np.float32]]:
         raise InputError(f"not a set of neural BRDF encodings ({error})", file=path) from error
     if weights.shape != (len(names), WEIGHTS):
         raise InputError(
-            f"weights of shape {weights.shape}, expected ({len(names)}, {WEIGHTS})", file=path
+            f"weights of shape {weights.shape}; expected ({len(names)}, {WEIGHTS})", file=path
         )
     if not np.isfinite(weights).all():
         raise InputError("weights are not finite numbers", file=path)
@@ -33,7 +33,7 @@ def load(path: Path) -> tuple[list[str], NDArray[np.float32]]:
 
 
 def evaluate(weights: NDArray[np.floating], angles: Angles) -> NDArray[np.float32]:
-    """f in 1/sr, (..., 3), at half/difference angles in radians (any shape)."""
+    """ρ in 1/sr, (..., 3), at half/difference angles in radians (any shape); weights: (675,)."""
     w = np.asarray(weights, np.float32)
     k1, b1 = w[:126].reshape(6, 21), w[126:147]
     k2, b2 = w[147:588].reshape(21, 21), w[588:609]

@@ -13,7 +13,7 @@ from ..angles import Angles, merl_grid
 
 @dataclass(frozen=True)
 class TabulatedBRDF:
-    """Reflectance ρ at the MERL cells' centres.
+    """Reflectance ρ at the centres of the MERL cells.
 
     values: (3, 90, 90, 180) float32, 1/sr, channels R, G, B; invalid cells are negative.
     """
@@ -29,24 +29,24 @@ class TabulatedBRDF:
         where = np.flatnonzero(seen)
         flat = [a.ravel() for a in centres]
         out = values.reshape(3, -1)
-        for start in range(0, where.size, 1 << 18):  # flat in memory
+        for start in range(0, where.size, 1 << 18):  # in blocks, to limit memory
             part = where[start : start + (1 << 18)]
             out[:, part] = evaluate(Angles(*(a[part] for a in flat))).T
         return cls(values)
 
     @property
     def valid(self) -> NDArray[np.bool_]:
-        """(90, 90, 180): cells that hold a measurement in all channels."""
+        """(90, 90, 180): cells with a measurement in all channels."""
         return np.all(self.values >= 0, axis=0)
 
     def nearest(self, angles: Angles) -> NDArray[np.float32]:
-        """(..., 3): the value of the cell that holds each direction, negative where invalid."""
+        """(..., 3): value of the cell that contains each direction, negative where invalid."""
         return np.moveaxis(self.values[(slice(None), *merl_grid.index(angles))], 0, -1)
 
     def evaluate(self, angles: Angles) -> NDArray[np.float32]:
-        """(..., 3): trilinear between cell centres (θh on its square root, φd periodic).
+        """(..., 3): trilinear between cell centres (in the square root of θh; φd periodic).
 
-        Invalid cells take no part (weights are renormalised); -1 where all eight are invalid.
+        Invalid cells are skipped (the weights are renormalised); -1 where all eight are invalid.
         """
         u_h = 90.0 * np.sqrt(np.clip(angles.theta_h / merl_grid.HALF_PI, 0, 1)) - 0.5
         u_d = np.degrees(angles.theta_d) - 0.5

@@ -1,1 +1,1 @@
-"""What the photos themselves say about camera and light: tone from a chart, place of a flash."""
+"""Calibration from the photos themselves: tone curve from a chart, positions of lights."""

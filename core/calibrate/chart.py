@@ -13,20 +13,21 @@ from ..photo.transfer import SRGB, Transfer
 
 Array = NDArray[np.float64]
 
-# The grey row of the ColorChecker Classic, white to black, by the densities printed on the chart
+# grey row of the ColorChecker Classic, white to black, from the densities printed on the chart
 COLORCHECKER_GREYS = tuple(10.0**-d for d in (0.05, 0.23, 0.44, 0.70, 1.05, 1.50))
 ROWS, COLUMNS = 4, 6
-PATCH = 0.25  # of the distance between patches: half the side of what is measured of each
-TOP = 0.995  # encoded values from here on may be clipped
-NOT_EVEN = 0.08  # scatter within a patch, relative to it, that deserves a word
-POINTS = 257
+PATCH = 0.25  # half the side of the measured square, relative to the distance between patches
+CLIPPED = 0.995  # encoded values from here on may be clipped
+UNEVEN = 0.08  # relative scatter within a patch above which a note is given
+POINTS = 257  # of the sampled curve
 
 
 @dataclass(frozen=True)
 class ChartTone:
-    """transfer: encoded → linear, grey is grey, white is white's reflectance. encoded, reflectance:
-    (n, 3), (n,) of the grey patches used, dark to light. gamma: (3,) mean slope of log reflectance
-    over log sRGB-decoded value: 1 where the photo is what its sRGB curve says. notes: sentences."""
+    """transfer: encoded → linear; grey patches are neutral, white has its reflectance. encoded,
+    reflectance: (n, 3), (n,) of the grey patches used, dark to light. gamma: (3,) mean slope of log
+    reflectance over the log of the sRGB-decoded value: 1 where the photo is encoded as sRGB. notes:
+    sentences for the report."""
 
     transfer: Transfer
     encoded: Array
@@ -38,13 +39,14 @@ class ChartTone:
 def chart_tone(
     pixels: NDArray[np.floating], corners: Array, greys: tuple[float, ...] | None = None
 ) -> ChartTone:
-    """Measure the curve of a photo (h, w, 3), encoded 0..1.
+    """Measure the tone curve of a photo (h, w, 3), encoded 0..1.
 
-    corners: (4, 2) pixels, centres of dark skin, bluish green, black and white of a ColorChecker
-    Classic; or, with greys given (reflectances), (2, 2): the first and the last patch of a scale.
-    The curve runs through the patches (monotone cubic in the logarithms); below the darkest it is
-    proportional to the sRGB-decoded value, above the lightest it goes on as it ended.
-    Raises PatinaError where the patches are not there or not in order.
+    corners: (4, 2) pixels, centres of the patches dark skin, bluish green, black and white of a
+    ColorChecker Classic; or, with greys given (reflectances), (2, 2): the first and the last patch
+    of a grey scale. The curve is a monotone cubic through the patches in the logarithms. Below the
+    darkest it is proportional to the sRGB-decoded value, above the lightest it is extrapolated with
+    its last slope. Raises PatinaError where patches lie outside the photo, are clipped or are not
+    in order.
     """
     if greys is None:
         centres, step = _colorchecker(corners)
@@ -58,22 +60,24 @@ def chart_tone(
     order = np.argsort(reflectance)
     found, scatter, reflectance = found[order], scatter[order], reflectance[order]
     notes = []
-    whole = (found < TOP).all(axis=1) & (found > 0.002).all(axis=1)
+    whole = (found < CLIPPED).all(axis=1) & (found > 0.002).all(axis=1)
     if not whole.all():
-        notes.append(f"{int((~whole).sum())} grey patches are clipped and left out")
+        notes.append(
+            f"Grey patches of the chart not used, clipped or black: {int((~whole).sum())}."
+        )
     found, reflectance = found[whole], reflectance[whole]
     if len(found) < 3:
         raise PatinaError(
-            f"{len(found)} grey patches of the chart are neither clipped nor black, expected at "
-            "least 3: expose the chart less, or check its corners"
+            f"{len(found)} grey patches of the chart are neither clipped nor black; expected at "
+            "least 3; expose the chart less, or check its corners"
         )
     if (np.diff(found, axis=0) <= 0).any():
         raise PatinaError(
-            "the grey patches of the chart do not get lighter in their order: check its corners "
+            "the grey patches of the chart are not in order of lightness; check its corners "
             "(centres of the patches dark skin, bluish green, black, white)"
         )
-    if np.median(scatter) > NOT_EVEN:
-        notes.append("the chart's patches are not even: is the photo sharp, are the corners right?")
+    if np.median(scatter) > UNEVEN:
+        notes.append("The chart's patches are not uniform; check its focus and its corners.")
     curves = [_curve(found[:, c], reflectance) for c in range(3)]
     at = curves[0][0]
     linear = np.stack([values for _, values in curves])
@@ -85,7 +89,8 @@ def chart_tone(
 def _colorchecker(corners: Array) -> tuple[Array, float]:
     """((6, 2) centres of the grey patches, white to black, the distance between patches).
 
-    A plane seen in perspective: the homography that takes the corners of the 3 × 5 lattice there.
+    The chart is a plane in perspective: a homography maps the corners of the 3 × 5 lattice to the
+    photo.
     """
     lattice = np.array([[0, 0], [COLUMNS - 1, 0], [COLUMNS - 1, ROWS - 1], [0, ROWS - 1]], float)
     rows = []
@@ -100,7 +105,7 @@ def _colorchecker(corners: Array) -> tuple[Array, float]:
 
 
 def _patches(pixels: NDArray[np.floating], centres: Array, half: float) -> tuple[Array, Array]:
-    """((n, 3) median of each patch, (n,) its scatter relative to that)."""
+    """((n, 3) median of each patch, (n,) its relative scatter)."""
     side = max(int(half), 1)
     height, width = pixels.shape[:2]
     values, scatter = [], []
@@ -108,7 +113,7 @@ def _patches(pixels: NDArray[np.floating], centres: Array, half: float) -> tuple
         if not (side <= x < width - side and side <= y < height - side):
             raise PatinaError(
                 f"a patch of the chart at ({x}, {y}) lies outside the photo of {width} × {height} "
-                "pixels: check its corners"
+                "pixels; check the corners of the chart"
             )
         part = pixels[y - side : y + side + 1, x - side : x + side + 1].reshape(-1, 3)
         middle = np.median(part, axis=0)
@@ -124,7 +129,7 @@ def _curve(encoded: Array, reflectance: Array) -> tuple[Array, Array]:
     log_s = np.log(np.maximum(SRGB(at), 1e-9))
     known_s, known_r = np.log(SRGB(encoded)), np.log(reflectance)
     inner = PchipInterpolator(known_s, known_r)
-    low = known_r[0] + (log_s - known_s[0])  # proportional: nothing darker was measured
+    low = known_r[0] + (log_s - known_s[0])  # proportional: no darker patch was measured
     last = float(inner.derivative()(known_s[-1]))
     steep = (known_r[-1] - known_r[-2]) / (known_s[-1] - known_s[-2])
     high = known_r[-1] + max(last, steep) * (log_s - known_s[-1])

@@ -1,4 +1,5 @@
-"""Pixels drawn from the lit photos for calibration: calm surface, its light averaged a little."""
+"""Random pixels of the lit photos for calibration: gently curved surface, radiance averaged over a
+small box."""
 
 from __future__ import annotations
 
@@ -13,17 +14,17 @@ from ..scan import Camera
 
 Array = NDArray[np.float64]
 
-REACH = 3  # pixels to the neighbours that must see the same surface
-CALM = np.cos(np.radians(12.0))  # with nearly the same normal
-BOX = 2  # radiance is the mean of (2 BOX + 1)² pixels: texture and noise average out
-DARK = 0.003  # of the bright end: below it a photo shows noise and stray light
+REACH = 3  # pixels to the neighbours that must show the same surface
+MIN_NORMAL_COSINE = np.cos(np.radians(12.0))  # between their normals
+BOX = 2  # radiance is the mean of (2 BOX + 1)² pixels, which reduces texture and noise
+DARK = 0.003  # of the 95th percentile: below it noise and stray light dominate
 
 
 @dataclass(frozen=True)
-class Seen:
+class CalibrationPixels:
     """n pixels of one photo. point, normal, view: (n, 3) float64, scan frame, view surface →
-    camera; radiance: (n,) mean of the channels; weight: (n,) how much each counts;
-    material: (n,) place of its material."""
+    camera; radiance: (n,) mean of the channels; weight: (n,) of each; material: (n,) index of its
+    material."""
 
     camera: Camera
     point: Array
@@ -33,9 +34,9 @@ class Seen:
     weight: Array
     material: NDArray[np.int16]
 
-    def select(self, which: NDArray) -> Seen:
+    def select(self, which: NDArray) -> CalibrationPixels:
         """The rows of a boolean mask or an index array."""
-        return Seen(
+        return CalibrationPixels(
             self.camera, self.point[which], self.normal[which], self.view[which],
             self.radiance[which], self.weight[which], self.material[which],
         )  # fmt: skip
@@ -48,9 +49,9 @@ def draw_pixels(
     material: NDArray[np.int16],
     count: int,
     rng: np.random.Generator,
-) -> Seen:
-    """Up to ``count`` pixels of a photo: radiance (h, w, 3); material (h, w): place of each pixel's
-    material, −1 for what must not be used."""
+) -> CalibrationPixels:
+    """Up to ``count`` random pixels of a photo. radiance: (h, w, 3); material: (h, w) index of each
+    pixel's material, −1 for pixels that must not be used."""
     edge = REACH + BOX
     inside = max(camera.height - 2 * edge, 0), max(camera.width - 2 * edge, 0)
     pixels = inside[0] * inside[1]
@@ -66,7 +67,7 @@ def draw_pixels(
         drawn += len(found[-1].radiance)
         if drawn >= count:
             break
-    return Seen(
+    return CalibrationPixels(
         camera=camera,
         point=np.concatenate([s.point for s in found])[:count],
         normal=np.concatenate([s.normal for s in found])[:count],
@@ -84,8 +85,8 @@ def _calm(
     material: NDArray[np.int16],
     row: NDArray[np.intp],
     column: NDArray[np.intp],
-) -> Seen:
-    """Of these pixels the ones whose neighbours see the same, gently curved surface."""
+) -> CalibrationPixels:
+    """Those of the pixels whose neighbours show the same, gently curved surface."""
     keep = np.ones(len(row), bool)
     face, u, v = np.full(len(row), -1, np.int32), np.zeros(len(row)), np.zeros(len(row))
     centre = np.zeros((len(row), 3))
@@ -106,7 +107,7 @@ def _calm(
             centre[some[hit]], along[some[hit]] = normal, directions[hit]
             face[some[hit]], u[some[hit]], v[some[hit]] = met.face, met.u, met.v
         else:
-            same = np.einsum("ij,ij->i", normal, centre[some[hit]]) > CALM
+            same = np.einsum("ij,ij->i", normal, centre[some[hit]]) > MIN_NORMAL_COSINE
             keep[some[hit][~same]] = False
     window = range(-BOX, BOX + 1)
     light, whole = np.zeros(len(row)), material[row, column] >= 0
@@ -117,14 +118,14 @@ def _calm(
     keep &= whole & (light > 0)
     hits = Hits(face[keep], u[keep].astype(np.float32), v[keep].astype(np.float32))
     mean = light[keep] / len(window) ** 2
-    return Seen(
+    return CalibrationPixels(
         camera, rays.points(hits), centre[keep], -along[keep], mean, np.ones(len(mean)),
         material[row, column][keep],
     )  # fmt: skip
 
 
-def not_dark(seen: list[Seen]) -> list[Seen]:
-    """Without what is nearly black in all photos together."""
+def not_dark(seen: list[CalibrationPixels]) -> list[CalibrationPixels]:
+    """Without pixels that are nearly black relative to all photos together."""
     together = np.concatenate([s.radiance for s in seen])
     bright = float(np.percentile(together, 95)) if together.size else 0.0
     return [s.select(s.radiance > DARK * bright) for s in seen]

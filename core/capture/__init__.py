@@ -1,4 +1,4 @@
-"""The capture file: everything a fit needs, by name."""
+"""Read and write capture files, which name everything that a fit needs."""
 
 from .entries import (
     ChartEntry,

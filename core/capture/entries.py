@@ -1,4 +1,4 @@
-"""What the tables of a capture file say, one dataclass a table."""
+"""The tables of a capture file as dataclasses, one per table."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SphereEntry:
-    """A photo of a sphere. camera: label of the scan camera it was taken with; surface: "chrome" or
-    "glossy"; reflectance: of a chrome one, which gives the light's irradiance; centre (2,) and
-    radius: its outline, pixels; mask: or the sphere in white; neither: it is searched for."""
+    """A photo of a sphere. camera: label of the scan camera with its viewpoint; surface: "chrome"
+    or "glossy"; reflectance: of a chrome sphere, gives the light's irradiance; centre (2,) and
+    radius: the outline in pixels; mask: an image with the sphere in white. Without outline and
+    mask the sphere is searched for."""
 
     photo: Path
     camera: str
@@ -32,8 +33,9 @@ class SphereEntry:
 
 @dataclass(frozen=True)
 class SunEntry:
-    """Where and when. latitude, longitude: degrees; altitude: metres; time: with its zone. north,
-    up: (3,) scan frame. None: from the photos' EXIF, or the scan's georeference."""
+    """Place and time of a photo lit by the sun. latitude, longitude: degrees; altitude: metres;
+    time: with time zone; north, up: (3,) scan frame. None: from the photo's EXIF or from the
+    scan's georeference."""
 
     latitude: float | None = None
     longitude: float | None = None
@@ -46,7 +48,7 @@ class SunEntry:
 @dataclass(frozen=True)
 class WhiteEntry:
     """A white matte target in a photo. normal: (3,) scan frame; None: it faces the light. exposure:
-    the photo's, in the unit of the lit photos' exposures."""
+    of the photo, in the unit of the lit photos' exposures."""
 
     photo: Path
     mask: Path
@@ -59,10 +61,10 @@ class WhiteEntry:
 class LightEntry:
     """One light: exactly one of direction, sphere, sun (distant), position (near), mounted.
 
-    strength: (3,) irradiance of a distant light, intensity of a near one. angle: radians,
-    diameter of a distant source as the object sees it; radius: of a near source, scan units; beam:
-    radians to half of the intensity. refine: what is given is where the search starts. charted: the
-    colour chart of [tone] says how strong it is."""
+    strength: (3,) irradiance of a distant light, or intensity of a near one. angle: radians,
+    angular diameter of a distant source; radius: of a near source, scan units; beam: radians, angle
+    from the axis at which half of the intensity is left. refine: the given values are start values
+    of an optimisation. charted: the colour chart of [tone] gives the strength."""
 
     name: str
     direction: Array | None = None
@@ -80,23 +82,25 @@ class LightEntry:
 
     @property
     def strength_given(self) -> bool:
-        """True where reflectance will have a scale."""
+        """True where the entry fixes the light's strength, so that reflectance has a scale."""
         mirror = self.sphere is not None and self.sphere.reflectance is not None
         return self.strength is not None or self.white is not None or mirror or self.charted
 
     @property
     def distant(self) -> bool:
-        """True for a light that is the same everywhere."""
+        """True for a light with the same direction and irradiance everywhere on the object."""
         return self.position is None and self.mounted is None
 
 
 @dataclass(frozen=True)
 class ChartEntry:
-    """A photo of a colour chart or a grey scale. corners: (4, 2) pixels, the centres of its corner
-    patches: dark skin, bluish green, black, white of a ColorChecker; first and last of a grey scale
-    are corners[0] and corners[1]. reflectance: of a grey scale's patches, first to last. light:
-    name of the distant light that shines on it, whose irradiance it then gives; normal: (3,) the
-    chart's, scan frame; None: it faces that light."""
+    """A photo of a colour chart or a grey scale.
+
+    corners: (4, 2) pixels, centres of a ColorChecker's corner patches (dark skin, bluish green,
+    black, white); for a grey scale (2, 2), its first and last patch. reflectance: of a grey
+    scale's patches, first to last. light: name of the distant light whose irradiance the chart
+    gives; normal: (3,) of the chart, scan frame; None: it faces that light.
+    """
 
     photo: Path
     corners: Array
@@ -107,8 +111,8 @@ class ChartEntry:
 
 @dataclass(frozen=True)
 class ToneEntry:
-    """[tone]: from the photos' numbers to linear light. transfer: a curve by name; chart: or
-    measured; "auto": as each file says."""
+    """[tone]: how pixel values are converted to linear light. transfer: name of a curve; "auto":
+    the curve that each file states; chart: measures the curve instead."""
 
     transfer: str = "auto"
     chart: ChartEntry | None = None
@@ -116,10 +120,13 @@ class ToneEntry:
 
 @dataclass(frozen=True)
 class PhotoEntry:
-    """One lit photo, or several exposures of it. camera: label of the scan camera that shares its
-    viewpoint; light: name of a light; exposures: divide the pixels of each file, None for EXIF's;
-    transfer: a curve of its own; saturation: the linear value at which a float photo clips;
-    masks: material (or "shadow") → mask file, white = in."""
+    """One lit photo, or several exposures of it.
+
+    camera: label of the scan camera with its viewpoint; light: name of its light; exposures: one
+    per file, the pixels are divided by it; None: from EXIF. transfer: curve of this photo, None for
+    that of [tone]. saturation: linear value at which a floating-point photo clips. masks:
+    {material or "shadow", "highlight", "ignore": mask file}, white = inside.
+    """
 
     files: tuple[Path, ...]
     camera: str
@@ -131,15 +138,17 @@ class PhotoEntry:
 
     @property
     def file(self) -> Path:
-        """The photo's name: its first file."""
+        """The first file, which names the photo."""
         return self.files[0]
 
 
 @dataclass(frozen=True)
 class MaterialEntry:
-    """One material to fit, by masks unless the mesh says where it is. faces: name of the mesh's
-    integer face attribute (its value is the material's place in the list, from 0); vertex_colour,
-    texture_colour: (3,) sRGB 0..255, painted on the mesh's vertices or in its texture."""
+    """One material to fit, located by masks unless one of these locates it on the mesh.
+
+    faces: name of an integer face attribute (its value is the material's index, from 0);
+    vertex_colour, texture_colour: (3,) sRGB 0..255, painted on the vertices or in the texture.
+    """
 
     name: str
     faces: str | None = None
@@ -148,15 +157,18 @@ class MaterialEntry:
 
     @property
     def by_mesh(self) -> bool:
-        """True where the mesh says which faces are of it."""
+        """True where faces or colours of the mesh locate the material."""
         return (self.faces or self.vertex_colour or self.texture_colour) is not None
 
 
 @dataclass(frozen=True)
 class FitOptions:
-    """[fit]: what is too close to trust, and the estimator's settings. method: "measured" or
-    "paper"; absolute: False where the lights' irradiance is known only relative to each other;
-    unused: keys that were given and that the method does not read."""
+    """[fit]: the margins and the settings of the estimator.
+
+    method: "measured" or "paper"; absolute: False where the lights' irradiance is known only
+    relative to each other; margins: distances within which pixels are rejected; held_out: whether
+    photos are held out for cross-validation; unused: given keys that the method does not read.
+    """
 
     method: str = "measured"
     absolute: bool = True

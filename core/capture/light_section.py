@@ -1,4 +1,4 @@
-"""[[light]]: where the light comes from, one of five ways, and how strong it is."""
+"""Read a [[light]] table: direction or position, in one of five ways, and strength."""
 
 from __future__ import annotations
 
@@ -12,36 +12,37 @@ from ..light.sun_time import parse_time
 from .entries import LightEntry, SphereEntry, SunEntry, WhiteEntry
 from .section import Section, shown
 
-LARGEST_SIDE = 131_072.0  # pixels
-LARGEST = 1e9  # scan units
+MAX_RADIUS_PIXELS = 131_072.0
+MAX_RADIUS = 1e9  # scan units
 
-WAYS = ("direction", "sphere", "sun", "position", "mounted")
+LOCATION_KEYS = ("direction", "sphere", "sun", "position", "mounted")
 
 
 def read_light(section: Section) -> LightEntry:
     """One [[light]] table. Raises InputError naming the key and the line."""
     name = section.text("name")
-    given = [way for way in WAYS if section.get(way) is not None]
+    given = [key for key in LOCATION_KEYS if section.get(key) is not None]
     if len(given) != 1:
         found = " and ".join(given) if given else "none of them"
         raise section.error(
-            f"expected one of {', '.join(WAYS)}; found {found}", given[1] if given else "direction"
+            f"found {found}; expected exactly one of {', '.join(LOCATION_KEYS)}",
+            given[1] if given else "direction",
         )
-    way = given[0]
-    distant = way in ("direction", "sphere", "sun")
+    location = given[0]
+    distant = location in ("direction", "sphere", "sun")
     angle = beam = None
     radius = 0.0
     if distant:
         angle = np.radians(section.number("angle", 0.0, 0.0, 90.0)) if "angle" in section else None
     else:
-        radius = section.number("radius", 0.0, 0.0, LARGEST)
-    if way == "mounted" and "beam" in section:
+        radius = section.number("radius", 0.0, 0.0, MAX_RADIUS)
+    if location == "mounted" and "beam" in section:
         beam = float(np.radians(section.number("beam", 45.0, 1.0, 180.0)))
     entry = LightEntry(
         name=name,
-        direction=_direction(section) if way == "direction" else None,
-        sphere=_sphere(section.table("sphere")) if way == "sphere" else None,
-        sun=_sun(section.table("sun")) if way == "sun" else None,
+        direction=_direction(section) if location == "direction" else None,
+        sphere=_sphere(section.table("sphere")) if location == "sphere" else None,
+        sun=_sun(section.table("sun")) if location == "sun" else None,
         position=section.vector("position"),
         mounted=section.vector("mounted", "right, down, forward"),
         strength=_strength(section, "irradiance" if distant else "intensity", distant),
@@ -54,8 +55,8 @@ def read_light(section: Section) -> LightEntry:
     mirror = entry.sphere is not None and entry.sphere.reflectance is not None
     if sum((entry.white is not None, entry.strength is not None, mirror)) > 1:
         raise section.error(
-            "the irradiance is given twice (irradiance, white, the sphere's reflectance): leave "
-            "one in",
+            "the irradiance is given more than once; expected only one of irradiance, white and "
+            "the sphere's reflectance: remove the others",
             "white" if entry.white is not None else "irradiance",
         )
     section.close()
@@ -64,10 +65,10 @@ def read_light(section: Section) -> LightEntry:
 
 def _direction(section: Section) -> NDArray[np.float64]:
     direction = section.vector("direction")
-    assert direction is not None  # asked for because it is there
+    assert direction is not None  # only called where the key is present
     length = float(np.linalg.norm(direction))
     if length < 1e-9:
-        raise section.error("the direction has no length", "direction")
+        raise section.error("found a vector of length 0; expected a direction", "direction")
     return direction / length
 
 
@@ -77,29 +78,37 @@ def _strength(section: Section, key: str, distant: bool) -> NDArray[np.float64] 
         kind = "distant" if distant else "near"
         raise section.error(f"a {kind} light has no {other}; expected {key}", other)
     if not distant and "white" in section:
-        raise section.error("a white target gives the irradiance of a distant light only", "white")
+        raise section.error(
+            "a white target gives only the irradiance of a distant light; for a near light give "
+            "intensity",
+            "white",
+        )
     strength = section.vector(key, "red, green, blue")
     if strength is not None and not (strength > 0).all():
-        raise section.error(f"found {shown(strength.tolist())}, expected positive numbers", key)
+        raise section.error(f"found {shown(strength.tolist())}; expected positive numbers", key)
     return strength
 
 
 def _sphere(section: Section) -> SphereEntry:
     photo, camera = section.file_path("photo"), section.text("camera")
     centre = section.numbers("center", 2)
-    radius = section.number("radius", 0.0, 1.0, LARGEST_SIDE) if "radius" in section else None
+    radius = section.number("radius", 0.0, 1.0, MAX_RADIUS_PIXELS) if "radius" in section else None
     mask = section.optional_file_path("mask")
     surface = section.optional_text("surface") or "chrome"
     mirror = section.number("reflectance", 0.6, 0.01, 1.0) if "reflectance" in section else None
     section.close()
     if surface not in ("chrome", "glossy"):
-        raise section.error(f"found {surface!r}, expected 'chrome' or 'glossy'", "surface")
+        raise section.error(f"found {surface!r}; expected 'chrome' or 'glossy'", "surface")
     if mirror is not None and surface != "chrome":
-        raise section.error("only a chrome sphere's reflectance gives irradiance", "reflectance")
+        raise section.error(
+            "only the reflectance of a chrome sphere gives the irradiance; remove reflectance, or "
+            "set surface = 'chrome'",
+            "reflectance",
+        )
     if (centre is None) != (radius is None) or (centre is not None and mask is not None):
         raise section.error(
-            "expected center and radius of its outline in pixels, or a mask, or neither: then it "
-            "is searched for",
+            "expected center and radius of the sphere's outline in pixels, or a mask, or neither "
+            "(then Patina searches for the sphere)",
             "center",
         )
     return SphereEntry(photo, camera, surface, mirror, centre, radius, mask)
@@ -112,11 +121,11 @@ def _sun(section: Section) -> SunEntry:
     time = section.get("time")
     if time is not None:
         if not isinstance(time, str | datetime):
-            raise section.error(f"found {shown(time)}, expected a time with its zone", "time")
+            raise section.error(f"found {shown(time)}; expected a time with its time zone", "time")
         try:
             time = parse_time(time)
         except InputError as error:
-            raise section.error(error.said, "time") from error
+            raise section.error(error.detail, "time") from error
     entry = SunEntry(
         latitude=optional("latitude", -90.0, 90.0),
         longitude=optional("longitude", -180.0, 360.0),
@@ -127,9 +136,9 @@ def _sun(section: Section) -> SunEntry:
     )
     section.close()
     if (entry.latitude is None) != (entry.longitude is None):
-        raise section.error("latitude and longitude belong together")
+        raise section.error("only one of latitude and longitude is given; expected both or none")
     if (entry.north is None) != (entry.up is None):
-        raise section.error("north and up belong together")
+        raise section.error("only one of north and up is given; expected both or none")
     return entry
 
 

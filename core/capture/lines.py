@@ -1,4 +1,4 @@
-"""Which line of a TOML text says which key (the standard parser does not tell)."""
+"""Find the line of each key in a TOML text; the standard parser does not report lines."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ KEY = re.compile(r"^\s*([\w\-\"']+)\s*=")
 
 
 def key_lines(text: str) -> dict[tuple[str | int, ...], int]:
-    """Key path → line, counted from 1; tables of arrays by place, as ("photo", 2, "file")."""
+    """{key path: line}, lines counted from 1; members of arrays of tables by index from 0, as in
+    ("photo", 2, "file")."""
     lines: dict[tuple[str | int, ...], int] = {}
     counts: dict[str, int] = {}
     here: tuple[str | int, ...] = ()

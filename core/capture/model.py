@@ -1,4 +1,4 @@
-"""What a capture file says, checked and with absolute paths."""
+"""The content of a capture file, checked and with absolute paths."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from ..errors import InputError
 from .entries import FitOptions, LightEntry, MaterialEntry, PhotoEntry, ToneEntry
 
 SHADOW_MASK, HIGHLIGHT_MASK, IGNORE_MASK = "shadow", "highlight", "ignore"
-LEFT_OUT = (SHADOW_MASK, HIGHLIGHT_MASK, IGNORE_MASK)
-"""Masks of what nothing is measured from: where the light does not come from the lamp alone,
-highlights that are not the material's (glare, a bulb's reflection in a window), whatever else is
-not the object."""
+EXCLUDED_MASKS = (SHADOW_MASK, HIGHLIGHT_MASK, IGNORE_MASK)
+"""Masks of pixels that are not measured: "shadow", where the light does not come from the lamp
+alone; "highlight", highlights that are not the material's (glare, a bulb's reflection in a
+window); "ignore", anything else that is not the object."""
 
 
 @dataclass(frozen=True)
 class ScanEntry:
-    """[scan]. chunk: of a project with several; frame: the mesh's, where the scan knows several;
-    extra: cameras of more photos (what ``localise`` writes); texture: over the mesh's own."""
+    """[scan]. chunk: name of the chunk in a project with several; frame: coordinate frame of the
+    mesh, where the scan has several; extra: cameras of additional photos (written by ``localise``);
+    texture: replaces the mesh's own."""
 
     cameras: Path
     mesh: Path
@@ -32,7 +33,7 @@ class ScanEntry:
 
 @dataclass(frozen=True)
 class Capture:
-    """A whole capture. lines: key path → line in the file, for messages."""
+    """A whole capture. lines: {key path: line in the file}, for error messages."""
 
     file: Path
     scan: ScanEntry
@@ -44,11 +45,14 @@ class Capture:
     lines: dict[tuple[str | int, ...], int] = field(default_factory=dict)
 
     def photo_name(self, place: int) -> str:
-        """A photo's file relative to the capture file: two folders may hold the same name."""
+        """A photo's path relative to the capture file, because file names alone may not be unique.
+
+        place: index of the photo, from 0.
+        """
         return Path(os.path.relpath(self.photos[place].file, self.file.parent)).as_posix()
 
     def named_by_masks(self, material: str) -> bool:
-        """True where some photo's mask says where this material is."""
+        """True where some photo has a mask for this material."""
         return any(material in photo.masks for photo in self.photos)
 
     def error(self, message: str, *path: str | int) -> InputError:
@@ -59,7 +63,7 @@ class Capture:
 def key_error(
     file: Path, lines: dict[tuple[str | int, ...], int], message: str, *path: str | int
 ) -> InputError:
-    """An InputError about the key at ``path``; array places are shown counted from 1."""
+    """An InputError about the key at ``path``; indices are shown counted from 1."""
     words: list[str] = []
     for part in path:
         if isinstance(part, int):

@@ -1,4 +1,4 @@
-"""A capture file of one's own: cameras, mesh and lit photos that lie about → `*.capture.toml`."""
+"""Write a new capture file (`*.capture.toml`) from cameras, a mesh and lit photos."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from .reader import read_capture
 PHOTOS = frozenset((*KIND_OF, *RAW))
 COLMAP = frozenset((".bin", ".txt"))
 CAMERAS = frozenset((*BY_SUFFIX, ".json", *COLMAP))
-LISTED = 3  # names in a message
+MAX_LISTED = 3  # file names in a message
 
 
 @dataclass(frozen=True)
-class Given:
-    """Files by what they are. cameras: a COLMAP model is its folder."""
+class SortedFiles:
+    """Files sorted by kind. cameras: a COLMAP model is represented by its folder."""
 
     cameras: tuple[Path, ...]
     meshes: tuple[Path, ...]
@@ -33,29 +33,29 @@ class Given:
 
 
 @dataclass(frozen=True)
-class LampWords:
-    """The one lamp of a new capture, as TOML: ``words`` is the line that says where it is."""
+class LampText:
+    """The lamp of a new capture as TOML. location_line: gives its direction or position."""
 
-    words: str
+    location_line: str
 
     @classmethod
-    def flash(cls, offset: Sequence[float]) -> LampWords:
-        """On the camera. offset: right, down, forward of the lens, scan units."""
+    def flash(cls, offset: Sequence[float]) -> LampText:
+        """A flash on the camera. offset: right, down, forward of the lens, scan units."""
         return cls(f"mounted = {_numbers(offset)}  # right, down, forward of the lens")
 
     @classmethod
-    def sun(cls) -> LampWords:
-        """Where the photos' own time and place have it."""
-        return cls("sun = {}  # as the photos' time and place say")
+    def sun(cls) -> LampText:
+        """The sun, from the time and place in the photos' EXIF."""
+        return cls("sun = {}  # from the photos' time and place")
 
     @classmethod
-    def distant(cls, direction: Sequence[float]) -> LampWords:
-        """direction: from the surface to the lamp, scan frame."""
+    def distant(cls, direction: Sequence[float]) -> LampText:
+        """A distant lamp. direction: (3,) from the surface to the lamp, scan frame."""
         return cls(f"direction = {_numbers(direction)}  # from the surface to the lamp")
 
 
-def sort_files(paths: Iterable[Path]) -> Given:
-    """Files by their suffix. Raises InputError for one that is of no use."""
+def sort_files(paths: Iterable[Path]) -> SortedFiles:
+    """Sort files by their suffix. Raises InputError for a file of no known kind."""
     cameras: list[Path] = []
     meshes: list[Path] = []
     photos: list[Path] = []
@@ -68,18 +68,20 @@ def sort_files(paths: Iterable[Path]) -> Given:
         elif suffix in CAMERAS:
             cameras.append(model_of(path))
         else:
-            raise InputError("is neither cameras nor a mesh nor a photo that is read", file=path)
-    return Given(tuple(dict.fromkeys(cameras)), tuple(meshes), tuple(photos))
+            raise InputError(
+                "has an unknown file type; expected cameras, a mesh or a photo", file=path
+            )
+    return SortedFiles(tuple(dict.fromkeys(cameras)), tuple(meshes), tuple(photos))
 
 
 def model_of(path: Path) -> Path:
-    """What is named as the cameras: of a COLMAP model the folder that its files lie in."""
+    """The path that names the cameras: for a file of a COLMAP model, its folder."""
     return path.parent if path.suffix.lower() in COLMAP else path
 
 
-def mesh_beside(cameras: Path) -> Path | None:
-    """The only mesh beside the cameras, or beside the folders of their model; None where there is
-    none or a choice."""
+def mesh_in_folder(cameras: Path) -> Path | None:
+    """The only mesh in the folder of the cameras, or next to the folder of a COLMAP model; None
+    where there is no mesh or more than one."""
     near = [cameras.parent, cameras.parent.parent] if cameras.is_dir() else [cameras.parent]
     for folder in near:
         with contextlib.suppress(OSError):
@@ -90,7 +92,7 @@ def mesh_beside(cameras: Path) -> Path | None:
 
 
 def free_name(folder: Path, stem: str) -> Path:
-    """A capture file that is not there yet."""
+    """A path for a capture file that does not exist yet."""
     out, count = folder / f"{stem}.capture.toml", 1
     while out.exists():
         count += 1
@@ -103,35 +105,35 @@ def write_new_capture(
     cameras: Path,
     mesh: Path,
     photos: Sequence[Path],
-    lamp: LampWords,
+    lamp: LampText,
     images: Path | None = None,
     chunk: str | None = None,
 ) -> None:
-    """Write a capture of photos lit by one lamp, each taken by the camera that is named like it.
+    """Write a capture of photos lit by one lamp; each photo gets the camera of the same name.
 
     images: folder of the scan's own photos. chunk: of a project with several. The file appears
     only after it has been read back. Raises InputError.
     """
     if not photos:
-        raise InputError("choose at least one lit photo", key="photos")
+        raise InputError("no photo is selected; expected at least one lit photo", key="photos")
     found = read_reconstruction(cameras, images, chunk)
     labels = {photo: find_camera(found.cameras, photo.name) for photo in photos}
     lost = [photo.name for photo, camera in labels.items() if camera is None]
     if lost:
-        some = ", ".join(lost[:LISTED]) + (" …" if len(lost) > LISTED else "")
+        some = ", ".join(lost[:MAX_LISTED]) + (" …" if len(lost) > MAX_LISTED else "")
         raise InputError(
-            f"{len(lost)} of {len(photos)} photos have no camera of their name: {some}; a lit "
-            "photo is called as the scan's photo from the same place, else the command `localise` "
-            "finds where it was taken from",
+            f"{len(lost)} of {len(photos)} photos have no camera of the same name: {some}; "
+            "expected each lit photo to have the name of the scan photo from the same viewpoint: "
+            "rename them, or use the command `localise` to find their viewpoints",
             file=cameras,
         )
     scan = {"cameras": cameras, "mesh": mesh, "images": images}
     lines = ["[scan]", *(f"{k} = {_path(p, out)}" for k, p in scan.items() if p is not None)]
     if chunk is not None:
         lines.append(f"chunk = {_text(chunk)}")
-    lines += ["", "[[light]]", 'name = "lamp"', lamp.words, ""]
+    lines += ["", "[[light]]", 'name = "lamp"', lamp.location_line, ""]
     for photo, camera in labels.items():
-        assert camera is not None  # those without are refused above
+        assert camera is not None  # photos without a camera raise an error above
         lines += ["[[photo]]", f"file = {_path(photo, out)}", f"camera = {_text(camera.label)}"]
         lines += ['light = "lamp"', ""]
     _write(out, "\n".join(lines))
@@ -147,14 +149,14 @@ def _write(out: Path, text: str) -> None:
 
 
 def _path(path: Path, out: Path) -> str:
-    """Relative to the capture file where it can be."""
-    with contextlib.suppress(ValueError):  # on another drive: stays absolute
+    """A path as TOML, relative to the capture file where possible."""
+    with contextlib.suppress(ValueError):  # a path on another drive stays absolute
         path = Path(os.path.relpath(path.resolve(), out.resolve().parent))
     return _text(path.as_posix())
 
 
 def _text(text: str) -> str:
-    """As TOML has it: what JSON writes is a subset."""
+    """A TOML string; JSON strings are a subset of TOML's."""
     return json.dumps(text, ensure_ascii=False)
 
 

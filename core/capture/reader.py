@@ -1,4 +1,4 @@
-"""Read a capture file (TOML). Everything that can be refused without opening images is refused."""
+"""Read a capture file (TOML) and check everything that can be checked without opening images."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..samples import Margins
 from .entries import FitOptions, LightEntry, MaterialEntry, ToneEntry
 from .light_section import read_light
 from .lines import key_lines
-from .model import LEFT_OUT, Capture, ScanEntry
+from .model import EXCLUDED_MASKS, Capture, ScanEntry
 from .photo_section import read_photo_entry, read_tone
 from .section import Section, shown
 
@@ -27,13 +27,16 @@ METHODS = ("measured", "paper")  # the first is the default
 PAPER_KEYS = (
     "samples", "trials", "subset", "curvature", "monotonicity", "highest_intensity", "eta", "seed",
 )  # fmt: skip
-LARGEST_FILE = 1_000_000  # bytes; a capture of a thousand photos has a tenth of it
-LONGEST_LINE = 10_000
+MAX_FILE_BYTES = 1_000_000  # a capture of a thousand photos has a tenth of it
+MAX_LINE_LENGTH = 10_000  # characters
 
 
 def read_capture(path: Path, margins: Margins | None = None) -> Capture:
-    """The capture in a file. margins: where it does not say them (default: the documented ones).
-    Raises InputError naming the key and the line."""
+    """Read the capture in a file.
+
+    margins: used where the file gives none (default: the documented ones). Raises InputError
+    naming the key and the line.
+    """
     top = open_capture(path)
     lines = top.lines
 
@@ -41,15 +44,15 @@ def read_capture(path: Path, margins: Margins | None = None) -> Capture:
     tone = read_tone(top.table("tone"))
     lights = tuple(read_light(section) for section in top.tables("light"))
     materials = tuple(_material(section) for section in top.tables("material"))
-    _refuse_twins(top, "light", [light.name for light in lights])
-    _refuse_twins(top, "material", [material.name for material in materials])
-    lights = _charted(top, tone, lights)
+    _check_unique(top, "light", [light.name for light in lights])
+    _check_unique(top, "material", [material.name for material in materials])
+    lights = _mark_charted(top, tone, lights)
     known = [light.strength_given for light in lights]
     if any(known) and not all(known):
         place = known.index(False)
         raise top.error(
-            "the irradiance (or intensity) is missing here and given for other lights: give all "
-            "or none",
+            "the irradiance (or intensity) is missing for this light but given for others; "
+            "expected it for all lights or for none",
             "light",
             place,
             "irradiance" if lights[place].distant else "intensity",
@@ -57,20 +60,20 @@ def read_capture(path: Path, margins: Margins | None = None) -> Capture:
     if lights and not any(known) and len({light.distant for light in lights}) > 1:
         place = next(i for i, light in enumerate(lights) if not light.distant)
         raise top.error(
-            "near and distant lights of unknown strength have no common scale: give irradiance and "
-            "intensity",
+            "near and distant lights of unknown strength have no common scale; expected irradiance "
+            "and intensity: give both",
             "light", place, "intensity",
         )  # fmt: skip
     photos = tuple(
         read_photo_entry(section, {light.name for light in lights}, {m.name for m in materials})
         for section in top.tables("photo")
     )
-    _refuse_doubles(top, materials, {name for photo in photos for name in photo.masks})
+    _check_located(top, materials, {name for photo in photos for name in photo.masks})
     fit = _fit(top.table("fit"), margins or Margins())
     top.table("diagnose").close()
     top.close()
     if not photos:
-        raise top.error("no [[photo]]: at least one lit photo is needed", "photo")
+        raise top.error("has no [[photo]]; expected at least one lit photo", "photo")
     return Capture(
         file=path.resolve(),
         scan=scan,
@@ -84,26 +87,26 @@ def read_capture(path: Path, margins: Margins | None = None) -> Capture:
 
 
 def open_capture(path: Path) -> Section:
-    """The whole file as a table to be read key by key. Raises InputError."""
+    """The whole file as a Section that is read key by key. Raises InputError."""
     text = _text(path)
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"is not valid TOML ({error})", file=path) from error
-    except (ValueError, RecursionError) as error:  # a number or a nest beyond all bounds
+    except (ValueError, RecursionError) as error:  # a number too large, or nesting too deep
         raise InputError(f"is not a capture file ({error})", file=path) from error
     return Section(data, path.resolve(), key_lines(text))
 
 
 def read_scan_entry(path: Path) -> ScanEntry:
-    """[scan] of a file that may lack all that comes after: lights, photos. Raises InputError."""
+    """Read only [scan], from a file that may have no lights or photos yet. Raises InputError."""
     return _scan(open_capture(path).table("scan"))
 
 
-def _charted(
+def _mark_charted(
     top: Section, tone: ToneEntry, lights: tuple[LightEntry, ...]
 ) -> tuple[LightEntry, ...]:
-    """The lights, the one that shone on the chart marked."""
+    """The lights, with ``charted`` set for the light of the chart."""
     chart = tone.chart
     if chart is None or chart.light is None:
         return lights
@@ -111,16 +114,24 @@ def _charted(
     if chart.light not in names:
         known = ", ".join(names) or "none"
         raise top.error(
-            f"no [[light]] is named {chart.light!r}; there are: {known}", "tone", "chart", "light"
+            f"no [[light]] is named {chart.light!r}; expected one of: {known}",
+            "tone",
+            "chart",
+            "light",
         )
     place = names.index(chart.light)
     if not lights[place].distant:
         raise top.error(
-            "a chart gives the irradiance of a distant light only", "tone", "chart", "light"
+            f"{chart.light!r} is a near light; expected a distant light, because a chart gives "
+            "only the irradiance of a distant light",
+            "tone",
+            "chart",
+            "light",
         )
     if lights[place].strength_given:
         raise top.error(
-            f"the irradiance of {chart.light!r} is given already: leave one of the two out",
+            f"the irradiance of {chart.light!r} is also given elsewhere; expected it only once: "
+            "remove it there or remove this key",
             "tone", "chart", "light",
         )  # fmt: skip
     return (*lights[:place], replace(lights[place], charted=True), *lights[place + 1 :])
@@ -137,31 +148,37 @@ def _scan(section: Section) -> ScanEntry:
         texture=section.optional_file_path("texture"),
     )
     if entry.images is not None and not entry.images.is_dir():
-        raise section.error(f"expected a folder, found a file: {entry.images}", "images")
+        raise section.error(f"found a file ({entry.images}); expected a folder", "images")
     section.close()
     return entry
 
 
 def _text(path: Path) -> str:
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise InputError("is too large for a capture file", file=path)
+        if path.stat().st_size > MAX_FILE_BYTES:
+            raise InputError("is too large for a capture file; expected at most 1 MB", file=path)
         text = path.read_text("utf-8-sig")
     except (OSError, ValueError) as error:
         if isinstance(error, UnicodeDecodeError):
-            raise InputError("is not a text in UTF-8", file=path) from error
+            raise InputError("is not UTF-8 text; save it as UTF-8", file=path) from error
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"cannot be read ({reason})", file=path) from error
-    if max(map(len, text.splitlines()), default=0) > LONGEST_LINE:
-        raise InputError("has a line too long for a capture file", file=path)
+    if max(map(len, text.splitlines()), default=0) > MAX_LINE_LENGTH:
+        raise InputError(
+            "has a line that is too long for a capture file; expected at most 10,000 characters",
+            file=path,
+        )
     return text
 
 
-def _refuse_twins(top: Section, kind: str, names: list[str]) -> None:
+def _check_unique(top: Section, kind: str, names: list[str]) -> None:
+    """Raise InputError where two tables have the same name."""
     for place, name in enumerate(names):
-        # some file systems do not tell upper from lower case
+        # names become file names, and some file systems ignore upper and lower case
         if name.casefold() in [other.casefold() for other in names[:place]]:
-            raise top.error(f"the name {name!r} is used twice", kind, place, "name")
+            raise top.error(
+                f"the name {name!r} is used twice; expected unique names", kind, place, "name"
+            )
 
 
 def _material(section: Section) -> MaterialEntry:
@@ -170,11 +187,19 @@ def _material(section: Section) -> MaterialEntry:
     vertex, texture = _colour(section, "vertex_colour"), _colour(section, "texture_colour")
     section.close()
     if sum(way is not None for way in (faces, vertex, texture)) > 1:
-        raise section.error("expected one of faces, vertex_colour and texture_colour", "faces")
-    if name in LEFT_OUT:
-        raise section.error(f"{name!r} is the name of masks that leave something out", "name")
+        raise section.error(
+            "found more than one of faces, vertex_colour and texture_colour; expected at most one",
+            "faces",
+        )
+    if name in EXCLUDED_MASKS:
+        raise section.error(
+            f"{name!r} is reserved for masks of excluded pixels; choose another name", "name"
+        )
     if not _is_file_name(name):
-        raise section.error(f"{name[:60]!r} cannot be part of a file name everywhere", "name")
+        raise section.error(
+            f"{name[:60]!r} cannot be part of a file name on every system; choose another name",
+            "name",
+        )
     return MaterialEntry(name, faces, vertex, texture)
 
 
@@ -183,13 +208,15 @@ def _colour(section: Section, key: str) -> tuple[int, int, int] | None:
     if value is None:
         return None
     if ((value < 0) | (value > 255) | (value % 1 != 0)).any():
-        raise section.error("expected three whole numbers from 0 to 255 (sRGB)", key)
+        raise section.error(
+            "found a value out of range; expected three whole numbers from 0 to 255 (sRGB)", key
+        )
     red, green, blue = (int(x) for x in value)
     return red, green, blue
 
 
 def _is_file_name(name: str) -> bool:
-    """True for what Linux, macOS and Windows all take as the start of a file's name."""
+    """True for a name that Linux, macOS and Windows all accept as the start of a file name."""
     return (
         name.isprintable()
         and len(name.encode()) <= 100
@@ -199,13 +226,13 @@ def _is_file_name(name: str) -> bool:
     )
 
 
-def _refuse_doubles(top: Section, materials: tuple[MaterialEntry, ...], masked: set[str]) -> None:
-    """Two materials that are both all of the object: the artist forgot the masks."""
+def _check_located(top: Section, materials: tuple[MaterialEntry, ...], masked: set[str]) -> None:
+    """Raise InputError where two materials both cover the whole object (masks were forgotten)."""
     whole = [i for i, m in enumerate(materials) if not m.by_mesh and m.name not in masked]
     if len(whole) > 1:
         raise top.error(
-            f"{materials[whole[0]].name!r} and {materials[whole[1]].name!r} would both be all of "
-            "the object: give them masks or faces",
+            f"{materials[whole[0]].name!r} and {materials[whole[1]].name!r} would both cover the "
+            "whole object; expected at most one such material: give the others masks or faces",
             "material",
             whole[1],
             "name",
@@ -217,12 +244,14 @@ def _fit(section: Section, margins: Margins) -> FitOptions:
     method = section.optional_text("method") or METHODS[0]
     if method not in METHODS:
         known = " or ".join(f"{m!r}" for m in METHODS)
-        raise section.error(f"found {shown(method)}, expected {known}", "method")
+        raise section.error(f"found {shown(method)}; expected {known}", "method")
     curvature = section.number("curvature", paper.curvature or 0.0, low=0.0)
     samples = section.integer("samples", paper.samples, 1, 40)
     subset = section.integer("subset", paper.subset, 10, 1_000_000)
     if subset < 2 * samples:
-        raise section.error(f"found {subset}, expected at least twice the samples", "subset")
+        raise section.error(
+            f"found {subset}; expected at least twice the number of samples", "subset"
+        )
     options = FitOptions(
         method=method,
         absolute=section.flag("absolute", True),

@@ -1,4 +1,4 @@
-"""A capture file with other lights: only the lines concerned change, comments and all else stay."""
+"""Write changed lights into a capture file; only their lines change, comments are kept."""
 
 from __future__ import annotations
 
@@ -25,10 +25,9 @@ TABLES = ("sphere", "sun", "white")
 def write_lights(capture: Capture, lights: Sequence[LightEntry], out: Path) -> None:
     """Write a copy of the capture's file with ``lights`` in place of its own, one for one.
 
-    Taken over are direction, position, mounted, irradiance or intensity, angle and radius; what
-    they stand for (sphere, sun, white) becomes a comment. out may be the capture's own file; it
-    appears whole or not at all, and only after it has been read back and found to say just this.
-    Raises PatinaError.
+    Written are direction, position, mounted, irradiance or intensity, angle and radius; the entries
+    that these replace (sphere, sun, white) become comments. out may be the capture's own file. It
+    is written atomically, after it has been read back and compared. Raises PatinaError.
     """
     try:
         text = capture.file.read_bytes().decode("utf-8")
@@ -58,12 +57,12 @@ def with_lights(text: str, capture: Capture, lights: Sequence[LightEntry]) -> st
     except TOMLKitError as error:
         raise InputError(f"cannot be edited ({error})", file=capture.file) from error
     tables = document.get("light")
+    if not isinstance(tables, AoT):
+        raise capture.error(
+            "is written inside another value; expected a [[light]] table of its own: "
+            "rewrite it so, then save again", "light", min(changes),
+        )  # fmt: skip
     for place, values in changes.items():
-        if not isinstance(tables, AoT):
-            raise capture.error(
-                "is written inside another value: give it a [[light]] table of its own, then "
-                "its lamp can be saved", "light", place,
-            )  # fmt: skip
         for key, value in values.items():
             if value is not None:
                 _set(tables[place], key, value, "\r\n" if "\r\n" in body else "\n")
@@ -98,7 +97,7 @@ def _commented(before: str, after: str) -> str:
 
 
 def _changes(old: LightEntry, new: LightEntry) -> dict[str, str | None]:
-    """Key → its new value as TOML, None where it goes."""
+    """{key: new value as TOML, None to remove it}."""
     strength = "irradiance" if new.distant else "intensity"
     pairs = {key: (getattr(old, key), getattr(new, key)) for key in VECTORS}
     pairs[strength] = (old.strength, new.strength)
@@ -118,26 +117,26 @@ def _changes(old: LightEntry, new: LightEntry) -> dict[str, str | None]:
 
 
 def _check(partial: Path, capture: Capture, lights: Sequence[LightEntry], out: Path) -> None:
-    """Refuse a file that does not say what it should."""
-    where = f"its files are named relative to {capture.file.parent}: save it in that folder"
+    """Raise PatinaError where the written file does not read back as intended."""
+    where = f"its paths are relative to {capture.file.parent}; save it in that folder"
     try:
         back = read_capture(partial)
     except InputError as error:
         elsewhere = out.resolve().parent != capture.file.parent
-        why = where if elsewhere else f"it would not be read again: {error}"
+        why = where if elsewhere else f"reading it back fails: {error}"
         raise InputError(f"cannot be saved here; {why}", file=out) from error
     for part in ("scan", "tone", "photos", "materials", "fit"):
         if not _same(getattr(back, part), getattr(capture, part)):
             raise InputError(f"cannot be saved here; {where}", file=out)
     if not _same(back.lights, tuple(lights)):
         raise PatinaError(
-            f"{capture.file}: its lights could not be changed in its text; give each light a "
-            "[[light]] table of its own, one key a line"
+            f"{capture.file}: the lights cannot be changed in this text; expected a [[light]] "
+            "table for each light, with one key per line"
         )
 
 
 def _same(one: Any, other: Any) -> bool:
-    """Equal, numbers but for rounding, paths by where they lead."""
+    """Equality with a tolerance for rounding of numbers; paths are compared after resolving."""
     if type(one) is not type(other) and not (
         isinstance(one, int | float) and isinstance(other, int | float)
     ):

@@ -1,5 +1,6 @@
-"""Work in a thread of its own while the job goes on yielding: ESC is heard within a moment, however
-long a piece of the work takes. What is dropped ends its piece unheard, and touches nothing."""
+"""Work in a background thread while the job goes on yielding, so that it reacts to Esc at once,
+however long a piece of work takes. A cancelled piece runs to its end, but its result is discarded.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +13,15 @@ from .job import Job
 Value = TypeVar("Value")
 Result = TypeVar("Result")
 
-MOMENT = 0.05  # seconds between yields
+YIELD_INTERVAL = 0.05  # seconds
 
 
 def in_background(work: Callable[[], Result], value: Value) -> Generator[Value, None, Result]:
-    """What ``work`` returns; yields ``value`` while it goes on. Errors of the work pass through."""
+    """The result of ``work``; yields ``value`` while it runs. Errors of the work are raised."""
     pool = ThreadPoolExecutor(1, "patina")
     try:
         future = pool.submit(work)
-        while wait([future], MOMENT).not_done:
+        while wait([future], YIELD_INTERVAL).not_done:
             yield value
         return future.result()
     finally:
@@ -30,8 +31,8 @@ def in_background(work: Callable[[], Result], value: Value) -> Generator[Value, 
 def steps_in_background(
     steps: Generator[float, None, Result],
 ) -> Generator[float, None, Result]:
-    """The fractions and the result of ``steps``; the latest fraction again and again while the next
-    is on its way."""
+    """The fractions and the result of ``steps``; the latest fraction is yielded repeatedly while
+    the next step runs."""
     done = 0.0
 
     def following() -> tuple[float, None] | tuple[None, Result]:
@@ -49,30 +50,32 @@ def steps_in_background(
 
 
 class BackgroundJob:
-    """A job in a thread of its own: who steps it never waits. Not for a job that touches what
-    belongs to another thread."""
+    """A job in its own thread: a caller that steps it never waits. Not for a job that uses objects
+    of another thread, such as Blender's data."""
 
     def __init__(self, job: Job) -> None:
         self.job = job
         self._pool = ThreadPoolExecutor(1, "patina")
-        self._dropped = False
-        self._going = self._pool.submit(self._drive)
+        self._cancelled = False
+        self._future = self._pool.submit(self._drive)
 
     def step(self) -> bool:
-        """False when the job is done. Errors of the work pass through."""
-        if not self._going.done():
+        """False when the job is done. Errors of the work are raised."""
+        if not self._future.done():
             return True
-        self._going.result()
+        self._future.result()
         return False
 
     def close(self) -> None:
-        """What is under way ends unheard; then the job lets go of everything it holds."""
-        self._dropped = True
+        """Cancel the job: the current piece runs to its end, its result is discarded, and then the
+        job releases its resources."""
+        self._cancelled = True
         self._pool.shutdown(wait=False)
 
     def _drive(self) -> None:
+        """Step the job in the thread until it ends or is cancelled."""
         try:
-            while not self._dropped and self.job.step():
+            while not self._cancelled and self.job.step():
                 pass
         finally:
             self.job.close()

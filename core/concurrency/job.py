@@ -1,4 +1,5 @@
-"""One code path for artist and farm: a job is stepped, reports its progress and can be dropped."""
+"""Stepped jobs, the same code for Blender and the command line: a job is stepped, reports progress
+and can be cancelled."""
 
 from __future__ import annotations
 
@@ -16,8 +17,8 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class Stage:
-    """Time and memory of one finished stage. seconds; peak_mb: the process's peak so far, MiB
-    (None where the system does not tell)."""
+    """Time and memory of one finished stage. peak_mb: peak memory of the process so far, MiB (None
+    where the system does not report it)."""
 
     name: str
     seconds: float
@@ -26,14 +27,14 @@ class Stage:
 
 @dataclass(frozen=True)
 class Step:
-    """What the job is about to do: a stage's name and the fraction of the WHOLE job done."""
+    """What the job does next: name of the stage and fraction of the WHOLE job done."""
 
     stage: str
     fraction: float
 
 
 class Job(ABC):
-    """Subclasses yield a Step before each piece of work in run()."""
+    """A job in steps: subclasses yield a Step before each piece of work in run()."""
 
     def __init__(self) -> None:
         self.stages: list[Stage] = []
@@ -43,10 +44,10 @@ class Job(ABC):
 
     @abstractmethod
     def run(self) -> Iterator[Step]:
-        """The work, cut into pieces by yields."""
+        """The work, divided by yields."""
 
     def step(self) -> bool:
-        """Do one piece; False when the job is done. Errors of the work pass through."""
+        """Do one piece of work; False when the job is done. Errors of the work are raised."""
         if self._steps is None:
             self._steps, self._since = self._run(), time.perf_counter()
         following = next(self._steps, None)
@@ -56,21 +57,23 @@ class Job(ABC):
         return following is not None
 
     def drain(self, report: Callable[[Step], None] = lambda step: None) -> None:
-        """All of it at once."""
+        """Run to the end; report is called after each step."""
         while self.step():
             report(self.now)
 
     def close(self) -> None:
-        """Drop what is not done, and let go of everything it holds."""
+        """Cancel the job and release its resources."""
         steps, self._steps = self._steps, iter(())
         if isinstance(steps, Generator):
             steps.close()
 
     def _run(self) -> Iterator[Step]:
+        """run() with single-threaded BLAS."""
         with single_threaded_blas():
             yield from self.run()
 
     def _close_stage(self) -> None:
+        """Record time and memory of the stage that ended."""
         moment = time.perf_counter()
         if self.now.stage:
             self.stages.append(Stage(self.now.stage, moment - self._since, peak_memory()))
@@ -78,14 +81,14 @@ class Job(ABC):
 
 
 def finished(result: R | None) -> R:
-    """What a drained job found."""
+    """The result of a job that ran to its end."""
     if result is None:  # pragma: no cover - drain raises or finishes
         raise RuntimeError("the job ended without a result")
     return result
 
 
 def peak_memory() -> float | None:
-    """Peak resident memory of this process, MiB."""
+    """Peak resident memory of this process, MiB; None on Windows."""
     try:
         import resource  # not on Windows
     except ImportError:

@@ -1,4 +1,4 @@
-"""A function over many things on some threads, its results in the order of the things."""
+"""Map a function over items on several threads, with the results in the order of the items."""
 
 from __future__ import annotations
 
@@ -7,29 +7,29 @@ from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
-Thing = TypeVar("Thing")
+Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
 def ordered_map(
     pool: ThreadPoolExecutor | None,
-    function: Callable[[Thing], Result],
-    things: Iterable[Thing],
+    function: Callable[[Item], Result],
+    things: Iterable[Item],
     ahead: int,
 ) -> Generator[Result, None, None]:
-    """Results one after the other, at most ``ahead`` of them made before they are asked for;
-    without a pool each is made when it is asked for. Errors of the function pass through."""
+    """Results in order, at most ``ahead`` of them computed in advance; without a pool each is
+    computed when it is requested. Errors of the function are raised."""
     if pool is None:
         yield from map(function, things)
         return
-    waiting: deque[Future[Result]] = deque()
+    pending: deque[Future[Result]] = deque()
     try:
-        for thing in things:
-            waiting.append(pool.submit(function, thing))
-            if len(waiting) > ahead:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
+        for item in things:
+            pending.append(pool.submit(function, item))
+            if len(pending) > ahead:
+                yield pending.popleft().result()
+        while pending:
+            yield pending.popleft().result()
     finally:
-        for future in waiting:
+        for future in pending:
             future.cancel()

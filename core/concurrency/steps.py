@@ -1,4 +1,4 @@
-"""Work that is stepped: a generator yields as it goes on and returns what it made."""
+"""Stepped work: generators that yield progress and return a result."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ Result = TypeVar("Result")
 
 
 def relayed(
-    steps: Generator[Step, None, Result], said: Callable[[Step], Other]
+    steps: Generator[Step, None, Result], convert: Callable[[Step], Other]
 ) -> Generator[Other, None, Result]:
-    """The same work, which yields what ``said`` makes of each step."""
+    """The same work, with ``convert`` applied to each step that it yields."""
     while True:
         try:
             step = next(steps)
         except StopIteration as end:
             return end.value
-        yield said(step)
+        yield convert(step)
 
 
 def drained(steps: Generator[Any, None, Result]) -> Result:
-    """What a stepped piece of work returns, all of it at once."""
+    """Run stepped work to its end and return its result."""
     while True:
         try:
             next(steps)

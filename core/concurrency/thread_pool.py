@@ -1,6 +1,6 @@
-"""Threads of Python's for what numpy does outside its lock, and one for what BLAS does.
+"""Python threads for numpy work that releases the GIL, and a single thread for BLAS.
 
-The matrices of a fit are small: BLAS's own threads wait for one another longer than they work.
+The matrices of a fit are small: BLAS threads would wait for one another longer than they compute.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from contextlib import AbstractContextManager, contextmanager
 
 from threadpoolctl import threadpool_limits
 
-MOST = 4  # each holds its own piece of work in memory
+MAX_THREADS = 4  # limits memory: each thread holds its own piece of work
 
 
 def thread_count(threads: int | None) -> int:
-    """How many threads; None: one a core, within reason."""
-    return max(1, min(MOST, os.cpu_count() or 1)) if threads is None else max(1, threads)
+    """Number of threads; None: one per core, at most MAX_THREADS."""
+    return max(1, min(MAX_THREADS, os.cpu_count() or 1)) if threads is None else max(1, threads)
 
 
 @contextmanager
 def thread_pool(count: int) -> Iterator[ThreadPoolExecutor | None]:
-    """So many threads, None where one is enough: work is then done where it is asked for. In the
-    end what waits is dropped, and what is at work ends unheard."""
+    """A pool of so many threads, None for one thread: work is then done by the caller. At the end
+    pending work is cancelled, and the results of running work are discarded."""
     pool = ThreadPoolExecutor(count, "patina") if count > 1 else None
     try:
         yield pool
@@ -33,5 +33,5 @@ def thread_pool(count: int) -> Iterator[ThreadPoolExecutor | None]:
 
 
 def single_threaded_blas() -> AbstractContextManager[object]:
-    """Linear algebra on one thread meanwhile, in the whole process."""
+    """Context in which BLAS uses one thread, in the whole process."""
     return threadpool_limits(1, user_api="blas")

@@ -1,1 +1,1 @@
-"""What the forward model gets wrong: shown, named, put into the model, measured."""
+"""Diagnosis: find the causes of the residual, and correct the samples for them."""

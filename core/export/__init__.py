@@ -1,4 +1,4 @@
-"""Files for other programs, and what each of them cannot hold."""
+"""Export to files of other programs, with the error of each format."""
 
 from .losses import Loss, write_losses
 

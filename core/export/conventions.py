@@ -1,4 +1,4 @@
-"""README texts beside the arrays: all that somebody without Patina needs to use them."""
+"""README texts for exported arrays: everything that is needed to use them without Patina."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ANGLES = """Directions
 Units and channels
   rho in 1/sr (radiance out / irradiance in): a white matte surface has 1/pi = 0.318.
   Channels are linear R, G, B with the primaries of the photos the fit was made from (Rec. 709 if
-  those say nothing). No gamma anywhere.
+  the photos do not state any). All values are linear.
 """
 
 TABLE = """The table
@@ -31,14 +31,14 @@ TABLE = """The table
   at the CENTRE of each cell:
     theta_h = 90 degrees * ((ih + 0.5)/90)^2   theta_d = id + 0.5 degrees   phi_d = ip + 0.5 degrees
   Cells with light or view below the horizon are -1. Between centres interpolate linearly in
-  (ih, id, ip), ip periodic, leaving out invalid cells.
+  (ih, id, ip), ip periodic, without the invalid cells.
 """
 
 MAPPING = """The basis (Nielsen, Jensen, Ramamoorthi 2015)
   cosMap = clip(cos theta_i * cos theta_o, 0.01, 1)     epsilon = 0.001
-  rho = (exp(mean + log_reference + sum_k c_k * components_k) - epsilon) / cosMap, not below 0
+  rho = max((exp(mean + log_reference + sum_k c_k * components_k) - epsilon) / cosMap, 0)
   with one coefficient c_k for each component and channel. mean is the mean of the mapped training
-  columns, log_reference is ln(their median of rho * cosMap, + epsilon), components are scaled by
+  columns, log_reference is ln(median of rho * cosMap + epsilon) over them, components are scaled by
   their singular values (training coefficients have variance 1/columns).
   Nodes: {n_h} theta_h x {n_d} theta_d x {n_p} phi_d.
     theta_h = knee * (exp(s * ln(1 + 90 degrees/knee)) - 1), s = 0 ... 1 in {n_h} even steps,
@@ -67,11 +67,11 @@ NPZ = """Files
   NAME.npz
     table         (3, 90, 90, 180) float32, the table, channels first
     log_table     ({n_h}, {n_d}, {n_p}, 3) float32, ln(rho * cosMap + epsilon) at the basis' nodes:
-                  the BRDF itself, with all components summed; what our renderers' plugins read
+                  the BRDF itself, with all components summed; the plugins for renderers read this
     theta_h, theta_d, phi_d   the nodes' angles in RADIANS;  knee (radians), epsilon
     coefficients  (3, k) float64;  basis_version
-    scale_known, scale   False where no irradiance was known: then rho was multiplied by scale and
-                  is right up to one factor
+    scale_known, scale   scale_known is False if the irradiance is unknown: then rho was multiplied
+                  by scale, and its absolute level is arbitrary
   basis_{version}.npz
     mean, log_reference  ({n_h}, {n_d}, {n_p});  components (k, {n_h}, {n_d}, {n_p})
     explained, and the nodes as above
@@ -83,17 +83,17 @@ NPZ = """Files
 
 
 def exr_readme(basis: Basis) -> str:
-    """The text that goes beside the EXR files of this basis."""
+    """The README text for the EXR files of this basis."""
     return _text("Measured BRDFs as EXR pictures", EXR, basis)
 
 
 def npz_readme(basis: Basis) -> str:
-    """The text that goes beside the NPZ files of this basis."""
+    """The README text for the NPZ files of this basis."""
     return _text("Measured BRDFs as NumPy archives", NPZ, basis)
 
 
 def write_readme(folder: Path, kind: str, basis: Basis) -> str:
-    """Write the text for ``kind`` ('exr' or 'npz'); returns its file's name."""
+    """Write the README for ``kind`` ("exr" or "npz") into ``folder``; returns its file name."""
     name, text = (
         (EXR_README, exr_readme(basis)) if kind == "exr" else (NPZ_README, npz_readme(basis))
     )
@@ -102,6 +102,7 @@ def write_readme(folder: Path, kind: str, basis: Basis) -> str:
 
 
 def _text(title: str, files: str, basis: Basis) -> str:
+    """The complete README text; files: the section about the files of this format."""
     n_h, n_d, n_p = basis.grid.shape
     words = {
         "n_h": n_h, "n_d": n_d, "n_p": n_p, "width": n_d * n_p, "slabs": 2 + basis.count,

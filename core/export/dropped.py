@@ -1,4 +1,4 @@
-"""Inputs of a fitted Principled that a format has no place for."""
+"""Inputs of a fitted Principled BSDF that a format cannot represent."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from ..appearance.principled import Principled
 
 
 def dropped_inputs(principled: Principled, places: Mapping[str, str]) -> tuple[str, ...]:
-    """Those of ``places`` (field → name of the socket) that the fit set to something else than
-    the node's own default, with their values."""
+    """The inputs of ``places`` (field → name of the socket) whose fitted values differ from the
+    defaults of the node, each as "socket (value)"."""
     plain = Principled()
     found = []
     for field, socket in places.items():

@@ -1,4 +1,4 @@
-"""Names of what is written, and identifiers that every format takes."""
+"""Names of exported files, and identifiers that are valid in every format."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ RESERVED = {"con", "prn", "aux", "nul", *(f"{p}{i}" for p in ("com", "lpt") for 
 
 
 def identifier(name: str) -> str:
-    """A material's name as letters, digits and underscores, not beginning with a digit: valid in
-    XML, USD, MaterialX, Python and pbrt."""
+    """The name of a material as letters, digits and underscores, without a leading digit: valid in
+    XML, USD, MaterialX, Python and pbrt. Names reserved on Windows get a prefix."""
     plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
     found = re.sub(r"\W+", "_", plain).strip("_") or "material"
     return f"m_{found}" if found[0].isdigit() or found.casefold() in RESERVED else found
 
 
 def check_distinct(names: list[str]) -> None:
-    """Raises InputError where two materials would write the same files."""
+    """Raise InputError if two materials would be written to the same files."""
     seen: dict[str, str] = {}
     for name in names:
         key = identifier(name).casefold()
         if key in seen:
             raise InputError(
-                f"{seen[key]!r} and {name!r} would both be written as {identifier(name)!r}: "
-                "export them one at a time",
+                f"{seen[key]!r} and {name!r} would both be written as {identifier(name)!r}; "
+                "expected names that differ in letters and digits; export them one at a time",
                 key="--material",
             )
         seen[key] = name

@@ -1,8 +1,9 @@
-"""What a viewer of glTF shows of a Principled BSDF: the reference BRDF of glTF 2.0.
+"""A Principled BSDF as a glTF viewer shows it: the reference BRDF of glTF 2.0.
 
 Khronos Group, "glTF 2.0 Specification", appendix B (metallic-roughness), and the extensions
 KHR_materials_specular, KHR_materials_ior and KHR_materials_clearcoat with their own formulas.
-Diffuse is Lambert whatever the Diffuse Roughness; the coat is of index 1.5 and without colour.
+The diffuse part is Lambertian whatever the Diffuse Roughness; the coat is colourless with index of
+refraction 1.5.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from ..appearance.principled import Configuration, Principled
 
 Array = NDArray[np.floating]
 
-# sockets that Blender's exporter has no place for, as far as our fit uses them
+# sockets used by the fit that Blender's exporter cannot write
 DROPPED = {
     "diffuse_roughness": "Diffuse Roughness",
     "coat_ior": "Coat IOR",
@@ -26,13 +27,14 @@ COAT_F0 = 0.04  # KHR_materials_clearcoat fixes the index of refraction at 1.5
 
 
 def evaluate(principled: Principled, angles: Angles) -> Array:
-    """f (..., 3) in 1/sr of what the exported file says, by the specification's formulas."""
+    """f (..., 3) in 1/sr of the exported file at half/difference angles, by the formulas of the
+    specification."""
     where = Configuration.of(*light_view(*angles))
     color = np.clip(np.asarray(principled.base_color, float), 0, 1)
     s5 = np.clip(1.0 - where.cos_d, 0.0, 1.0)[..., None] ** 5
     lobe = where.ggx(principled.roughness)[..., None]
-    # KHR_materials_specular: the factor scales f0 and f90, and is at most 1; what is beyond goes
-    # into the colour, as Blender's exporter has it
+    # KHR_materials_specular: the factor scales f0 and f90 and is at most 1; Blender's exporter puts
+    # the rest into the specular colour
     level = 2.0 * principled.specular_ior_level
     tint = np.asarray(principled.specular_tint, float)
     factor, specular_color = (level, tint) if level <= 1 else (1.0, tint * level)

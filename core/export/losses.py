@@ -1,4 +1,4 @@
-"""What an export could not take along, with numbers: losses.txt to read, losses.json to compute."""
+"""The errors and omissions of an export: losses.txt for users, losses.json for programs."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ MEASURE = (
 
 @dataclass(frozen=True)
 class Loss:
-    """What one format keeps of one material.
+    """The accuracy of one material in one format.
 
-    format: as in ``--to``. files: what was written for it. errors: what is held → its relative
-    cube-root error against the fitted table, the first being what a program that opens the file
-    shows. dropped: inputs or facts that the format has no place for. notes: what to know besides.
+    format: as in ``--to``. files: the written files. errors: representation → its relative
+    cube-root error against the fitted table; the first one is what a program shows that opens the
+    file. dropped: inputs or facts that the format cannot represent. notes: other remarks.
     """
 
     format: str
@@ -41,21 +41,21 @@ class Loss:
     notes: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
-        """The same for people."""
+        """The lines of losses.txt for this material and format."""
         head = f"{self.material} as {self.format} ({', '.join(self.files)})"
         shown = [f"  {what}: {percent(error)}" for what, error in self.errors.items()]
-        gone = [f"  lost: {what}" for what in self.dropped]
-        return [head, *shown, *gone, *(f"  note: {note}" for note in self.notes)]
+        omitted = [f"  lost: {what}" for what in self.dropped]
+        return [head, *shown, *omitted, *(f"  note: {note}" for note in self.notes)]
 
 
 def percent(error: float) -> str:
-    """An error as people read it."""
+    """A relative error as text, in per cent."""
     return "0 %" if error == 0 else "< 0.01 %" if error < 1e-4 else f"{100 * error:.2g} %"
 
 
 def cube_root_error(evaluate: Evaluate, truth: Evaluate) -> float:
-    """Error of ``evaluate(angles) -> (n, 3)`` against ``truth``, both in 1/sr; the measure that the
-    Principled is fitted by. Negative values count as 0."""
+    """Relative cube-root error of ``evaluate(angles) -> (n, 3)`` against ``truth``, both in 1/sr:
+    the measure that the fit of the Principled BSDF minimises. Negative values count as 0."""
     angles, weight = quadrature()
     cos_i, _ = cosines(*angles)
     root = [
@@ -70,17 +70,17 @@ def cube_root_error(evaluate: Evaluate, truth: Evaluate) -> float:
 def write_losses(folder: Path, losses: Sequence[Loss], source: str) -> list[str]:
     """Write losses.txt and losses.json into a folder; returns the lines of the text.
 
-    source: what was exported, for the head. The files appear whole or not at all.
+    source: the name of what was exported, for the heading. The files are written atomically.
     """
     lines = [
-        f"What these files hold of {source}, and what not.",
+        f"Accuracy of these files, compared with {source}, and what they cannot represent.",
         f"Measure: {MEASURE}.",
         "",
     ]
     for loss in losses:
         lines += [*loss.lines(), ""]
-    told = {"format": FORMAT, "measure": MEASURE, "losses": [vars(loss) for loss in losses]}
+    content = {"format": FORMAT, "measure": MEASURE, "losses": [vars(loss) for loss in losses]}
     write_text_atomic(folder / "losses.txt", "\n".join(lines))
-    text = json.dumps(told, indent=1, allow_nan=False) + "\n"
+    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
     write_text_atomic(folder / "losses.json", text)
     return lines

@@ -46,11 +46,11 @@ def export_materials(
     by_blender: writes the formats of BLENDER, which open a .blend of their own in place of the one
     that is open. Raises InputError for unknown materials and folders that cannot be written.
     """
-    chosen = _chosen(result, names)
-    check_distinct([material.name for material in chosen])
-    _check_not_itself(out, result, formats)
+    selected = _selected_materials(result, names)
+    check_distinct([material.name for material in selected])
+    _check_other_folder(out, result, formats)
     formats = list(dict.fromkeys(formats))
-    subjects = [Subject(material) for material in chosen]
+    subjects = [Subject(material) for material in selected]
     losses: list[Loss] = []
     with staged_folder(out) as folder:
         for done, name in enumerate(formats):
@@ -66,27 +66,27 @@ def export_materials(
     return losses, lines
 
 
-def _chosen(result: FittedResult, names: Sequence[str] | None) -> list[FittedMaterial]:
-    """The materials to export, in the result's order."""
+def _selected_materials(result: FittedResult, names: Sequence[str] | None) -> list[FittedMaterial]:
+    """Return the materials to export, in the order of the result. Raises InputError."""
     if names is None:
         return list(result.materials)
     known = [material.name for material in result.materials]
     for name in names:
         if name not in known:
             raise InputError(
-                f"no material is called {name!r}; there are {', '.join(known)}",
+                f"found no material named {name!r}; expected one of {', '.join(known)}",
                 file=result.file,
                 key="--material",
             )
     return [material for material in result.materials if material.name in names]
 
 
-def _check_not_itself(out: Path, result: FittedResult, formats: Sequence[str]) -> None:
-    """The result's own files are the only record of the fit: nothing is written over them."""
+def _check_other_folder(out: Path, result: FittedResult, formats: Sequence[str]) -> None:
+    """Raise InputError if ``out`` is the folder of the result, whose files must not be replaced."""
     if out.resolve() == result.file.parent.resolve():
         raise InputError(
-            f"is the result's own folder; expected another one ({'/'.join(formats)} would be mixed "
-            "with the record of the fit)",
+            f"is the folder of the result; expected another folder ({'/'.join(formats)} would mix "
+            "with the files of the fit)",
             file=out,
             key="--out",
         )

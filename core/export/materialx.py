@@ -1,9 +1,9 @@
 """MaterialX 1.39 documents of a lobe stack and of a Principled BSDF, written as plain XML.
 
-Lobe stack: `oren_nayar_diffuse_bsdf` below `generalized_schlick_bsdf` lobes, each put on top by
-`layer`; colours that change towards the silhouette are mixed by `facingratio`. Principled:
-`open_pbr_surface`. Node definitions: MaterialX standard nodes, physically based shading nodes and
-OpenPBR 1.1 as MaterialX 1.39 has them. No MaterialX package is needed to write.
+Lobe stack: `oren_nayar_diffuse_bsdf` below `generalized_schlick_bsdf` lobes, combined by `layer`;
+colours that change towards grazing view are mixed by `facingratio`. Principled BSDF:
+`open_pbr_surface`. Node definitions: the standard nodes, the physically based shading nodes and
+OpenPBR 1.1 of MaterialX 1.39. Writing needs no MaterialX package.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ COLORSPACE = "lin_rec709"
 
 
 def document() -> ET.Element:
-    """An empty document; its colours are linear Rec. 709."""
+    """An empty document with linear Rec. 709 colours."""
     return ET.Element("materialx", version=VERSION, colorspace=COLORSPACE)
 
 
@@ -41,7 +41,7 @@ def add_lobe_stack(root: ET.Element, name: str, stack: LobeStack) -> str:
     _input(base, "roughness", "float", stack.diffuse_roughness)
     _input(base, "energy_compensation", "boolean", True)
     below = f"{name}_diffuse"
-    for index in reversed(range(len(stack.lobes))):  # topmost first: laid on from the bottom
+    for index in reversed(range(len(stack.lobes))):  # the first lobe is the topmost one
         top = _add_lobe(root, name, f"lobe{index + 1}", stack.lobes[index])
         layer = _node(root, "layer", f"{name}_layer{index + 1}", "BSDF")
         _connect(layer, "top", "BSDF", top)
@@ -53,7 +53,7 @@ def add_lobe_stack(root: ET.Element, name: str, stack: LobeStack) -> str:
 
 
 def _add_turning(root: ET.Element, name: str) -> None:
-    """NAME_turned: (1 − cosθ of the view)², by which colours change towards the silhouette."""
+    """Add the node NAME_turned, (1 − cos θo)², the argument of the colour polynomials."""
     facing = _node(root, "facingratio", f"{name}_facing", "float")
     _input(facing, "faceforward", "boolean", True)
     away = _node(root, "subtract", f"{name}_away", "float")
@@ -67,8 +67,9 @@ def _add_turning(root: ET.Element, name: str) -> None:
 def _turned_color(
     root: ET.Element, name: str, part: str, values: tuple[Any, Any, Any]
 ) -> str | None:
-    """The node that blends three colours (facing the viewer, midway, at the edge) by quadratic
-    Bernstein polynomials, as de Casteljau has them; None where there is one colour only."""
+    """Add nodes that mix three colours (normal, intermediate and grazing view) by quadratic
+    Bernstein polynomials (de Casteljau's algorithm); returns the name of the last node, None for a
+    constant colour."""
     facing, mid, edge = values
     if mid is None and edge is None:
         return None
@@ -88,6 +89,7 @@ def _turned_color(
 
 
 def _color(node: ET.Element, name: str, value: Any, turned: str | None) -> None:
+    """Set a colour input to a value, or connect it to the node ``turned``."""
     if turned is None:
         _input(node, name, "color3", value)
     else:
@@ -95,6 +97,7 @@ def _color(node: ET.Element, name: str, value: Any, turned: str | None) -> None:
 
 
 def _add_lobe(root: ET.Element, stack: str, part: str, lobe: Lobe) -> str:
+    """Add a specular lobe; returns the name of its node."""
     name = f"{stack}_{part}"
     turned = _turned_color(root, stack, part, (lobe.f0, lobe.f0_mid, lobe.f0_edge))
     node = _node(root, "generalized_schlick_bsdf", name, "BSDF")
@@ -110,9 +113,9 @@ def _add_lobe(root: ET.Element, stack: str, part: str, lobe: Lobe) -> str:
 
 
 def add_open_pbr(root: ET.Element, name: str, principled: Principled) -> str:
-    """Add the Principled as OpenPBR and a surfacematerial of the given name; returns it.
+    """Add the Principled BSDF as OpenPBR and a surfacematerial of this name; returns the name.
 
-    Inputs as Blender's own exporter maps them: specular_weight is twice the Specular IOR Level.
+    The inputs are mapped as by Blender's exporter: specular_weight is twice the Specular IOR Level.
     """
     node = _node(root, "open_pbr_surface", f"{name}_surface", "surfaceshader")
     _input(node, "base_weight", "float", 1.0)
@@ -127,12 +130,12 @@ def add_open_pbr(root: ET.Element, name: str, principled: Principled) -> str:
     _input(node, "coat_color", "color3", principled.coat_tint)
     _input(node, "coat_roughness", "float", principled.coat_roughness)
     _input(node, "coat_ior", "float", principled.coat_ior)
-    _input(node, "coat_darkening", "float", 0.0)  # Blender's coat does not darken what it covers
+    _input(node, "coat_darkening", "float", 0.0)  # Blender's coat does not darken the layers below
     return _add_material(root, name, f"{name}_surface")
 
 
 def write(path: Path, root: ET.Element) -> None:
-    """Write the document; the file appears whole or not at all."""
+    """Write the document atomically: a failed write leaves no partial file."""
     ET.indent(root, "  ")
     with atomic_path(path) as partial:
         ET.ElementTree(root).write(partial, encoding="utf-8", xml_declaration=True)

@@ -1,10 +1,10 @@
-"""A lobe stack as MaterialX's own shaders show it.
+"""A lobe stack as the shaders of MaterialX show it.
 
-MaterialX 1.39, `generalized_schlick_bsdf` and `layer` of its GLSL library: a lobe is multiplied by
-Turquin's compensation for light scattered several times between facets (2019, "Practical multiple
-scattering compensation for microfacet models", equations 14 and 16), and what lies below is
-darkened by 1 − the MEAN of the channels of its directional albedo. Blender has neither, so a stack
-that was fitted as Blender renders it looks a little different there.
+MaterialX 1.39, `generalized_schlick_bsdf` and `layer` of its GLSL library: each lobe is multiplied
+by Turquin's compensation for multiple scattering between facets (2019, "Practical multiple
+scattering compensation for microfacet models", equations 14 and 16), and the layers below are
+multiplied by 1 − the channel MEAN of its directional albedo. Blender has neither, so a stack that
+was fitted for Blender looks slightly different in MaterialX.
 """
 
 from __future__ import annotations

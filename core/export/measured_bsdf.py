@@ -1,15 +1,15 @@
 """The fitted BRDF as an RGL measured material (`.bsdf`), which Mitsuba 3 and pbrt-v4 read.
 
 Dupuy and Jakob 2018, "An Adaptive Parameterization for Efficient Material Acquisition and
-Rendering": for every elevation θi of one direction, f·cosθo is a picture over the half vector,
+Rendering": for each elevation θi of one direction, f·cosθo is an image over the half vector,
 bilinear between its nodes and linear in θi, times `ndf(m) / (4 σ)`. Here
 
-- the warp by visible normals is left as the identity (`vndf` constant), so a picture's axes are
-  plainly u = √(2θm/π) across and v = (φm − φi + π)/2π down;
-- σ is ¼ and `ndf` holds the lobe's mean profile over u on many nodes, so that the pictures hold a
-  smooth ratio and a sharp highlight is not cut off between their nodes;
-- `luminance`, by which renderers draw directions, is the luminance of f·cosθo times the measure of
-  (u, v): importance sampling of the material itself.
+- the warp by visible normals is the identity (`vndf` constant), so the axes of an image are
+  u = √(2θm/π) across and v = (φm − φi + π)/2π down;
+- σ is ¼, and `ndf` holds the mean profile of the lobe over u at many nodes, so that the images hold
+  a smooth ratio, and a sharp highlight is not lost between their nodes;
+- `luminance`, from which renderers sample directions, is the luminance of f·cosθo times the measure
+  of (u, v): importance sampling of the material itself.
 """
 
 from __future__ import annotations
@@ -25,18 +25,19 @@ from . import spectra
 
 Array = NDArray[np.floating]
 
-SIDE = 80  # nodes a side of a picture; the format wants it square
+SIDE = 80  # nodes a side of an image; the format requires square images
 ELEVATIONS = 32
 PROFILE = 2048  # nodes of ndf along u
-LAST = np.radians(89.0)  # beyond it the last elevation is shown
-FLOOR = 0.02  # of the mean density: what is drawn where the material is dark
-REC709 = np.array([0.2126, 0.7152, 0.0722])
+MAX_ELEVATION = np.radians(89.0)  # θi of the last image; it is used beyond this angle too
+MIN_DENSITY = 0.02  # of the mean sampling density, added where the material is dark
+REC709 = np.array([0.2126, 0.7152, 0.0722])  # luminance weights
 
 
 @dataclass(frozen=True)
 class MeasuredPictures:
-    """theta_i: (t,) radians; ratio: (3, t, v, u) float32, f·cosθo / ndf, channels R, G, B; ndf:
-    (PROFILE,) over u in [0, 1]; density: (t, v, u), unnormalised."""
+    """The images of a measured material. theta_i: (t,) radians; ratio: (3, t, v, u) float32,
+    f·cosθo / ndf, channels R, G, B; ndf: (PROFILE,) over u in [0, 1]; density: (t, v, u) sampling
+    density, unnormalised."""
 
     theta_i: NDArray[np.float32]
     ratio: NDArray[np.float32]
@@ -44,7 +45,7 @@ class MeasuredPictures:
     density: NDArray[np.float32]
 
     def evaluate(self, angles: Angles) -> Array:
-        """f (n, 3) in 1/sr as a renderer reads it, by the format's own interpolation."""
+        """f (n, 3) in 1/sr as a renderer computes it, by the interpolation of the format."""
         light, view = light_view(*angles)
         half = light + view
         half /= np.linalg.norm(half, axis=-1, keepdims=True)
@@ -64,7 +65,7 @@ class MeasuredPictures:
         return found * profile[:, None] / np.maximum(light[:, 2], 1e-6)[:, None]
 
     def fields(self, description: str) -> dict[str, NDArray[Any]]:
-        """The file's arrays, in its order of indices; RGB spread over wavelengths (spectra.py)."""
+        """The arrays of the file by name, with its order of axes; RGB as spectra (spectra.py)."""
         count = len(self.theta_i)
         spread = np.einsum("wc,ctvu->twvu", spectra.BASIS, self.ratio)
         return {
@@ -82,8 +83,8 @@ class MeasuredPictures:
 
 
 def pictures(evaluate: Any) -> MeasuredPictures:
-    """From ``evaluate(angles) -> (n, 3)``, ρ in 1/sr, reciprocal and isotropic."""
-    theta_i = np.linspace(0.0, LAST, ELEVATIONS)
+    """The images of ``evaluate(angles) -> (n, 3)``, a reciprocal isotropic BRDF in 1/sr."""
+    theta_i = np.linspace(0.0, MAX_ELEVATION, ELEVATIONS)
     u, v = np.linspace(0, 1, SIDE), np.linspace(0, 1, SIDE)
     theta_m = u**2 * np.pi / 2
     phi = (2 * v - 1) * np.pi
@@ -111,7 +112,7 @@ def pictures(evaluate: Any) -> MeasuredPictures:
     carried = f * np.maximum(cos_o, 0)[..., None]
     measure = np.maximum(along, 0) * (u * np.sin(theta_m))[None, None, :]
     density = (carried @ REC709) * measure
-    density += FLOOR * density.mean(axis=(1, 2), keepdims=True) + 1e-9
+    density += MIN_DENSITY * density.mean(axis=(1, 2), keepdims=True) + 1e-9
     ratio = np.moveaxis(carried / ndf_here[None, None, :, None], -1, 0)
     return MeasuredPictures(
         theta_i.astype(np.float32),
@@ -122,7 +123,8 @@ def pictures(evaluate: Any) -> MeasuredPictures:
 
 
 def _profile(evaluate: Any) -> Array:
-    """Mean luminance of f over θd (to 60°) and φd along u: what the highlight looks like."""
+    """(PROFILE,) luminance of f along u, the mean over some θd (to 45°) and φd: the shape of the
+    highlight."""
     u = np.linspace(0, 1, PROFILE)
     theta_d, phi_d = np.radians([5.0, 25.0, 45.0]), np.radians([30.0, 90.0])
     grid = np.meshgrid(u**2 * np.pi / 2, theta_d, phi_d, indexing="ij")
@@ -135,6 +137,7 @@ def _profile(evaluate: Any) -> Array:
 
 
 def _two(at: Array, last: int) -> list[tuple[NDArray[np.intp], Array]]:
+    """(index, weight) of the two nodes 0 … last around each position, for linear interpolation."""
     low = np.clip(np.floor(at).astype(np.intp), 0, max(last - 1, 0))
     high = np.clip(at - low, 0.0, 1.0)
     return [(low, 1.0 - high), (np.minimum(low + 1, last), high)]

@@ -1,7 +1,7 @@
-"""Mitsuba 3: a plugin of ours that reads the BRDF exactly, and Mitsuba's own `measured`.
+"""Export to Mitsuba 3: Patina's plugin, which evaluates the BRDF exactly, and Mitsuba's `measured`.
 
-NAME.xml uses the plugin (RGB variants); NAME_spectral.xml needs no Python and uses NAME.bsdf
-(spectral variants). The same sphere under the same light in both.
+NAME.xml uses the plugin (RGB variants of Mitsuba). NAME_spectral.xml needs no Python and uses
+NAME.bsdf (spectral variants). Both show the same sphere under the same light.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from .table_files import log_table_arrays, write_npz
 
 PLUGIN = Path(__file__).parents[2] / "assets" / "mitsuba"
 PLUGIN_FILES = ("patina_bsdf.py", "render.py")
-IRRADIANCE = 3.14159265  # a white matte surface facing the light reaches 1
+IRRADIANCE = 3.14159265  # a white diffuse surface facing the light has radiance 1
 
 
 def write_material(folder: Path, material: FittedMaterial) -> list[str]:
-    """NAME_mitsuba.npz and NAME.xml; returns their names."""
+    """Write NAME_mitsuba.npz and NAME.xml; returns their names."""
     name = identifier(material.name)
     principled = material.principled
     lobe = principled.roughness
@@ -33,7 +33,7 @@ def write_material(folder: Path, material: FittedMaterial) -> list[str]:
     write_npz(
         folder / f"{name}_mitsuba.npz",
         **log_table_arrays(material.brdf),
-        # measured tails are longer than the fitted lobe's
+        # measured lobes have longer tails than the fitted one
         sampling_alpha=np.array(float(np.clip((1.1 * lobe) ** 2, 0.002, 1.0))),
         sampling_share=np.array(0.5),
     )
@@ -42,14 +42,14 @@ def write_material(folder: Path, material: FittedMaterial) -> list[str]:
 
 
 def write_plugin(folder: Path) -> list[str]:
-    """The plugin and the script that renders with it; returns their names."""
+    """Copy the plugin and its render script into ``folder``; returns their names."""
     for name in PLUGIN_FILES:
         shutil.copyfile(PLUGIN / name, folder / name)
     return list(PLUGIN_FILES)
 
 
 def write_scene(path: Path, plugin: str, file: str) -> None:
-    """A unit sphere seen along −z by an orthographic camera, under one distant light."""
+    """Write a scene: a unit sphere, an orthographic camera that looks along −z, a distant light."""
     root = ET.Element("scene", version="3.0.0")
     ET.SubElement(root, "default", name="spp", value="64")
     ET.SubElement(root, "default", name="size", value="256")
@@ -68,8 +68,8 @@ def write_scene(path: Path, plugin: str, file: str) -> None:
     ET.SubElement(film, "rfilter", type="box")
     light = ET.SubElement(root, "emitter", type="directional")
     towards = -KEY / np.linalg.norm(KEY)
-    ET.SubElement(light, "vector", name="direction", value=_numbers(towards))
-    ET.SubElement(light, "rgb", name="irradiance", value=_numbers([IRRADIANCE] * 3))
+    ET.SubElement(light, "vector", name="direction", value=_vector_text(towards))
+    ET.SubElement(light, "rgb", name="irradiance", value=_vector_text([IRRADIANCE] * 3))
     sphere = ET.SubElement(root, "shape", type="sphere")
     bsdf = ET.SubElement(sphere, "bsdf", type=plugin)
     ET.SubElement(bsdf, "string", name="filename", value=file)
@@ -78,5 +78,6 @@ def write_scene(path: Path, plugin: str, file: str) -> None:
         ET.ElementTree(root).write(partial, encoding="utf-8", xml_declaration=True)
 
 
-def _numbers(values: object) -> str:
+def _vector_text(values: object) -> str:
+    """Numbers separated by commas, as Mitsuba expects a vector."""
     return ", ".join(f"{float(v):.8g}" for v in np.ravel(np.asarray(values, float)))

@@ -1,4 +1,4 @@
-"""pbrt-v4: a scene whose material is `measured` and reads NAME.bsdf."""
+"""Export to pbrt-v4: a scene whose `measured` material reads NAME.bsdf."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ Shape "sphere" "float radius" 1
 
 
 def write_scene(path: Path, name: str, title: str) -> None:
-    """Write the scene for NAME.bsdf beside it; name: an identifier; title: one line for people."""
+    """Write the scene that reads NAME.bsdf in the same folder. name: an identifier; title: text of
+    one line for the comment at the top."""
     light = " ".join(f"{v:.8g}" for v in KEY / np.linalg.norm(KEY))
     shown = " ".join(title.split()).encode("ascii", "replace").decode()
     text = SCENE.format(name=name, title=shown, light=light, power=f"{IRRADIANCE:.8g}")

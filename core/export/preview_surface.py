@@ -1,9 +1,9 @@
-"""What a viewer shows of a UsdPreviewSurface, as Blender's USD exporter fills it.
+"""A Principled BSDF as a viewer shows the UsdPreviewSurface that Blender's USD exporter writes.
 
 Pixar, "UsdPreviewSurface Specification" (2.6): metallic workflow, f0 from ior; with metallic 1,
-f0 is the colour and so is f90; in between they are interpolated. GGX with α = roughness², Schlick's
-Fresnel; the clear coat is white and of the same ior. There is no place for a specular level or
-tint, sheen, anisotropy, diffuse roughness, or a coat of another index.
+f0 and f90 are the colour; values in between are interpolated. GGX with α = roughness², Schlick's
+Fresnel; the clear coat is white and has the same ior. Specular level and tint, sheen, anisotropy,
+diffuse roughness and a coat of another index cannot be represented.
 """
 
 from __future__ import annotations
@@ -29,19 +29,20 @@ DROPPED = {
 
 
 def evaluate(principled: Principled, angles: Angles) -> Array:
-    """f (..., 3) in 1/sr of what the exported file says, by the specification's formulas."""
+    """f (..., 3) in 1/sr of the exported file at half/difference angles, by the formulas of the
+    specification."""
     where = Configuration.of(*light_view(*angles))
     color = np.clip(np.asarray(principled.base_color, float), 0, 1)
     metallic = principled.metallic
     s5 = np.clip(1.0 - where.cos_d, 0.0, 1.0)[..., None] ** 5
-    plain = f0_from_ior(principled.ior)
-    f0 = (1.0 - metallic) * plain + metallic * color
+    dielectric_f0 = f0_from_ior(principled.ior)
+    f0 = (1.0 - metallic) * dielectric_f0 + metallic * color
     f90 = (1.0 - metallic) + metallic * color
     fresnel = f0 + (f90 - f0) * s5
     diffuse = (1.0 - metallic) * (1.0 - fresnel) * color / np.pi
     base = diffuse + fresnel * where.ggx(principled.roughness)[..., None]
     if principled.coat_weight > 0:
-        coated = principled.coat_weight * (plain + (1.0 - plain) * s5)
+        coated = principled.coat_weight * (dielectric_f0 + (1.0 - dielectric_f0) * s5)
         coat = where.ggx(principled.coat_roughness)[..., None]
         base = (1.0 - coated) * base + coated * coat
     return np.where(where.seen[..., None], base, 0.0)

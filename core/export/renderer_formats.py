@@ -11,14 +11,14 @@ from .losses import Loss
 from .subject import Subject
 
 SPECTRAL = (
-    "colours are spread over wavelengths so that they come back under daylight (D65); under other "
-    "light they are a guess"
+    "The spectra reproduce the RGB colours under daylight (D65). Under other light the colours are "
+    "a guess."
 )
 
 
 def write_mtlx(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
-    """NAME.mtlx: surfacematerials NAME (lobe stack), NAME_plain where that one's colours change
-    towards the silhouette, and NAME_openpbr (the Principled)."""
+    """Write NAME.mtlx with the surfacematerials NAME (lobe stack), NAME_plain (only if the colours
+    of the stack change towards grazing view) and NAME_openpbr (the Principled BSDF)."""
     losses = []
     for subject in subjects:
         root = materialx.document()
@@ -46,7 +46,7 @@ def write_mtlx(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
                 subject.name,
                 (file,),
                 errors,
-                dropped=("what the lobes and the diffuse base cannot follow",),
+                dropped=("the part of the BRDF that the lobes and the diffuse base cannot fit",),
                 notes=subject.scale_note,
             )
         )
@@ -54,7 +54,8 @@ def write_mtlx(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
 
 
 def write_mitsuba(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
-    """NAME.xml with the plugin, NAME_spectral.xml with Mitsuba's own `measured`, render.py."""
+    """Write NAME.xml for the plugin, NAME_spectral.xml for Mitsuba's `measured`, and the plugin
+    with render.py."""
     plugin = tuple(mitsuba.write_plugin(folder))
     losses = []
     for subject in subjects:
@@ -80,7 +81,7 @@ def write_mitsuba(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
 
 
 def write_pbrt(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
-    """NAME.pbrt and the NAME.bsdf that its `measured` material reads."""
+    """Write NAME.pbrt, and NAME.bsdf, which its `measured` material reads."""
     losses = []
     for subject in subjects:
         tensor = _write_tensor(folder, subject)
@@ -99,6 +100,7 @@ def write_pbrt(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
 
 
 def _write_tensor(folder: Path, subject: Subject) -> str:
+    """Write NAME.bsdf unless it exists; returns its name."""
     name = f"{subject.id}.bsdf"
     if not (folder / name).is_file():  # Mitsuba and pbrt share it
         fields = subject.pictures.fields(f"{subject.id}, measured with Patina")

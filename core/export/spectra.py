@@ -1,11 +1,11 @@
-"""Colours as spectra, for renderers that trace wavelengths.
+"""RGB reflectances as spectra, for spectral renderers.
 
-Three reflectance spectra, one for each of linear R, G and B of Rec. 709: what is least steep among
-those that stay within [0, 1], add up to 1 at every wavelength, and come back as exactly (1, 0, 0),
-(0, 1, 0) and (0, 0, 1) under daylight D65 by the CIE 1931 observer. The construction is that of
-Mallett and Yuksel 2019, "Spectral primary decomposition for rendering with sRGB reflectance"; being
-linear, it takes any reflectance and never gains energy. What a colour does under another light is
-a guess: three numbers cannot tell.
+Three reflectance spectra, one each for linear R, G and B of Rec. 709: the smoothest ones that stay
+within [0, 1], sum to 1 at every wavelength, and give exactly (1, 0, 0), (0, 1, 0) and (0, 0, 1)
+under daylight D65 for the CIE 1931 observer. The construction is that of Mallett and Yuksel 2019,
+"Spectral primary decomposition for rendering with sRGB reflectance". It is linear, so it applies to
+any reflectance and never gains energy. Colours under another light are a guess: RGB values do not
+determine the spectrum.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from __future__ import annotations
 import numpy as np
 
 WAVELENGTHS = np.arange(400.0, 621.0, 20.0)
-"""Nanometres; linear in between, constant beyond."""
+"""Nanometres; spectra are linear in between and constant beyond."""
 
 RED = (0.06435, 0.0598, 0.03206, 0, 0, 0, 0, 0, 0, 0.12158, 0.81155, 1)
 GREEN = (0, 0, 0, 0, 0.24456, 0.76351, 1, 1, 1, 0.80868, 0.1841, 0)
 BASIS = np.stack([RED, GREEN, 1.0 - np.array(RED) - np.array(GREEN)], axis=1)
-"""(wavelengths, 3): what each of R, G and B reflects."""
+"""(wavelengths, 3) the reflectance spectra of R, G and B."""

@@ -1,4 +1,4 @@
-"""A material on its way out: what several formats need of it, computed once."""
+"""A material to be exported, with the representations that several formats share."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ from .measured_bsdf import MeasuredPictures, pictures
 
 @dataclass(frozen=True)
 class Subject:
-    """A fitted material with its derived forms, made when they are first asked for."""
+    """A fitted material with derived representations, computed on first use."""
 
     material: FittedMaterial
 
     @property
     def name(self) -> str:
-        """As the capture has it."""
+        """The name in the capture."""
         return self.material.name
 
     @property
     def id(self) -> str:
-        """As files and formats have it."""
+        """The identifier for file names and formats."""
         return identifier(self.material.name)
 
     @cached_property
     def table(self) -> TabulatedBRDF:
-        """At the MERL cells' centres."""
+        """The BRDF at the centres of the MERL cells."""
         return self.material.brdf.table()
 
     @cached_property
     def lobes(self) -> LobeStackFit:
-        """The nearest stacks of lobes."""
+        """The best-fitting lobe stacks."""
         return fit_lobe_stack(self.material.brdf.evaluate)
 
     @cached_property
     def pictures(self) -> MeasuredPictures:
-        """As an RGL measured material."""
+        """The images of an RGL measured material."""
         return pictures(self.material.brdf.evaluate)
 
     def error(self, evaluate: Evaluate) -> float:
@@ -50,10 +50,10 @@ class Subject:
 
     @property
     def scale_note(self) -> tuple[str, ...]:
-        """Where the irradiance was not known."""
+        """A note if the irradiance is unknown, otherwise empty."""
         if self.material.scale_known:
             return ()
         return (
-            "the light's strength was not known: the BRDF is right up to one factor "
-            f"(it was multiplied by {self.material.scale:.4g})",
+            "The strength of the light is unknown. The absolute level of the BRDF is therefore "
+            f"arbitrary (it was multiplied by {self.material.scale:.4g}).",
         )

@@ -1,4 +1,4 @@
-"""The BRDF as arrays: table, coefficients and components, as EXR pictures or as one NPZ each."""
+"""The BRDF as arrays (table, coefficients and basis), in EXR images or NPZ archives."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ def table_pixels(table: TabulatedBRDF) -> NDArray[np.float32]:
 
 
 def table_from_pixels(pixels: NDArray[np.floating]) -> TabulatedBRDF:
-    """What :func:`table_pixels` was made of."""
+    """The table of such pixels: the inverse of :func:`table_pixels`."""
     values = np.moveaxis(np.asarray(pixels).reshape(*merl_grid.SHAPE, 3), -1, 0)
     return TabulatedBRDF(np.ascontiguousarray(values, np.float32))
 
 
 def write_exr_material(folder: Path, material: FittedMaterial, table: TabulatedBRDF) -> list[str]:
-    """NAME_table.exr and NAME_coefficients.exr; returns their names."""
+    """Write NAME_table.exr and NAME_coefficients.exr; returns their names."""
     name = identifier(material.name)
     write_exr(
         folder / f"{name}_table.exr",
@@ -51,7 +51,8 @@ def write_exr_material(folder: Path, material: FittedMaterial, table: TabulatedB
 
 
 def write_exr_basis(folder: Path, basis: Basis) -> str:
-    """basis_VERSION.exr: slabs of n_h rows, first µ, then ln(ref + ε), then the components."""
+    """Write basis_VERSION.exr, slabs of n_h rows: µ, ln(ref + ε), then the components. Returns its
+    name."""
     n_h, n_d, n_p = basis.grid.shape
     slabs = np.concatenate([basis.mean[None], basis.log_reference[None], basis.components])
     name = f"basis_{basis.version}.exr"
@@ -66,7 +67,7 @@ def write_exr_basis(folder: Path, basis: Basis) -> str:
 
 
 def write_npz_material(folder: Path, material: FittedMaterial, table: TabulatedBRDF) -> str:
-    """NAME.npz: table, log table, coefficients and the nodes' angles; returns its name."""
+    """Write NAME.npz: table, log table, coefficients and the nodes' angles; returns its name."""
     name = f"{identifier(material.name)}.npz"
     write_npz(
         folder / name,
@@ -82,13 +83,13 @@ def write_npz_material(folder: Path, material: FittedMaterial, table: TabulatedB
 
 
 def log_table_arrays(brdf: PrincipalBRDF) -> dict[str, NDArray[Any]]:
-    """ln(ρ·cosMap + ε) at the basis' nodes, (n_h, n_d, n_p, 3), with the nodes' angles."""
+    """ln(ρ·cosMap + ε) at the nodes of the basis, (n_h, n_d, n_p, 3), and the nodes' angles."""
     grid = brdf.basis.grid
     return {"log_table": brdf.log_table.values.reshape(*grid.shape, 3), **node_arrays(grid)}
 
 
 def node_arrays(grid: AngleGrid) -> dict[str, NDArray[Any]]:
-    """The angles of a grid's nodes along each axis, and what the mapping needs beside them."""
+    """The angles of a grid's nodes along each axis, and the constants of the mapping."""
     nodes = grid.nodes()
     return {
         "theta_h": nodes.theta_h[:, 0, 0],
@@ -100,7 +101,7 @@ def node_arrays(grid: AngleGrid) -> dict[str, NDArray[Any]]:
 
 
 def write_npz_basis(folder: Path, basis: Basis) -> str:
-    """basis_VERSION.npz: µ, ln(ref + ε), components and nodes; returns its name."""
+    """Write basis_VERSION.npz: µ, ln(ref + ε), components and nodes; returns its name."""
     name = f"basis_{basis.version}.npz"
     write_npz(
         folder / name,
@@ -115,6 +116,6 @@ def write_npz_basis(folder: Path, basis: Basis) -> str:
 
 
 def write_npz(path: Path, **arrays: NDArray[Any]) -> None:
-    """Write a compressed .npz; the file appears whole or not at all."""
+    """Write a compressed .npz atomically: a failed write leaves no partial file."""
     with atomic_path(path) as partial, open(partial, "wb") as file:
         np.savez_compressed(file, **arrays)

@@ -1,4 +1,4 @@
-"""The exports that hold the BRDF itself: MERL `.binary`, EXR and NPZ."""
+"""Export of the BRDF as tables: MERL `.binary`, EXR and NPZ."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from . import conventions, table_files
 from .losses import Loss
 from .subject import Subject
 
-CELLS = "read between the cells' centres"
-NEAREST = "read as the value of the cell, as many programs do"
-BACK = "the coefficients and the basis are left behind: the fit cannot be continued from it"
+# keys of losses.json: how a program interpolates the table
+INTERPOLATED = "read between the cells' centres"
+NEAREST_CELL = "read as the value of the cell, as many programs do"
+NO_COEFFICIENTS = "the coefficients and the basis; a result cannot be restored from the table"
 
 
 def write_binary(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
-    """NAME.binary in the MERL format."""
+    """Write NAME.binary in the MERL format."""
     losses = []
     for subject in subjects:
         file = f"{subject.name}.binary"
@@ -27,10 +28,11 @@ def write_binary(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
                 subject.name,
                 (file,),
                 _table_errors(subject),
-                dropped=(BACK,),
+                dropped=(NO_COEFFICIENTS,),
                 notes=(
-                    "cells hold the value at their centre; programs that take it for the lower "
-                    "edge (as some readers of MERL do) shift the highlight by half a cell",
+                    "Cells hold the value at their centre. Programs that take it as the value at "
+                    "the lower edge (as some readers of MERL do) shift the highlight by half a "
+                    "cell.",
                     *subject.scale_note,
                 ),
             )
@@ -39,7 +41,7 @@ def write_binary(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
 
 
 def write_exr(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
-    """Table, coefficients and the basis as EXR pictures, and README_exr.txt."""
+    """Write table, coefficients and basis as EXR images, and README_exr.txt."""
     basis = subjects[0].material.brdf.basis
     shared = (
         table_files.write_exr_basis(folder, basis),
@@ -54,7 +56,7 @@ def write_exr(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
 
 
 def write_npz(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
-    """The same as NumPy archives, with the logarithms at the basis' nodes, and README_npz.txt."""
+    """Write table, coefficients, basis and the log table as NumPy archives, and README_npz.txt."""
     basis = subjects[0].material.brdf.basis
     shared = (
         table_files.write_npz_basis(folder, basis),
@@ -70,5 +72,6 @@ def write_npz(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
 
 
 def _table_errors(subject: Subject) -> dict[str, float]:
+    """Errors of the MERL table, by how a program interpolates it."""
     table = subject.table
-    return {CELLS: subject.error(table.evaluate), NEAREST: subject.error(table.nearest)}
+    return {INTERPOLATED: subject.error(table.evaluate), NEAREST_CELL: subject.error(table.nearest)}

@@ -1,8 +1,8 @@
 """The container of RGL's measured BRDFs (`.bsdf`): named arrays in one file.
 
-As Mitsuba 3 (`TensorFile`) and pbrt-v4 read it: "tensor_file\\0", version (1, 0), number of fields
-(uint32); then for each: length of its name (uint16), name, dimensions (uint16), type (uint8), place
-of its data from the file's start (uint64), shape (uint64 each). Little endian.
+Format of Mitsuba 3 (`TensorFile`) and pbrt-v4: "tensor_file\\0", version (1, 0), number of fields
+(uint32); then for each field: length of its name (uint16), name, number of dimensions (uint16),
+type (uint8), offset of its data in the file (uint64), shape (uint64 each). Little endian.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ ALIGNMENT = 8
 
 
 def write(path: Path, fields: Mapping[str, NDArray[Any]]) -> None:
-    """Write uint8 and float32 arrays by name; the file appears whole or not at all."""
+    """Write uint8 and float32 arrays by name, atomically: a failed write leaves no partial file."""
     arrays = {name: np.ascontiguousarray(value) for name, value in fields.items()}
     head = (
         len(MAGIC)
@@ -47,4 +47,5 @@ def write(path: Path, fields: Mapping[str, NDArray[Any]]) -> None:
 
 
 def _aligned(place: int) -> int:
+    """The next multiple of ALIGNMENT, in bytes."""
     return -(-place // ALIGNMENT) * ALIGNMENT

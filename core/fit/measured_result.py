@@ -1,4 +1,4 @@
-"""What is kept of a measured fit once its samples are let go: megabytes, not hundreds of them."""
+"""What is kept of a measured fit without its samples: some megabytes instead of hundreds."""
 
 from __future__ import annotations
 
@@ -12,42 +12,44 @@ from ..basis import AngleGrid, PrincipalBRDF, mapping
 from .measured import MeasuredFit
 from .spread import Spread, directions
 
-COARSE = (42, 24, 10)  # nodes of the band: it is smooth, the BRDF is not
-NINETY = 1.6449  # standard deviations to either side that hold 90 % of a normal distribution
+COARSE = (42, 24, 10)  # nodes of the band, over θh, θd and φd: it is smoother than the BRDF
+NINETY_PERCENT = 1.6449  # 90 % of a normal distribution lie within so many standard deviations
 
 
 @dataclass(frozen=True)
 class Band:
-    """How far ln(ρ·cosMap + ε) may be off. values: (grid.size, 3) standard deviations."""
+    """Standard deviation of ln(ρ·cosMap + ε). values: (grid.size, 3)."""
 
     grid: AngleGrid
     values: NDArray[np.float32]
 
     @staticmethod
     def from_values(values: NDArray[np.floating], knee: float) -> Band:
-        """values: (n, 3) of a band; knee: of its BRDF's basis. Raises ValueError."""
+        """values: (n, 3) of a band; knee: that of the grid of its BRDF's basis. Raises
+        ValueError."""
         grid = AngleGrid(*COARSE, knee)
         return Band(grid, np.asarray(values, np.float32).reshape(grid.size, 3))
 
     @staticmethod
     def of(fit: MeasuredFit) -> Band:
-        """The fit's own, at the nodes of a coarser grid."""
+        """The band of a fit, at the nodes of a coarser grid."""
         grid = AngleGrid(*COARSE, fit.brdf.basis.grid.knee)
         nodes = Angles(*(a.ravel() for a in grid.nodes()))
         return Band(grid, fit.band(nodes).astype(np.float32))
 
     def deviation(self, angles: Angles) -> NDArray[np.float32]:
-        """(n, 3) at n directions."""
+        """(n, 3) standard deviation at n directions."""
         return self.grid.interpolate(self.values, angles)
 
     def factor(self, angles: Angles) -> NDArray[np.float32]:
-        """(n, 3) what ρ·cosMap + ε may be larger or smaller by, in nine of ten cases at most."""
-        return np.exp(np.float32(NINETY) * self.deviation(angles))
+        """(n, 3) factor by which ρ·cosMap + ε may be larger or smaller: half the width of the 90 %
+        interval, in the logarithm."""
+        return np.exp(np.float32(NINETY_PERCENT) * self.deviation(angles))
 
     def interval(
         self, brdf: PrincipalBRDF, angles: Angles
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """(low, high) (n, 3) in 1/sr: the 90 % interval of the BRDF that the band is of, at n
+        """(low, high) (n, 3) in 1/sr: the 90 % interval of the BRDF of this band at n
         directions."""
         weight = mapping.cos_map(angles).astype(np.float32)[:, None]
         level = brdf.evaluate(angles) * weight + np.float32(mapping.EPSILON)
@@ -59,35 +61,36 @@ class Band:
         )
 
     def spread(self) -> Spread:
-        """In three numbers."""
+        """The three summary values of the band."""
         angles = directions(self.grid)
         return Spread.of(self.deviation(angles), angles)
 
 
 @dataclass(frozen=True)
 class MeasuredResult:
-    """brdf: the most probable one, all components. normal_deviation: degrees along each tangent
-    that the scan's normals are off by. gains: photo → what it is brighter by than the BRDF that
-    all of them give: its exposure, and what no BRDF of the basis explains.
-    anchoring: what the BRDF rests on where no photo looked. samples: how many were used."""
+    """brdf: the most probable one, all components. normal_deviation: degrees along each tangent,
+    standard deviation of the scan's normals. gains: photo → factor by which it is brighter than the
+    BRDF of all photos predicts: its exposure, and what no BRDF of the basis explains.
+    extrapolation: what the BRDF rests on in directions without samples. samples: how many were
+    used."""
 
     brdf: PrincipalBRDF
     samples: int
     normal_deviation: float
     gains: dict[int, float]
-    anchoring: str
+    extrapolation: str
     band: Band
     warnings: tuple[str, ...]
 
     @staticmethod
     def of(fit: MeasuredFit) -> MeasuredResult:
-        """Without samples, model and posterior."""
+        """The fit without its samples, model and posterior."""
         return MeasuredResult(
             brdf=fit.brdf,
             samples=fit.samples,
             normal_deviation=fit.normal_deviation,
             gains=dict(fit.gains),
-            anchoring=fit.anchoring,
+            extrapolation=fit.extrapolation,
             band=Band.of(fit),
             warnings=fit.warnings,
         )
@@ -96,6 +99,6 @@ class MeasuredResult:
         """(low, high) (n, 3) in 1/sr: the 90 % interval at n directions."""
         return self.band.interval(self.brdf, angles)
 
-    def odd_gains(self, least: float) -> dict[int, float]:
-        """The gains that differ from 1 by more than ``least``, photo → gain."""
-        return {photo: g for photo, g in self.gains.items() if abs(g - 1) > least}
+    def gains_beyond(self, limit: float) -> dict[int, float]:
+        """The gains that differ from 1 by more than ``limit``: photo → gain."""
+        return {photo: g for photo, g in self.gains.items() if abs(g - 1) > limit}

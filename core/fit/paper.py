@@ -1,13 +1,22 @@
 """The paper's estimator: Ono et al. 2019, "Practical BRDF reconstruction using reliable geometric
-regions from multi-view stereo", section 3. Every assumption can be switched off; with all three off
+regions from multi-view stereo", section 3. Every assumption can be switched off; without all three
 it is Nielsen et al. 2015 on random subsets of the photos' pixels.
 
-Where the paper leaves room:
-- "keep drawing until the chosen set is monotone" is met by letting only samples into the set that
-  are monotone with those already in it. Taken literally it hardly ever ends: of 150 sets chosen for
-  their condition number alone, 0 to 11 are monotone on the captures we measured.
-- the similarity of prediction and photos is taken over the pixels the margins trust, of this
-  material, as one vector of radiances.
+Where the equations are:
+- (1)-(2) principal components: core/basis/training.py and components.py;
+- (3) BRDF from coefficients: core/basis/principal_brdf.py;
+- (4) reduced system of the observed rows: _one_trial here, from Basis.rows and Basis.mapped; it is
+  solved by Nielsen's ridge regression (ridge.py);
+- (5)-(7) curvature: core/geometry/curvature.py, its threshold in reliability.py;
+- (8) monotonicity: reliability.monotone_with;
+- (9) specular peak: reliability.highest_intensity.
+
+Two choices that the paper leaves open:
+- "Keep drawing until the chosen set is monotone": here only samples that are monotone with those
+  already in the set may join it. Taken literally the loop hardly ever ends: of 150 sets chosen for
+  their condition number alone, 0 to 11 are monotone on the captures that we measured.
+- The similarity of prediction and photos is the cosine over the pixels of this material within the
+  margins, as one vector of radiances.
 """
 
 from __future__ import annotations
@@ -28,9 +37,10 @@ REDRAWS = 20  # subsets tried before a trial gives up on the monotonicity constr
 
 @dataclass(frozen=True)
 class PaperSettings:
-    """samples: n, and components used (k = n). trials: random subsets tried. subset: candidates
-    drawn for each. curvature: largest screen-space mean curvature, 1/pixel, None for no test.
-    monotonicity, highest_intensity: the paper's other two assumptions. eta: ridge."""
+    """samples: n, number of samples, and of components (k = n). trials: number of random subsets.
+    subset: candidates drawn for each. curvature: largest image-space mean curvature, 1/pixel; None
+    for no test. monotonicity, highest_intensity: the paper's other two assumptions. eta: ridge
+    parameter. seed: of the random subsets."""
 
     samples: int = 6
     trials: int = 10
@@ -44,9 +54,10 @@ class PaperSettings:
 
 @dataclass(frozen=True)
 class PaperFit:
-    """brdf: the best candidate. chosen: its samples (the specular peak first, where assumed).
-    condition: its condition number. candidates: (trials, 3, k); similarity: (trials,) cosine
-    similarity of each to the photos. reliable: number of samples that passed the curvature test."""
+    """brdf: the candidate most similar to the photos. chosen: its samples (the specular peak first,
+    where assumed). condition: the condition number of its system. candidates: (trials, 3, k)
+    coefficients; similarity: (trials,) cosine similarity of each to the photos. reliable: number of
+    samples that passed the curvature test. warnings: sentences for the report."""
 
     brdf: PrincipalBRDF
     chosen: SampleTable
@@ -68,21 +79,21 @@ def fit_paper(
     reliable = np.flatnonzero(
         np.ones(len(table), bool)
         if s.curvature is None
-        else reliability.calm(table.curvature, s.curvature)
+        else reliability.below_curvature_limit(table.curvature, s.curvature)
     )
     if len(reliable) < 4 * s.samples:
         raise FitError(
-            f"{len(table)} lit samples, {len(reliable)} of them on calm surface; "
-            f"at least {4 * s.samples} are needed: more light, larger masks or a higher "
-            "curvature threshold"
+            f"{len(table)} lit samples, {len(reliable)} of them below the curvature limit; "
+            f"expected at least {4 * s.samples}; add photos or light, enlarge the masks, or raise "
+            "the curvature limit"
         )
     peak = reliability.highest_intensity(table) if s.highest_intensity else None
-    likely = table.weight[reliable].astype(np.float64)
-    likely /= likely.sum()
+    probability = table.weight[reliable].astype(np.float64)
+    probability /= probability.sum()
     rng = np.random.default_rng(s.seed)
     trials = []
     for _ in range(s.trials):
-        trials.append(_one_trial(table, reliable, likely, peak, basis, s, rng, warnings))
+        trials.append(_one_trial(table, reliable, probability, peak, basis, s, rng, warnings))
     candidates = np.stack([coefficients for coefficients, _, _ in trials])
     similarity = similarity_sums(basis, candidates, table)
     best = int(similarity.argmax())
@@ -100,18 +111,21 @@ def fit_paper(
 def _one_trial(
     table: SampleTable,
     reliable: NDArray[np.intp],
-    likely: NDArray[np.float64],
+    probability: NDArray[np.float64],
     peak: tuple[int, SampleTable] | None,
     basis: Basis,
     s: PaperSettings,
     rng: np.random.Generator,
     warnings: list[str],
 ) -> tuple[NDArray[np.float64], SampleTable, float]:
-    """Draw a subset, choose samples, solve: (coefficients (3, k), chosen samples, condition)."""
+    """Draw a subset, choose samples and solve the reduced system of their rows (equation (4)).
+
+    Returns (coefficients (3, k), chosen samples, condition number).
+    """
     for redraw in range(REDRAWS + 1):
         size = min(s.subset, len(reliable))
         if weighted.thinned(table):
-            rows = rng.choice(reliable, size, replace=False, p=likely)
+            rows = rng.choice(reliable, size, replace=False, p=probability)
         else:
             rows = rng.choice(reliable, size, replace=False)
         drawn = table.select(rows if peak is None else rows[rows != peak[0]])
@@ -135,7 +149,9 @@ def _one_trial(
         chosen = selection.choose(q, s.samples, allowed, fixed=None if peak is None else 0)
         if chosen is not None:
             if last and s.monotonicity:
-                warnings.append("no monotone set of samples was found; the test was left out")
+                warnings.append(
+                    "No monotone set of samples was found; the monotonicity test was skipped."
+                )
             break
     else:  # pragma: no cover - the last draw is unconstrained
         raise FitError("no set of samples could be chosen")

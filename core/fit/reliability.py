@@ -1,4 +1,4 @@
-"""The paper's three tests of which samples to believe (section 3.2)."""
+"""The paper's three tests for reliable samples (Ono et al. 2019, section 3.2)."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from ..angles import half_difference
 from ..samples import SampleTable
 
 
-def calm(curvature: NDArray[np.floating], threshold: float) -> NDArray[np.bool_]:
-    """(n,) where the screen-space mean curvature (n,), 1/pixel, is known and at most the
-    threshold."""
+def below_curvature_limit(curvature: NDArray[np.floating], threshold: float) -> NDArray[np.bool_]:
+    """(n,) where the image-space mean curvature (n,), 1/pixel (equations (5)-(7),
+    geometry/curvature.py), is known and at most the threshold."""
     with np.errstate(invalid="ignore"):
         return np.abs(curvature) <= threshold
 
@@ -19,10 +19,11 @@ def calm(curvature: NDArray[np.floating], threshold: float) -> NDArray[np.bool_]
 def monotone_with(
     theta_h: NDArray[np.floating], rho: NDArray[np.floating], chosen: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
-    """(n,) samples that stand to every chosen one as n·h does: larger n·h ⇔ larger ρ.
+    """(n,) samples that are monotone with every chosen one: a larger n·h goes with a larger ρ
+    (equation (8); Higo et al. 2010).
 
-    theta_h, rho: (n,), rho the mean over the channels (Higo et al. 2010's monotonicity). θh stands
-    for n·h, which in float32 is 1 for everything within 0.02° of the peak.
+    theta_h, rho: (n,), rho the mean over the channels. θh replaces n·h, which in float32 is 1 for
+    everything within 0.02° of the peak.
     """
     agree = np.ones(len(theta_h), bool)
     for i in chosen:
@@ -32,10 +33,10 @@ def monotone_with(
 
 def highest_intensity(table: SampleTable) -> tuple[int, SampleTable]:
     """(row, table of that one sample) of the brightest pixel, its normal replaced by the half
-    vector: the paper takes it for the specular peak, so θh = 0 there.
+    vector: the paper assumes that it is the specular peak, θh = 0 (equation (9)).
 
-    Brightest for the light it was given (L / E: lamps may differ in strength), among the samples
-    that the margins trust.
+    Brightest relative to its irradiance (L / E: lamps may differ in strength), among the samples
+    within the margins.
     """
     row = int((table.radiance / table.irradiance).mean(axis=1).argmax())
     one = table.select(np.array([row]))

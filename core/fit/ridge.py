@@ -1,20 +1,25 @@
-"""Coefficients from few samples: Nielsen's ridge regression (Nielsen et al. 2015, equation 5;
-the paper's equation 5)."""
+"""Coefficients from few samples by ridge regression (Nielsen, Jensen and Ramamoorthi 2015, equation
+(5)).
+
+It solves the reduced system of the observed rows, equation (4) of Ono et al. 2019.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-ETA = 40.0  # Nielsen's published value: an assumed log residual of 0.365 a sample
+ETA = 40.0  # published by Nielsen et al.; corresponds to a log residual of 0.365 per sample
 
 
 def solve(
     q: NDArray[np.floating], mapped: NDArray[np.floating], eta: float = ETA
 ) -> NDArray[np.float64]:
-    """c = (Q̂ᵀQ̂ + ηI)⁻¹ Q̂ᵀ (x̂ − µ̂), for every channel: (c, k).
+    """c = (Q̂ᵀQ̂ + ηI)⁻¹ Q̂ᵀ (x̂ − µ̂), for every channel: (c, k). Nielsen et al. 2015, equation
+    (5).
 
-    q: (n, k) rows of scaled components; mapped: (n, c) centred, mapped observations.
+    q: (n, k) rows of scaled components; mapped: (n, c) centred, mapped observations; eta: ridge
+    parameter.
     """
     q64 = q.astype(np.float64)
     normal = q64.T @ q64 + eta * np.eye(q.shape[1])

@@ -1,4 +1,4 @@
-"""How sure a fit is of its BRDF, over the directions that count, in three numbers."""
+"""Uncertainty of a fit's BRDF over the relevant directions, in three numbers."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from ..angles import Angles, cosines
 from ..basis import AngleGrid, Basis
 
-SEEN = np.radians(80)  # light and view nearer to the normal than this
-PEAK = np.radians(3)
+MAX_THETA = np.radians(80)  # of light and view from the normal
+HIGHLIGHT = np.radians(3)  # θh below which a direction counts to the highlight
 
 
 @dataclass(frozen=True)
 class Spread:
     """Standard deviation of ln(ρ·cosMap + ε), mean of the channels, over directions with light and
-    view within 80° of the normal. Of the paper's fit: between its trials, NOT a calibrated
-    interval. Of the measured fit: of what the photos leave possible."""
+    view within 80° of the normal. For the paper's fit: the spread of its trials, NOT a calibrated
+    interval. For the measured fit: that of its posterior."""
 
     median: float
     percentile_90: float
@@ -26,25 +26,25 @@ class Spread:
 
     @staticmethod
     def of(deviation: NDArray[np.floating], angles: Angles) -> Spread:
-        """deviation: (n, c) at directions (n,) within SEEN."""
+        """deviation: (n, c) standard deviations at directions (n,) within MAX_THETA."""
         mean = deviation.mean(axis=1)
         return Spread(
             median=float(np.median(mean)),
             percentile_90=float(np.percentile(mean, 90)),
-            at_highlight=float(np.median(mean[angles.theta_h < PEAK])),
+            at_highlight=float(np.median(mean[angles.theta_h < HIGHLIGHT])),
         )
 
 
 def directions(grid: AngleGrid) -> Angles:
-    """Some of a grid's nodes, those within SEEN; each (n,)."""
+    """Every third (φd: fifth) of a grid's nodes within MAX_THETA; each array (n,)."""
     thin = (slice(None, None, 3), slice(None, None, 3), slice(None, None, 5))
     angles = Angles(*(a[thin].ravel() for a in grid.nodes()))
-    near = np.minimum(*cosines(*angles)) > np.cos(SEEN)
+    near = np.minimum(*cosines(*angles)) > np.cos(MAX_THETA)
     return Angles(*(a[near] for a in angles))
 
 
 def candidate_spread(basis: Basis, candidates: NDArray[np.floating]) -> Spread:
-    """How far the candidates (trials, 3, k) of the paper's fit disagree."""
+    """Spread of the candidates (trials, 3, k) of the paper's fit."""
     angles = directions(basis.grid)
     trials, channels, k = candidates.shape
     centre, q = basis.rows(angles, k)

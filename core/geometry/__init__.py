@@ -1,4 +1,5 @@
-"""Rays, visibility, shadows and curvature of the scanned surface (Embree through embreex)."""
+"""Ray casting, visibility, shadows and curvature of the scanned surface (Embree through
+embreex)."""
 
 from .pixel_rays import PixelRays
 from .rays import RayScene

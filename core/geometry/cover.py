@@ -1,8 +1,8 @@
-"""Which part of a photo the mesh can be in: rays elsewhere are not worth casting.
+"""The part of a photo that can show the mesh; no rays are cast elsewhere.
 
-The mesh is boxed into the cells of a coarse lattice. A cell is convex, so a pinhole sees it within
-the rectangle around its corners; a lens with distortion bends the cell's edges, by much less than
-the rectangle is large.
+The mesh is enclosed in cells of a coarse lattice. A cell is convex, so a pinhole camera sees it
+within the rectangle around its projected corners. A lens with distortion bends the edges of the
+cell, by much less than the size of the rectangle.
 """
 
 from __future__ import annotations
@@ -14,23 +14,26 @@ from numpy.typing import NDArray
 
 from ..scan import Camera, Mesh
 
-CELLS = 64  # along each axis
-ROWS = 16  # of a photo that share one range of columns
-SLACK, LEAST = 0.25, 2.0  # added to rectangles on every side: of their size, and pixels
+CELLS = 64  # lattice cells along each axis of the bounding box
+ROWS = 16  # pixel rows that share one range of columns
+RELATIVE_MARGIN, MARGIN_PIXELS = (
+    0.25,
+    2.0,
+)  # margin on every side of a rectangle: fraction of its size, plus pixels
 CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 
 
 @dataclass(frozen=True)
 class Cover:
-    """Cells of a lattice that hold the mesh. points: (p, 3) scan frame, the corners of all of them;
-    corners: (c, 8) the places of each cell's corners among the points."""
+    """The lattice cells that hold the mesh. points: (p, 3) corners of all cells, scan frame;
+    corners: (c, 8) indices into points of each cell's corners."""
 
     points: NDArray[np.float64]
     corners: NDArray[np.intp]
 
     @classmethod
     def of(cls, mesh: Mesh) -> Cover:
-        """The cells that the boxes around the faces touch."""
+        """The cells that the bounding boxes of the faces touch."""
         low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
         edge = np.maximum((high - low) * (1 + 1e-6), 1e-30) / CELLS
         cell = np.clip(((mesh.vertices - low) / edge).astype(np.int32), 0, CELLS - 1)
@@ -41,7 +44,7 @@ class Cover:
             second = corner if second is None else np.maximum(second, corner)
         assert first is not None and second is not None
         second += 1
-        # a box adds 1 to its cells: differences at its corners, summed along the axes
+        # add 1 to all cells of each box: differences at its corners, then cumulative sums
         side = CELLS + 1
         marks = np.zeros(side**3, np.int64)
         for pick in CORNERS:
@@ -59,8 +62,8 @@ class Cover:
         return cls(low + lattice * edge, places.reshape(-1, 8))
 
     def columns(self, camera: Camera) -> NDArray[np.int32]:
-        """(blocks, 2) first and last column + 1 of every ROWS rows of a photo outside of which the
-        mesh cannot be; equal where it is in none."""
+        """(blocks, 2) first column and last column + 1 that can show the mesh, for every ROWS rows
+        of a photo; equal where no column can."""
         blocks = -(-camera.height // ROWS)
         everywhere = np.tile(np.array([[0, camera.width]], np.int32), (blocks, 1))
         if camera.panoramic or camera.orthographic:
@@ -68,13 +71,15 @@ class Cover:
         ahead = self.points @ camera.pose.rotation[2] + camera.pose.translation[2] > 0
         corners = self.corners[ahead[self.corners].any(axis=1)]
         pixels = camera.project(self.points)
-        if not np.isfinite(pixels[corners]).all():  # beside or around the camera, or beyond a fold
+        if not np.isfinite(
+            pixels[corners]
+        ).all():  # at or behind the camera plane, or beyond a fold
             return everywhere
         low, high = pixels[corners].min(axis=1), pixels[corners].max(axis=1)
-        slack = SLACK * (high - low) + LEAST
+        margin = RELATIVE_MARGIN * (high - low) + MARGIN_PIXELS
         limits = np.array([camera.width, camera.height])
-        first = np.clip(np.floor(low - slack), 0, limits).astype(np.int32)
-        last = np.clip(np.ceil(high + slack), 0, limits).astype(np.int32)
+        first = np.clip(np.floor(low - margin), 0, limits).astype(np.int32)
+        last = np.clip(np.ceil(high + margin), 0, limits).astype(np.int32)
         inside = (first < last).all(axis=1)
         first, last = first[inside], last[inside]
         found = np.stack([np.full(blocks, camera.width), np.zeros(blocks)], axis=1).astype(np.int32)

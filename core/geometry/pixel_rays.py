@@ -1,8 +1,9 @@
-"""Directions of a photo's pixels, many at once: the lens is asked on a coarse lattice only.
+"""Ray directions of many pixels: the lens is evaluated on a coarse lattice and interpolated.
 
-Undoing a lens's distortion takes an iteration a pixel, longer than casting its ray. Between lattice
-points the direction is a smooth function, which cubics through four of them follow far below what
-can be seen. Lenses that cannot be interpolated so well, or not everywhere, are asked everywhere.
+Inverting a lens's distortion takes an iteration for each pixel, which costs more than casting its
+ray. Between lattice points the direction is a smooth function, and cubic interpolation from four
+points is far more accurate than a pixel. Where a test shows that a lens cannot be interpolated so
+well, or where it has no direction at some lattice point, it is evaluated at every pixel.
 """
 
 from __future__ import annotations
@@ -16,40 +17,40 @@ from ..scan import Camera
 
 Array = NDArray[np.float64]
 STEP = 16  # pixels between lattice points
-PROBES = 12, 40  # rows, and pixels in each, asked to judge the lattice
-TOLERANCE = 0.002  # pixels that it may be off
-FEWEST = 8  # lattice points a side below which it is not worth it
+PROBES = 12, 40  # rows, and pixels in each row, to test the lattice
+MAX_ERROR = 0.002  # maximum error, pixels
+MIN_LATTICE_POINTS = 8  # lattice points per side; smaller photos are evaluated at every pixel
 
 
 @dataclass(frozen=True)
 class PixelRays:
-    """lattice: (3, rows, columns) float64 world directions at pixels 0, 16, 32, … of a camera;
-    None where its lens has to be asked for every pixel."""
+    """lattice: (3, rows, columns) float64 world directions at pixels 0, 16, 32, … of a camera; None
+    where the lens must be evaluated at every pixel."""
 
     camera: Camera
     lattice: Array | None
 
     @classmethod
     def of(cls, camera: Camera) -> PixelRays:
-        """Ask the lens, and try whether the lattice is good enough."""
+        """Build the lattice and test its accuracy at random pixels."""
         lattice = _lattice(camera)
         if lattice is None:
             return cls(camera, None)
         made = cls(camera, lattice)
         rng = np.random.default_rng(0)
-        probed = rng.integers(0, camera.height, PROBES[0])
+        test_rows = rng.integers(0, camera.height, PROBES[0])
         column = rng.integers(0, camera.width, (PROBES[0], PROBES[1]))
-        pixels = np.stack([column, np.broadcast_to(probed[:, None], column.shape)], axis=-1)
+        pixels = np.stack([column, np.broadcast_to(test_rows[:, None], column.shape)], axis=-1)
         exact = camera.rays(pixels.reshape(-1, 2) + 0.5)
-        near = np.concatenate(
+        interpolated = np.concatenate(
             [
                 made.window(row, row + 1, 0, camera.width)[:, some].T
-                for row, some in zip(probed.tolist(), column, strict=True)
+                for row, some in zip(test_rows.tolist(), column, strict=True)
             ]
         )
-        apart = np.linalg.norm(near - exact, axis=1)
+        error = np.linalg.norm(interpolated - exact, axis=1)
         pixel = float(camera.footprint(np.ones(1))[0])
-        return made if (apart < TOLERANCE * pixel).all() else cls(camera, None)
+        return made if (error < MAX_ERROR * pixel).all() else cls(camera, None)
 
     def window(self, top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
         """(3, n) unit directions, world frame, through the centres of the pixels of rows top …
@@ -76,9 +77,10 @@ class PixelRays:
 
 
 def _lattice(camera: Camera) -> Array | None:
-    """(3, rows, columns) directions; None where they are not worth it, or not all there."""
+    """(3, rows, columns) directions; None for small photos, orthographic cameras and lenses with
+    undefined directions."""
     rows, columns = (-(-(size - 1) // STEP) + 1 for size in (camera.height, camera.width))
-    if camera.orthographic or min(rows, columns) < FEWEST:
+    if camera.orthographic or min(rows, columns) < MIN_LATTICE_POINTS:
         return None
     y, x = np.mgrid[0:rows, 0:columns] * STEP + 0.5
     found = camera.rays(np.stack([x.ravel(), y.ravel()], axis=1))
@@ -88,7 +90,7 @@ def _lattice(camera: Camera) -> Array | None:
 
 
 def _stencil(begin: int, end: int, count: int) -> tuple[NDArray[np.intp], Array]:
-    """(first of the four lattice points (n,), Lagrange's weights (4, n)) of pixels begin … end."""
+    """((n,) first of the four lattice points, (4, n) Lagrange weights) of pixels begin … end."""
     place = np.arange(begin, end) / STEP
     first = np.clip(np.floor(place).astype(np.intp) - 1, 0, count - 4)
     t = place - first

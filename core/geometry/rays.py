@@ -1,4 +1,4 @@
-"""Ray casting against the scanned mesh: Embree, vectorised, in chunks."""
+"""Ray casting against the scanned mesh with Embree, vectorised, in chunks."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ from ..scan import Mesh
 from .cover import Cover
 from .lift import SHADOW_LIFT, facet_lift
 
-CHUNK = 1 << 20  # rays at once: 24 M rays with their results would take over 2 GB
+CHUNK_RAYS = 1 << 20  # bounds memory: 24 M rays with their results would take over 2 GB
 
 
 class Hits(NamedTuple):
-    """Where rays meet the mesh first. face: (n,) int32, -1 for none; u, v: (n,) float32 weights of
-    the face's second and third vertex; distance: (n,) float32 along the ray, scan units."""
+    """First intersections of rays with the mesh. face: (n,) int32, −1 for none; u, v: (n,) float32
+    barycentric weights of the face's second and third vertex; distance: (n,) float32 along the ray,
+    scan units."""
 
     face: NDArray[np.int32]
     u: NDArray[np.float32]
@@ -29,15 +30,15 @@ class Hits(NamedTuple):
     distance: NDArray[np.float32] | None = None
 
     def select(self, which: NDArray) -> Hits:
-        """Those of a boolean mask or an index array, without distances."""
+        """The hits of a boolean mask or an index array, without distances."""
         return Hits(self.face[which], self.u[which], self.v[which])
 
 
 @dataclass(frozen=True)
 class RayScene:
-    """A mesh ready for rays. Embree works in float32: everything is shifted to the mesh's centre,
-    so that georeferenced coordinates lose nothing. lift: how far above the surface shadow rays
-    start, scan units."""
+    """A mesh prepared for ray casting. Embree works in float32, so everything is relative to the
+    mesh's centre, which keeps the precision of georeferenced coordinates. lift: distance of shadow
+    rays' starts from the surface, scan units."""
 
     mesh: Mesh
     origin: NDArray[np.float64]
@@ -52,15 +53,16 @@ class RayScene:
         TriangleMesh(scene, np.ascontiguousarray(triangles))
         del triangles
         one = np.zeros((1, 3), np.float32)
-        scene.run(one, one + 1)  # builds the tree here, not in the first of several threads
+        scene.run(one, one + 1)  # builds the tree here, before threads use it
         return cls(mesh, origin, scene, SHADOW_LIFT * mesh.size)._ready()
 
     def close(self) -> RayScene:
-        """The same, whose shadow rays start as close to the surface as its facets allow."""
+        """The same scene with shadow rays that start as close to the surface as its facets
+        allow."""
         return replace(self, lift=facet_lift(self.mesh))._ready()
 
     def _ready(self) -> RayScene:
-        """With all that it keeps, before several threads ask for it."""
+        """Compute the cached properties before several threads use them."""
         _ = self._vertex_table, self._corners, self.cover
         return self
 
@@ -71,8 +73,8 @@ class RayScene:
         face = np.empty(n, np.int32)
         u, v, distance = (np.empty(n, np.float32) for _ in range(3))
         local = (start - self.origin).astype(np.float32)
-        for begin in range(0, n, CHUNK):
-            part = slice(begin, min(begin + CHUNK, n))
+        for begin in range(0, n, CHUNK_RAYS):
+            part = slice(begin, min(begin + CHUNK_RAYS, n))
             along = np.asarray(directions[part], np.float32)
             begins = np.broadcast_to(local if local.ndim == 1 else local[part], along.shape)
             found = self.scene.run(begins, along, output=True)
@@ -87,13 +89,14 @@ class RayScene:
         limits: NDArray[np.floating] | None = None,
         lift: NDArray[np.floating] | None = None,
     ) -> NDArray[np.bool_]:
-        """(n,) whether anything lies from ``points`` (n, 3), moved by ``lift`` (n, 3) where given,
-        along unit ``directions``, (3,) or (n, 3), nearer than ``limits`` (n,) where given."""
+        """(n,) whether the mesh blocks rays from ``points`` (n, 3), offset by ``lift`` (n, 3) where
+        given, along unit ``directions``, (3,) or (n, 3), within the distances ``limits`` (n,) where
+        given."""
         blocked = np.empty(len(points), bool)
         same = directions.ndim == 1 or (len(directions) > 0 and directions.strides[0] == 0)
         one = np.array(directions if directions.ndim == 1 else directions[:1], np.float32)
-        for begin in range(0, len(points), CHUNK):
-            part = slice(begin, begin + CHUNK)
+        for begin in range(0, len(points), CHUNK_RAYS):
+            part = slice(begin, begin + CHUNK_RAYS)
             start = (points[part] - self.origin).astype(np.float32)
             if lift is not None:
                 start += lift[part]
@@ -106,8 +109,8 @@ class RayScene:
     def just_before(
         self, start: NDArray[np.float64], directions: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """(n, 3) ``start`` moved along ``directions`` (n, 3) to just before the mesh: rays without
-        a camera's centre may start anywhere, and Embree's float32 wants them to start near."""
+        """(n, 3) ``start`` moved along ``directions`` (n, 3) to just before the mesh, for rays
+        without a camera centre: Embree's float32 needs near start points."""
         along = np.einsum("ij,ij->i", self.origin - start, directions) - self.mesh.size
         return start + along[:, None] * directions
 
@@ -122,7 +125,7 @@ class RayScene:
 
     def surface(self, hits: Hits) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """((3, n) points relative to ``origin``, (3, n) unit smooth normals) at hits (all must
-        hit), in float32: what points() and normals() say in a fifth of the time."""
+        hit), in float32: the results of points() and normals() in a fifth of the time."""
         table, corners = self._vertex_table, self._corners
         second, third = hits.u, hits.v
         first = np.float32(1.0) - second - third
@@ -142,7 +145,7 @@ class RayScene:
 
     @cached_property
     def cover(self) -> Cover:
-        """Where the mesh is, coarsely."""
+        """The coarse cells that the mesh occupies."""
         return Cover.of(self.mesh)
 
     @cached_property

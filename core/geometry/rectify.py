@@ -1,4 +1,4 @@
-"""Resample a photo from a distorted lens to a pinhole of the same pose."""
+"""Resample a photo from a distorted lens to a pinhole camera of the same pose."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from ..scan import Camera
 
 
 def rectify(pixels: NDArray[np.floating], camera: Camera, target: Camera) -> NDArray[np.float32]:
-    """The photo (h, w, c) of ``camera`` as the pinhole ``target`` would have taken it.
+    """The photo (h, w, c) of ``camera`` resampled to the pinhole camera ``target``.
 
-    Bilinear; directions the photo does not hold are 0. Streams by row blocks.
+    Bilinear; 0 for directions outside the photo. Works in blocks of rows.
     """
     source, lens = camera.lens, target.lens
     out = np.zeros((target.height, target.width, pixels.shape[2]), np.float32)

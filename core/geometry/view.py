@@ -1,4 +1,4 @@
-"""What one camera sees of the scanned surface."""
+"""The part of the scanned surface that one camera sees."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ COLUMNS: dict[str, NDArray] = {
     "normal": np.zeros((0, 3), np.float32),
     "view": np.zeros((0, 3), np.float32),
     "curvature": np.zeros(0, np.float32),
-}  # what a view holds of every pixel, for none
+}  # the arrays of a view with no pixels
 
 
 @dataclass(frozen=True)
 class SurfaceView:
-    """The surface behind every pixel of one photo, or of a window of it, that hits it; n pixels in
+    """The surface behind every pixel of a photo, or of a window of it, that hits it; n pixels in
     row-major order.
 
-    shape: (h, w) of the window; seen: (h, w) which of its pixels hit; pixel: (n,) int32 flat
-    indices in the whole photo; face: (n,) int32; point: (n, 3) float64; normal: (n, 3) unit,
+    shape: (h, w) of the window; seen: (h, w) whether a pixel hits; pixel: (n,) int32 flat indices
+    in the whole photo; face: (n,) int32; point: (n, 3) float64, scan units; normal: (n, 3) unit,
     smooth; view: (n, 3) unit, surface → camera, both float32; curvature: (n,) float32, 1/pixel, NaN
-    at outlines; silhouette: (h, w) outline pixels. Frame: the scan's.
-    place: (n,) int32 flat indices in the window, None where it is the whole photo. wanted: the rows
-    of the n that are not of the window's halo.
+    at outlines; silhouette: (h, w) outline pixels. Frame: the scan's. place: (n,) int32 flat
+    indices in the window, None where it is the whole photo. wanted: the rows of the n pixels
+    outside the window's halo.
     """
 
     shape: tuple[int, int]
@@ -51,34 +51,34 @@ class SurfaceView:
     wanted: slice = field(default_factory=lambda: slice(None))
 
     def image(self, values: NDArray, fill: float = np.nan) -> NDArray:
-        """Values (n,) or (n, c) put back at their pixels: (h, w) or (h, w, c)."""
+        """(h, w) or (h, w, c) image of values (n,) or (n, c) at their pixels."""
         out = np.full((self.shape[0] * self.shape[1], *values.shape[1:]), fill, values.dtype)
         out[self.pixel if self.place is None else self.place] = values
         return out.reshape(*self.shape, *values.shape[1:])
 
     def at(self, image: NDArray) -> NDArray:
-        """(n,) or (n, c) what an image (h, w) or (h, w, c) of the window holds at the pixels."""
+        """(n,) or (n, c) values of an image (h, w) or (h, w, c) of the window at the pixels."""
         flat = image.reshape(self.shape[0] * self.shape[1], *image.shape[2:])
         return flat.take(self.pixel if self.place is None else self.place, axis=0)
 
 
 def view_surface(rays: RayScene, camera: Camera) -> SurfaceView:
-    """All of a photo: one ray through every pixel's centre."""
+    """The view of a whole photo, with one ray through the centre of every pixel."""
     lines = PixelRays.of(camera)
     windows = list(bands(camera, halo=1, columns=rays.cover.columns(camera)))
     return _joined(camera, windows, (view_window(rays, lines, window) for window in windows))
 
 
 def view_window(rays: RayScene, lines: PixelRays, window: Window) -> SurfaceView:
-    """A window of a photo. Outlines and curvature are those of the whole photo but in the rows next
-    to the window's ends."""
+    """The view of a window of a photo. Outlines and curvature equal those of the whole photo except
+    in the rows at the window's ends."""
     camera, shape = lines.camera, window.shape
     directions = lines.window(window.top, window.bottom, window.left, window.right)
-    blind = ~np.isfinite(directions).all(axis=0)  # corners that the lens does not reach
+    blind = ~np.isfinite(directions).all(axis=0)  # pixels without a ray, for example in the corners
     if blind.any():
         directions[:, blind] = -camera.pose.rotation[2][:, None]
     start = camera.pose.centre
-    if camera.orthographic:  # its rays come from behind all of the object
+    if camera.orthographic:  # its rays start in front of the whole object
         rows, columns = np.mgrid[window.top : window.bottom, window.left : window.right]
         pixels = np.stack([columns.ravel() + 0.5, rows.ravel() + 0.5], axis=1)
         start = rays.just_before(camera.ray_starts(pixels), directions.T.astype(np.float64))
@@ -115,20 +115,25 @@ def view_window(rays: RayScene, lines: PixelRays, window: Window) -> SurfaceView
 def _curvature(
     camera: Camera, normal: NDArray[np.float32], place: NDArray[np.int32], shape: tuple[int, int]
 ) -> NDArray[np.float32]:
-    """(n,) screen-space mean curvature at the pixels ``place`` with normals (3, n), scan frame."""
+    """(n,) screen-space mean curvature at the pixels ``place``, from normals (3, n) in the scan
+    frame.
+
+    Rotates the normals to the camera frame and computes the gradient of Ono et al. 2019, equation
+    (5); slope_curvature computes equations (6) and (7).
+    """
     x, y, z = normal
-    turned = camera.pose.rotation.astype(np.float32)
-    facing = -(turned[2, 0] * x + turned[2, 1] * y + turned[2, 2] * z)
+    rotation = camera.pose.rotation.astype(np.float32)
+    facing = -(rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z)
     facing = np.where(facing > 1e-3, facing, np.float32(np.nan))
     slopes = np.full((2, shape[0] * shape[1]), np.nan, np.float32)
     for axis in range(2):
-        slope = turned[axis, 0] * x + turned[axis, 1] * y + turned[axis, 2] * z
+        slope = rotation[axis, 0] * x + rotation[axis, 1] * y + rotation[axis, 2] * z
         slopes[axis, place] = -slope / facing
     return slope_curvature(*slopes.reshape(2, *shape)).ravel().take(place)
 
 
 def _joined(camera: Camera, windows: Sequence[Window], parts: Iterable[SurfaceView]) -> SurfaceView:
-    """One view of a whole photo from the wanted rows of its bands."""
+    """One view of a whole photo, from the wanted rows of its bands."""
     shape = camera.height, camera.width
     silhouette, seen = np.zeros(shape, bool), np.zeros(shape, bool)
     lists: dict[str, list[NDArray]] = {name: [] for name in COLUMNS}

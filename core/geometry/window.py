@@ -1,4 +1,4 @@
-"""Pieces of a photo that are looked at one after the other."""
+"""Windows of a photo that are processed one after the other."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from ..scan import Camera
 from .cover import ROWS
 
-PIXELS = 1 << 19  # of a window: some MB an array, and what its halo costs twice is little
+WINDOW_PIXELS = 1 << 19  # of a window: some MB per array, and the halo is a small part of it
 
 
 class Window(NamedTuple):
-    """Rows top … bottom − 1 and columns left … right − 1 are looked at; rows first … last − 1 are
-    wanted: the others are the halo, which the margins of those need to know."""
+    """Rows top … bottom − 1 and columns left … right − 1 are processed. Rows first … last − 1 are
+    wanted; the others are the halo that neighbourhood operations need."""
 
     top: int
     bottom: int
@@ -32,7 +32,7 @@ class Window(NamedTuple):
 
 
 def whole(camera: Camera) -> Window:
-    """All of a photo."""
+    """The window of a whole photo."""
     return Window(0, camera.height, 0, camera.width, 0, camera.height)
 
 
@@ -40,11 +40,11 @@ def bands(
     camera: Camera,
     halo: int,
     columns: NDArray[np.int32] | None = None,
-    pixels: int = PIXELS,
+    pixels: int = WINDOW_PIXELS,
 ) -> Iterator[Window]:
-    """The rows of a photo in bands of about so many ``pixels`` (never less than four halos high),
-    each with ``halo`` rows more on either side, as far as the photo goes. columns: what
-    Cover.columns says; bands where there is nothing are left out."""
+    """Bands of rows of a photo with about ``pixels`` pixels each (at least four halos high), with
+    ``halo`` more rows on either side within the photo. columns: the result of Cover.columns; bands
+    without a column are omitted."""
     step = max(1, pixels // max(camera.width, 1), 4 * halo)
     for first in range(0, camera.height, step):
         last = min(first + step, camera.height)

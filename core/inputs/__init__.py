@@ -1,1 +1,1 @@
-"""From a capture to checked data: scan, photos, masks and lights."""
+"""Open and check the data of a capture: scan, photos, masks and lights."""

@@ -1,4 +1,4 @@
-"""Oklab: a colour space in which distances are what an eye sees.
+"""Oklab: a perceptually uniform colour space.
 
 Ottosson, "A perceptual color space for image processing" (2020).
 """
@@ -29,6 +29,6 @@ LINEAR = np.where(  # IEC 61966-2-1
 
 
 def oklab(srgb: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """(n, 3) lightness in 0…1, a, b of 8-bit sRGB colours (n, 3)."""
+    """(n, 3) Oklab lightness (0…1), a, b of 8-bit sRGB colours (n, 3)."""
     cones = np.cbrt(LINEAR[srgb] @ TO_CONES.T.astype(np.float32))
     return np.asarray(cones @ TO_LAB.T.astype(np.float32))

@@ -1,4 +1,4 @@
-"""The lit photos of a capture as radiance of one unit, whatever files they come from."""
+"""Read the lit photos of a capture as linear radiance, all in one unit."""
 
 from __future__ import annotations
 
@@ -22,9 +22,12 @@ from ..photo.transfer import Transfer
 
 @dataclass(frozen=True)
 class LitPhoto:
-    """radiance: (h, w, 3) float32 linear, divided by its exposure. usable: (h, w) not clipped, in a
-    bracket not in all of it. variance: (h, w, 3) of a bracket, else None. notes: how its numbers
-    were read, sentences."""
+    """One photo as radiance.
+
+    radiance: (h, w, 3) float32 linear, divided by the exposure. usable: (h, w) not clipped; in a
+    bracket, not clipped in at least one exposure. variance: (h, w, 3) of the radiance, None where
+    it was not estimated. notes: how the pixels were read, sentences.
+    """
 
     radiance: NDArray[np.float32]
     usable: NDArray[np.bool_]
@@ -34,9 +37,12 @@ class LitPhoto:
 
 @dataclass(frozen=True)
 class LitPhotos:
-    """How the photos of a capture are read. chart: the tone curve measured, or None; exposures:
-    one a file of each photo; first: EXIF's exposure that counts as 1, None where EXIF is not used;
-    notes: sentences for the user."""
+    """How the photos of a capture are read.
+
+    chart: tone curve measured from a chart, or None. exposures: for each photo, one per file.
+    first: the EXIF exposure that counts as 1, None where EXIF is not used. notes: sentences for
+    the user.
+    """
 
     capture: Capture
     chart: ChartTone | None
@@ -46,7 +52,8 @@ class LitPhotos:
 
     @classmethod
     def open(cls, capture: Capture) -> LitPhotos:
-        """Measure the chart, read the exposures. Raises InputError."""
+        """Measure the tone curve from the chart, if any, and read the exposures. Raises
+        InputError."""
         chart = _chart(capture)
         exposures, first, notes = _exposures(capture)
         if chart is not None:
@@ -58,7 +65,7 @@ class LitPhotos:
         return self._read(place)
 
     def read_with_noise(self, place: int) -> LitPhoto:
-        """The same with the variance of every pixel, also where it is no bracket."""
+        """The same with the variance of every pixel, also for a single exposure."""
         return self._read(place, noise=True)
 
     def _read(self, place: int, noise: bool = False) -> LitPhoto:
@@ -73,8 +80,8 @@ class LitPhotos:
                     radiance /= np.float32(self.exposures[place][0])
                     if variance is not None:
                         variance /= np.float32(self.exposures[place][0] ** 2)
-                told = () if one.info.levels is None else (one.info.sentence,)
-                return LitPhoto(radiance, ~one.clipped, variance, (*told, *one.info.notes))
+                curve_note = () if one.info.levels is None else (one.info.sentence,)
+                return LitPhoto(radiance, ~one.clipped, variance, (*curve_note, *one.info.notes))
             merged = merge_bracket(
                 [partial(read_photo, file, curve, photo.saturation) for file in photo.files],
                 self.exposures[place],
@@ -82,16 +89,17 @@ class LitPhotos:
             )
         except InputError as error:
             raise self.capture.error(str(error), "photo", place, "file") from error
-        said = (f"{len(photo.files)} exposures merged", *merged.warnings)
-        return LitPhoto(merged.radiance, merged.valid, merged.variance, said)
+        notes = (f"{len(photo.files)} exposures merged.", *merged.warnings)
+        return LitPhoto(merged.radiance, merged.valid, merged.variance, notes)
 
     def read_other(self, file: Path, exposure: float | None = None) -> LitPhoto:
-        """A photo of a sphere or a white target, in the same unit. Raises InputError."""
+        """A photo of a sphere or a white target, in the unit of the lit photos. Raises
+        InputError."""
         own = {photo.transfer for photo in self.capture.photos}
         if len(own) > 1:
             raise InputError(
-                f"the photos have different transfer curves, which is {file.name}'s? Give one for "
-                "all, [tone] transfer"
+                f"the photos have different transfer curves, so the curve of {file.name} is "
+                "unknown; give one curve for all photos with [tone] transfer"
             )
         photo = read_photo(file, self._curve(own.pop()))
         if exposure is None:
@@ -99,23 +107,26 @@ class LitPhotos:
         return LitPhoto(photo.radiance / np.float32(exposure), ~photo.clipped)
 
     def check_comparable(self, file: Path) -> None:
-        """Refuse a photo whose exposure against the lit ones is not known. Raises InputError."""
+        """Check that the exposure of ``file`` relative to the lit photos is known. Raises
+        InputError."""
         if self.first is not None:
             if read_exif(file).relative_exposure is None:
                 raise InputError(
-                    f"{file.name} does not say how it was exposed, the lit photos do: give its "
-                    "exposure relative to the first of them"
+                    f"{file.name} has no exposure in its EXIF, but the lit photos have; give its "
+                    "exposure relative to the first lit photo"
                 )
         elif any(e != 1.0 for photo in self.exposures for e in photo):
-            raise InputError(f"the lit photos' exposures are given: give that of {file.name} too")
+            raise InputError(
+                f"exposure is given for the lit photos but not for {file.name}; give it there too"
+            )
 
     def exposure_of(self, file: Path) -> float:
-        """EXIF's exposure of another photo relative to the first lit one; 1 where it is unknown."""
+        """The EXIF exposure of another photo relative to the first lit one; 1 where unknown."""
         own = None if self.first is None else read_exif(file).relative_exposure
         return 1.0 if own is None or self.first is None else own / self.first
 
     def curve(self, place: int) -> Transfer:
-        """The curve a photo is read with; "auto" is what its file says."""
+        """The transfer curve that a photo is read with; "auto" is the curve its file states."""
         return self._curve(self.capture.photos[place].transfer)
 
     def _curve(self, own: str | None) -> Transfer:
@@ -139,57 +150,58 @@ def _chart(capture: Capture) -> ChartTone | None:
 def _exposures(
     capture: Capture,
 ) -> tuple[tuple[tuple[float, ...], ...], float | None, tuple[str, ...]]:
-    """(exposures of every photo's files, EXIF's exposure that counts as 1, notes).
+    """(exposures of every photo's files, EXIF exposure that counts as 1, notes).
 
-    What the capture file gives is taken as it is. Where it gives none at all, EXIF is asked: the
-    first photo's exposure is 1 and the others are relative to it, so that numbers of the user's (an
-    irradiance) keep the unit of that photo's pixels. The two units do not mix.
+    Exposures in the capture file are used as they are. If the file gives none at all, they come
+    from EXIF: the first photo's exposure is 1 and the others are relative to it, so that given
+    values such as an irradiance keep the unit of that photo's pixels. The two units do not mix.
     """
     given = [photo.exposures is not None for photo in capture.photos]
-    asked = [(i, f) for i, p in enumerate(capture.photos) if not given[i] for f in p.files]
-    told = {file: read_exif(file) for _, file in asked}
-    silent = [(i, f) for i, f in asked if told[f].relative_exposure is None]
-    speaking = len(silent) < len(asked)
-    if speaking and any(given):
+    needed = [(i, f) for i, p in enumerate(capture.photos) if not given[i] for f in p.files]
+    exif = {file: read_exif(file) for _, file in needed}
+    without = [(i, f) for i, f in needed if exif[f].relative_exposure is None]
+    from_exif = len(without) < len(needed)
+    if from_exif and any(given):
         raise capture.error(
-            "the exposure is given here, other photos have EXIF's, which is in another unit: give "
-            "all or none",
+            "exposure is given for this photo, but other photos have only EXIF, which is in "
+            "another unit; give exposure for all photos or for none",
             "photo", given.index(True), "exposure",
         )  # fmt: skip
-    if speaking and silent:
-        place, file = silent[0]
+    if from_exif and without:
+        place, file = without[0]
         raise capture.error(
-            f"{file.name} does not say how it was exposed ({', '.join(told[file].missing)} "
-            "missing), other photos do: give the exposure of all",
+            f"{file.name} has no exposure in its EXIF ({', '.join(exif[file].missing)} missing), "
+            "but other photos have; give exposure for all photos",
             "photo", place, "exposure",
         )  # fmt: skip
-    if not speaking:
+    if not from_exif:
         for place, photo in enumerate(capture.photos):
             if photo.exposures is None and len(photo.files) > 1:
                 raise capture.error(
-                    "these exposures of one viewpoint do not say how they were exposed: give "
-                    "exposure = [...], one a file",
+                    "the files of this bracket have no exposure in their EXIF; give exposure = "
+                    "[...], one number per file",
                     "photo", place, "exposure",
                 )  # fmt: skip
         return tuple(p.exposures or (1.0,) for p in capture.photos), None, ()
-    _check_flash(capture, told)
-    first = told[asked[0][1]].relative_exposure or 1.0
+    _check_flash(capture, exif)
+    first = exif[needed[0][1]].relative_exposure or 1.0
     exposures = tuple(
-        tuple((told[f].relative_exposure or first) / first for f in p.files) for p in capture.photos
+        tuple((exif[f].relative_exposure or first) / first for f in p.files) for p in capture.photos
     )
     differ = len({round(e, 3) for photo in exposures for e in photo}) > 1
-    notes = (f"exposures are EXIF's, relative to {asked[0][1].name}",) if differ else ()
+    notes = (f"Exposures come from EXIF, relative to {needed[0][1].name}.",) if differ else ()
     return exposures, first, notes
 
 
-def _check_flash(capture: Capture, told: dict[Path, Exif]) -> None:
-    """Refuse to divide a flash's light by shutter times: it does not depend on them."""
+def _check_flash(capture: Capture, exif: dict[Path, Exif]) -> None:
+    """Raise InputError where photos with flash have different shutter times: dividing by them would
+    be wrong, because a flash's light does not depend on the shutter time."""
     mounted = {light.name for light in capture.lights if light.mounted is not None}
     places = [i for i, photo in enumerate(capture.photos) if photo.light in mounted]
-    times = {told[file].exposure_time for i in places for file in capture.photos[i].files}
+    times = {exif[file].exposure_time for i in places for file in capture.photos[i].files}
     if len(times) > 1:
         raise capture.error(
-            "these photos' exposure times differ, and a flash's light does not depend on them: "
-            "give exposure for all photos (ISO / f-number² for a flash, 1 where these are equal)",
+            "the exposure times of these photos differ, but a flash's light does not depend on "
+            "them; give exposure for all photos (ISO / f-number², or 1 where these are equal)",
             "photo", places[0], "exposure",
         )  # fmt: skip

@@ -1,4 +1,5 @@
-"""Long work as one object with step(): scripts drain it, Blender steps it on a timer."""
+"""Long computations as Job objects with step(): scripts run them to the end, Blender steps them on
+a timer."""
 
 from ..concurrency.job import Job, Stage, finished
 from .fit_job import CaptureResult, FitJob, MaterialResult

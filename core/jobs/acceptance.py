@@ -1,5 +1,7 @@
-"""Whether a second fit is refused: a model may explain the photos it was fitted to by something
-that is not there, and it then predicts photos that it has not seen worse than without."""
+"""The decision whether a second fit is rejected.
+
+A model can explain the photos that it was fitted to by a cause that is not present. It then
+predicts held-out photos worse than the model without that cause."""
 
 from __future__ import annotations
 
@@ -11,28 +13,29 @@ import numpy as np
 from ..diagnose.selection.diagnosis import Diagnosis
 from ..diagnose.selection.held_out_error import held_out_photo_error
 from ..diagnose.solver.model_fit import ModelFit
-from ..fit.held_out import HeldOut
+from ..fit.held_out import HeldOutErrors
 from .fit_job import MaterialResult
 
-MORE = 0.03  # ln of what errors of unseen photos may grow by
-USELESS = 0.1  # the same of the second fit alone, whatever the causes are worth
+MAX_LOG_GROWTH = 0.03  # ln of the factor by which the errors of held-out photos may grow
+MAX_LOG_GROWTH_OF_FIT = 0.1  # the same for the second fit alone, whatever the joint fit gains
 
 
 @dataclass(frozen=True)
 class Rejection:
-    """words: what speaks against a second fit; of_cause: whether it speaks against what it was rid
-    of, too. Else that is there, but what is known of it does not tell the materials better: under a
-    lamp as wide as a highlight none is seen."""
+    """evidence: a sentence with the evidence against a second fit. of_cause: whether it is evidence
+    against the cause as well. If not, the cause is present, but the correction does not improve the
+    materials: the shape of a highlight cannot be measured under a lamp as wide as the highlight."""
 
-    words: str
+    evidence: str
     of_cause: bool
 
 
 @dataclass(frozen=True)
 class Refit:
-    """A material's second fit. material: None where it could not be fitted; light: of each photo
-    the RMS radiance of its samples, as it shows it, over that of all it shows; warnings: what is to
-    be said; blurred: whether its highlights are still as wide as the photos show them."""
+    """A material's second fit. material: None where it could not be fitted. light: photo → RMS
+    radiance of the lamp's light on its samples divided by the RMS of their whole radiance
+    (CorrectedSamples.light). warnings: sentences. blurred: whether its highlights are still as wide
+    as in the photos."""
 
     material: MaterialResult | None
     light: Mapping[int, float]
@@ -40,52 +43,78 @@ class Refit:
     blurred: bool = False
 
 
-def seen_jointly(found: Diagnosis, fitted: ModelFit) -> float:
-    """ln of what the error of unseen photos grew by where the materials and all causes are fitted
-    together; 0 of one photo. fitted: with the causes that the second fit takes into account."""
+def joint_log_growth(found: Diagnosis, fitted: ModelFit) -> float:
+    """ln of the factor by which the RMS error of held-out photos grows if the materials and all
+    causes are fitted together; 0 if there is only one photo. fitted: with the causes that the
+    second fit takes into account."""
     before = found.error_before.photos
     known = fitted is found.after
     after = found.error_after.photos if known else held_out_photo_error(fitted)
-    return 0.0 if before is None or after is None else grown(before, after)
+    return 0.0 if before is None or after is None else log_growth(before, after)
 
 
-def worse(
+def evidence_against(
     before: Sequence[MaterialResult], after: Sequence[Refit], jointly: float = 0.0
 ) -> Rejection | None:
-    """Where unseen photos are predicted worse than without.
+    """The evidence against second fits that predict held-out photos worse; None: accepted.
 
-    Every photo counts alike, beside itself without the causes: over all photos together, the worst
-    would decide. Both errors are relative to all that a photo shows: in light that a steep curve
-    was taken from, the same error is another part. jointly: the same of the materials and causes
-    fitted together, whose photos are unseen, too: of eight photos, what the materials' own fits say
-    is chance by a few percent.
+    before, after: first and second fits of the materials. Each photo is compared with itself, and
+    all have the same weight; otherwise the photo with the largest error would decide. Both errors
+    are relative to the whole radiance of a photo, because a correction (of a steep tone curve, for
+    example) changes the radiance of its samples. jointly: ln of the growth of the error if
+    materials and causes are fitted together (joint_log_growth); it is added because the errors of
+    the separate fits vary by a few percent by chance if there are only eight photos.
     """
     judged = [
-        by_photo(one.held_out, other.material.held_out, other.light)
+        (one.name, mean_photo_errors(one.held_out, other.material.held_out, other.light))
         for one, other in zip(before, after, strict=True)
         if other.material is not None
         and one.held_out is not None
         and other.material.held_out is not None
     ]
-    errors = [each for each in judged if each is not None]
-    each_grown = [grown(*each) for each in errors]
-    mean = float(np.mean(each_grown)) if each_grown else -np.inf
-    of_cause = mean + jointly > MORE
-    if not of_cause and mean < USELESS:
+    errors = {name: each for name, each in judged if each is not None}
+    growths = [log_growth(*each) for each in errors.values()]
+    mean = float(np.mean(growths)) if growths else -np.inf
+    of_cause = mean + jointly > MAX_LOG_GROWTH
+    if not of_cause and mean < MAX_LOG_GROWTH_OF_FIT:
         return None
-    said = ", ".join(f"{100 * a:.1f} to {100 * b:.1f} %" for a, b in errors)
-    words = (
-        f"with it, unseen photos are predicted worse: a usual one's error goes from {said}, and by "
-        f"{100 * np.expm1(jointly):+.0f} % where materials and causes are fitted at once"
+    return Rejection(_evidence(errors, jointly), of_cause)
+
+
+def _evidence(errors: Mapping[str, tuple[float, float]], jointly: float) -> str:
+    """A sentence on the errors of held-out photos: by material (before, after), and in the joint
+    fit. Each verb is chosen from the numbers as they are printed."""
+    changes = ", ".join(f"{_change(*each)} for {name}" for name, each in errors.items())
+    percent = round(100 * float(np.expm1(jointly)))
+    if not percent:
+        joint = ""
+    else:
+        verb = "increases" if percent > 0 else "decreases"
+        joint = (
+            "; if materials and causes are fitted together, the RMS error over all held-out photos "
+            f"{verb} by {abs(percent)} %"
+        )
+    return (
+        "With this cause, the RMS error of held-out photos (geometric mean over photos) "
+        f"{changes}{joint}."
     )
-    return Rejection(words, of_cause)
 
 
-def by_photo(
-    before: HeldOut, after: HeldOut, light: Mapping[int, float] | None = None
+def _change(before: float, after: float) -> str:
+    """A relative error before and after, in words; small ones with more digits."""
+    digits = 1 if before >= 0.1 else 2
+    first, last = (f"{100 * error:.{digits}f} %" for error in (before, after))
+    if first == last:
+        return f"stays at {first}"
+    return f"{'increases' if after > before else 'decreases'} from {first} to {last}"
+
+
+def mean_photo_errors(
+    before: HeldOutErrors, after: HeldOutErrors, light: Mapping[int, float] | None = None
 ) -> tuple[float, float] | None:
-    """Geometric means of the errors of photos, over all that they show; None where no photo has
-    both. light: Again.light of the second, None: all that they show in both."""
+    """Geometric means over photos of their relative RMS errors (before, after); None where no photo
+    has both. light: Refit.light of the second fit, which makes its errors relative to the whole
+    radiance of the photos; None: they are already."""
     if light is None:
         light = dict.fromkeys(after.per_photo, 1.0)
     photos = sorted(before.per_photo.keys() & after.per_photo.keys() & light.keys())
@@ -96,6 +125,6 @@ def by_photo(
     return float(first), float(second)
 
 
-def grown(before: float, after: float) -> float:
-    """ln of what an error grew by."""
+def log_growth(before: float, after: float) -> float:
+    """ln of the factor by which an error grew."""
     return float(np.log(max(after, 1e-9) / max(before, 1e-9)))

@@ -1,4 +1,4 @@
-"""An effect that a fitted material takes into account."""
+"""An effect for which a fitted material was corrected."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class AppliedEffect:
-    """cause: of the vocabulary; sentence: for an artist; names, units, numbers: (p,) its
-    parameters, with their standard errors."""
+    """cause: its name in the vocabulary of causes. sentence: for the user. names, units, numbers:
+    (p,) of its parameters; errors: (p,) their standard errors."""
 
     cause: str
     sentence: str

@@ -1,4 +1,4 @@
-"""Fit, diagnose, and fit again with what was found."""
+"""Fit, diagnose, and fit again with a correction for the causes that were found."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from collections.abc import Collection, Iterator
 from ..concurrency.background import in_background
 from ..concurrency.job import Job, Step, finished
 from ..diagnose.selection.effect_subset import with_contradicted
-from .diagnose_job import LOOKING, DiagnoseJob
+from .diagnose_job import EXAMINING, DiagnoseJob
 from .fit_job import CaptureResult, FitJob
 from .refit_job import RefitJob
 
-SHARE = 0.85  # of the job, before the second fit
+SHARE = 0.85  # fraction of the job's time before the second fit
 
 
 class CheckJob(Job):
-    """``checked`` is the diagnosis with the fit as it was, ``result`` the fit with what was named
-    in the model, but without the causes ``without``; they are there when the job is done. What the
-    second fit does not bear out is named no more (Found.contradicted). Its
-    materials have portable forms where those of ``fit`` would have."""
+    """Sets ``checked``, the diagnosis with the first fit, and ``result``, the second fit with a
+    correction for the named causes except ``without``. Both are complete when the job is done.
+    Causes that the second fit does not confirm are no longer named (Diagnosis.contradicted). The
+    materials of ``result`` have portable forms if those of ``fit`` would have had them."""
 
     def __init__(self, fit: FitJob, without: Collection[str] = ()) -> None:
         super().__init__()
@@ -28,11 +28,11 @@ class CheckJob(Job):
         self.result: CaptureResult | None = None
 
     def run(self) -> Iterator[Step]:
-        """The diagnosis' steps, then those of the second fit."""
+        """The steps of the diagnosis, then those of the second fit."""
         for step in self.checked.run():
             yield Step(step.stage, SHARE * step.fraction)
         again = RefitJob(self.checked, without=self.without, portable=self.portable)
-        step = Step(LOOKING, SHARE)
+        step = Step(EXAMINING, SHARE)
         for inner in again.run():
             step = Step(inner.stage, SHARE + (1 - SHARE) * inner.fraction)
             yield step

@@ -1,4 +1,4 @@
-"""Fit a capture, then say what its photos show that the model does not."""
+"""Fit a capture, then search for the causes of the remaining residual."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..concurrency.background import steps_in_background
 from ..concurrency.job import Job, Step, finished
 from ..concurrency.steps import relayed
 from ..concurrency.thread_pool import thread_count, thread_pool
-from ..diagnose.effects import made_for
+from ..diagnose.effects import effects_for
 from ..diagnose.forward.diagnosis_context import DiagnosisContext
 from ..diagnose.forward.material_brdfs import MaterialBRDFs
 from ..diagnose.pixels.pixel_selection import select_pixels
@@ -26,14 +26,14 @@ from .fit_job import CaptureResult, FitJob
 
 Result = TypeVar("Result")
 
-UNSAID = 1.0  # degrees: what a scan's normals are off by where the fit does not say it
-SHARE = 0.5  # of the job, the fit
-LOOKING, TRYING = "looking at the photos", "trying what may be wrong"
+DEFAULT_NORMAL_DEVIATION = 1.0  # degrees, of a scan's normals where the fit does not estimate it
+SHARE = 0.5  # fraction of the job's time that the fit takes
+EXAMINING, TESTING = "examining the photos", "testing possible causes"
 
 
 class DiagnoseJob(Job):
-    """``result`` is the fit, ``context`` what was looked at, ``found`` what is wrong with it; they
-    are there when the job is done."""
+    """Sets ``result``, the fit; ``context``, the input of the diagnosis; and
+    ``found``, the diagnosis. All are set when the job is done."""
 
     def __init__(self, fit: FitJob) -> None:
         super().__init__()
@@ -48,29 +48,29 @@ class DiagnoseJob(Job):
         return self.fit.result
 
     def run(self) -> Iterator[Step]:
-        """The fit's steps, then those of the diagnosis."""
+        """The steps of the fit, then those of the diagnosis."""
         for step in self.fit.run():
             yield Step(step.stage, SHARE * step.fraction)
         result = finished(self.fit.result)
         with thread_pool(thread_count(self.fit.threads)) as pool:
             steps = context_of(result, pool)
-            self.context = yield from _stepped(steps, LOOKING, 0.0, 0.1)
-            yield Step(LOOKING, SHARE + 0.1 * (1 - SHARE))
-            self.found = yield from _stepped(self._search(pool), TRYING, 0.1, 1.0)
+            self.context = yield from _stepped(steps, EXAMINING, 0.0, 0.1)
+            yield Step(EXAMINING, SHARE + 0.1 * (1 - SHARE))
+            self.found = yield from _stepped(self._search(pool), TESTING, 0.1, 1.0)
 
     def _search(self, pool: ThreadPoolExecutor | None) -> Generator[float, None, Diagnosis]:
         result, context = finished(self.result), finished(self.context)
         deviation = expected_deviation(
             context.pixels, context.brdfs, np.radians(normal_deviation(result))
         )
-        model, effects = Model(context.pixels, context.brdfs), made_for(context)
+        model, effects = Model(context.pixels, context.brdfs), effects_for(context)
         return (yield from search(model, deviation, effects, context, pool))
 
 
 def context_of(
     result: CaptureResult, pool: ThreadPoolExecutor | None = None
 ) -> Generator[float, None, DiagnosisContext]:
-    """What a diagnosis looks at; yields the fraction done."""
+    """The input of a diagnosis; yields the fraction done. Raises what select_pixels raises."""
     capture = result.capture
     brdfs = MaterialBRDFs.of([m.fit.brdf for m in result.materials])
     rays = result.rays.close()
@@ -98,15 +98,18 @@ def context_of(
 
 
 def normal_deviation(result: CaptureResult) -> float:
-    """Degrees along each tangent that the scan's normals are off by, of the worst material."""
-    said = [m.fit.normal_deviation for m in result.materials if isinstance(m.fit, MeasuredResult)]
-    return max(said, default=UNSAID)
+    """Degrees along each tangent: standard deviation of the scan's normals, largest of all
+    materials."""
+    estimated = [
+        m.fit.normal_deviation for m in result.materials if isinstance(m.fit, MeasuredResult)
+    ]
+    return max(estimated, default=DEFAULT_NORMAL_DEVIATION)
 
 
 def _stepped(
     steps: Generator[float, None, Result], stage: str, begin: float, end: float
 ) -> Generator[Step, None, Result]:
-    """Steps of a part of the diagnosis."""
+    """Steps of one part of the diagnosis, which spans ``begin`` to ``end`` of its time."""
     span = (1 - SHARE) * (end - begin)
     return relayed(
         steps_in_background(steps),

@@ -1,4 +1,4 @@
-"""One material's samples → what its fit found, by either method, in steps."""
+"""Fit one material to its samples, by the measured or the paper's method, in steps."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from ..capture import Capture
 from ..concurrency.background import in_background, steps_in_background
 from ..fit import PaperFit, fit_paper
 from ..fit.held_out import (
-    HeldOut,
+    HeldOutErrors,
     Judge,
-    leave_out,
+    fit_without_photo,
     photos_to_hold_out,
-    predicted,
+    prediction_errors,
     summarise,
 )
 from ..fit.measured.estimate import measured_steps
@@ -26,11 +26,11 @@ from ..samples import SampleTable
 
 @dataclass(frozen=True)
 class Estimate:
-    """By either method. held_out: None where nothing was held out. notes: what the holding out
-    itself ran into."""
+    """A fit with its quality measures, of either method. held_out: errors on held-out photos, None
+    where no photo was held out. notes: photos that could not be held out, sentences."""
 
     fit: PaperFit | MeasuredResult
-    held_out: HeldOut | None
+    held_out: HeldOutErrors | None
     spread: Spread
     notes: tuple[str, ...] = ()
 
@@ -41,10 +41,13 @@ Steps = Generator[tuple[str, float], None, Estimate]
 def estimate(
     table: SampleTable, basis: Basis, capture: Capture, name: str, judge: Judge | None = None
 ) -> Steps:
-    """By the capture's method; yields (what comes next, fraction done). judge: how photos that are
-    held out are predicted, None: as the table's samples are. Raises FitError."""
+    """Fit by the capture's method; yields (name of the next stage, fraction done).
+
+    judge: predicts a held-out photo and measures the error (None: from the samples in ``table``).
+    Raises FitError.
+    """
     if judge is None:
-        judge = partial(predicted, table)
+        judge = partial(prediction_errors, table)
     if capture.fit.method == "paper":
         return _paper(table, basis, capture, name, judge)
     return _measured(table, basis, capture, name, judge)
@@ -58,15 +61,15 @@ def _measured(table: SampleTable, basis: Basis, capture: Capture, name: str, jud
         except StopIteration as end:
             fit = end.value
             break
-    unseen = photos_to_hold_out(table) if capture.fit.held_out else []
+    held_out = photos_to_hold_out(table) if capture.fit.held_out else []
     parts = []
-    for done, photo in enumerate(unseen):
-        at = f"predicting unseen photos of {name}", 0.85 + 0.1 * done / len(unseen)
+    for done, photo in enumerate(held_out):
+        at = f"predicting held-out photos of {name}", 0.85 + 0.1 * done / len(held_out)
         yield at
-        other = fit.without.pop(photo, None)  # let go: once evaluated each is a megabyte
+        other = fit.without.pop(photo, None)  # frees it: once evaluated, each takes a megabyte
         if other is not None:
             parts.append((yield from in_background(partial(judge, photo, other), at)))
-    yield f"how sure {name} is", 0.95
+    yield f"estimating the uncertainty of {name}", 0.95
     kept = MeasuredResult.of(fit)
     return Estimate(kept, summarise(parts), kept.band.spread())
 
@@ -77,15 +80,17 @@ def _paper(table: SampleTable, basis: Basis, capture: Capture, name: str, judge:
     fit = yield from in_background(
         lambda: fit_paper(table, basis, settings), (f"fitting {name}", 0.0)
     )
-    unseen = photos_to_hold_out(table) if capture.fit.held_out else []
+    held_out = photos_to_hold_out(table) if capture.fit.held_out else []
     parts = []
-    for done, photo in enumerate(unseen):
-        yield f"predicting unseen photos of {name}", 0.4 + 0.6 * done / len(unseen)
-        parts.append(leave_out(table, photo, basis, settings, judge))
-    lost = [capture.photo_name(p) for p, part in zip(unseen, parts, strict=True) if part is None]
+    for done, photo in enumerate(held_out):
+        yield f"predicting held-out photos of {name}", 0.4 + 0.6 * done / len(held_out)
+        parts.append(fit_without_photo(table, photo, basis, settings, judge))
+    lost = [capture.photo_name(p) for p, part in zip(held_out, parts, strict=True) if part is None]
     return Estimate(
         fit=fit,
         held_out=summarise([part for part in parts if part is not None]),
         spread=candidate_spread(basis, fit.candidates),
-        notes=(f"without {', '.join(lost)} too little is left to fit",) if lost else (),
+        notes=(f"Not held out: {', '.join(lost)}. Without it, too few samples are left for a fit.",)
+        if lost
+        else (),
     )

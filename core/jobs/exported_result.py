@@ -1,4 +1,4 @@
-"""A fit in memory as the type that exports read from disk."""
+"""Convert a fit in memory to the type that exporters read from disk."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from .fit_job import CaptureResult, MaterialResult
 
 
 def exported_result(result: CaptureResult, file: Path, program: str) -> FittedResult:
-    """The same as reading ``file``, the result.json of ``result``, written by a version
-    ``program``. The materials must have their portable forms."""
+    """The FittedResult that reading ``file``, the result.json of ``result``, would give.
+
+    program: version of Patina that wrote it. The materials must have their portable forms.
+    """
     return FittedResult(
         file=file,
         program=program,

@@ -1,4 +1,4 @@
-"""Capture → scan, photos, samples → a BRDF per material."""
+"""The fit of a capture: read scan and photos, take samples, fit one BRDF per material."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ from ..concurrency.job import Job, Step, finished
 from ..concurrency.steps import relayed
 from ..errors import FitError
 from ..fit import PaperFit
-from ..fit.held_out import HeldOut, Judge
+from ..fit.held_out import HeldOutErrors, Judge
 from ..fit.measured_result import MeasuredResult
 from ..fit.spread import Spread
 from ..geometry import RayScene
 from ..inputs import capture_data
 from ..inputs.lights import Lights, find_lights, refined
+from ..inputs.material_pixels import face_attribute
 from ..inputs.photos import LitPhotos
 from ..samples import MeasuredPoints, SampleSink, SampleTable
 from ..samples.face_votes import FaceVotes
@@ -31,20 +32,22 @@ from ..samples.level import at_typical_level
 from ..scan import Scan
 from .applied_effects import AppliedEffect
 from .estimators import Estimate, estimate
-from .fit_warnings import black_photos, material_warnings, trust_warnings
+from .fit_warnings import black_photo_warnings, material_warnings, quality_warnings
 from .portable_materials import Portable, fit_portable
-from .sampling import Taken, take_samples
+from .sampling import PhotoSamples, take_samples
 
-LEAST_RHO, LARGEST_RHO = 1e-6, 1e4  # 1/sr: black velvet has 1e-3, mirrors' peaks 1e4
+MIN_RHO, MAX_RHO = 1e-6, 1e4  # 1/sr: black velvet has 1e-3, peaks of mirrors 1e4
 
 
 @dataclass(frozen=True)
 class MaterialResult:
-    """One fitted material. fit: by the capture's method; samples: number taken from the photos;
-    used: those that the fit was given, all unless there are too many; per_photo: taken of every
-    photo; points: some of them, for charts; scale: what the photos' reflectance was multiplied by,
-    1 where the irradiance is known.
-    portable: as others show it, None until somebody asks.
+    """One fitted material.
+
+    fit: by the method that the capture selects. samples: number of samples taken from the photos;
+    used: number of samples that the fit used (all, unless there are too many); per_photo: samples
+    taken from each photo; points: a subset of them, for charts. scale: factor applied to the
+    reflectance, 1 where the irradiance is known. portable: the material as other renderers show
+    it, None until it is computed. warnings: sentences for the user.
     """
 
     name: str
@@ -53,7 +56,7 @@ class MaterialResult:
     used: int
     per_photo: tuple[int, ...]
     points: MeasuredPoints
-    held_out: HeldOut | None
+    held_out: HeldOutErrors | None
     spread: Spread
     portable: Portable | None
     scale: float
@@ -62,20 +65,23 @@ class MaterialResult:
 
     @property
     def principled(self) -> PrincipledFit:
-        """The Principled BSDF nearest to it."""
+        """The Principled BSDF that approximates the BRDF best."""
         return finished(self.portable).principled
 
     @property
     def lobes(self) -> LobeStackFit:
-        """The stack of lobes nearest to it."""
+        """The stack of lobes that approximates the BRDF best."""
         return finished(self.portable).lobes
 
 
 @dataclass(frozen=True)
 class CaptureResult:
-    """Everything a fit found. face_material: (f,) int, place of each face's material; notes: what
-    was read, assumed and left out, a sentence each; effects: that a diagnosis named, and that the
-    materials take into account."""
+    """Everything that a fit found.
+
+    face_material: (f,) int, index into ``materials`` for each face. notes: what was read, assumed
+    and left out, one sentence each. effects: causes found by a diagnosis that the materials take
+    into account.
+    """
 
     capture: Capture
     scan: Scan
@@ -92,30 +98,36 @@ class CaptureResult:
 def with_portable(
     material: MaterialResult, start: float, threads: int | None
 ) -> Generator[Step, None, MaterialResult]:
-    """With its portable form, unless it has it, ``start`` of the job done."""
+    """The material with its portable form, computed if it is missing.
+
+    start: fraction of the job that is done before this step. threads: None for one per core.
+    """
     if material.portable is not None:
         return material
     found = yield from fit_portable(material.fit.brdf, material.name, start, threads)
     warnings = material.warnings
     if found.principled.clipped:
-        warnings += ("brighter than any base colour: the Principled material is too dark",)
+        warnings += (
+            "The material is brighter than any base colour can be. Its Principled BSDF is too "
+            "dark.",
+        )
     return replace(material, portable=found, warnings=warnings)
 
 
-def _way(entry: LightEntry) -> str:
-    """The key that says where a light is."""
-    ways = ("sphere", "sun", "position", "mounted")
-    return next((way for way in ways if getattr(entry, way) is not None), "direction")
+def _location_key(entry: LightEntry) -> str:
+    """The key of a [[light]] table that gives the light's direction or position."""
+    keys = ("sphere", "sun", "position", "mounted")
+    return next((key for key in keys if getattr(entry, key) is not None), "direction")
 
 
 class FitJob(Job):
-    """Fit every material of a capture; ``result`` is there when the job is done.
+    """Fit every material of a capture; ``result`` is set when the job is done.
 
-    basis: to fit in, or how to come by it, beside the job (None: the embedded one). prepare: what
-    is done to the scan once it is read (face attributes that no file has). threads: how many look
-    at the photos (None: one a core); the result does not depend on it. keep: whether ``samples``
-    holds those that each material was fitted to, by its name. portable: whether the materials'
-    portable forms are fitted too.
+    basis: the basis of the fit, or a function that returns it and runs in the background (None:
+    the embedded basis). prepare: called with the scan after it is read, to add face attributes
+    that no file has. threads: number of threads that sample the photos (None: one per core); the
+    result does not depend on it. keep: whether ``samples`` keeps the samples that each material
+    was fitted to, by material name. portable: whether to fit the portable forms too.
     """
 
     def __init__(
@@ -138,7 +150,7 @@ class FitJob(Job):
         self.result: CaptureResult | None = None
 
     def run(self) -> Iterator[Step]:
-        """Scan, photos, then one material after the other."""
+        """Read the scan and the photos, then fit one material after the other."""
         capture = self.capture
         yield Step("reading the scan", 0.0)
         if isinstance(self.basis, Basis) or self.basis is None:
@@ -170,7 +182,7 @@ class FitJob(Job):
         known = lights.known and capture.fit.absolute
         for index in range(len(capture.materials)):
             results.append((yield from self._fit_material(index, taken, basis, known)))
-        yield Step("materials on the mesh", 0.97)
+        yield Step("assigning materials to the mesh", 0.97)
         self.result = CaptureResult(
             capture=capture,
             scan=scan,
@@ -178,7 +190,7 @@ class FitJob(Job):
             lights=lights,
             notes=(
                 *scan.notes,
-                *(f"{n} photo{'s' * (n > 1)}: {said}" for said, n in taken.notes.items()),
+                *(f"{n} photo{'s' * (n > 1)}: {note}" for note, n in taken.notes.items()),
                 *photos.notes,
                 *lights.notes,
                 *capture_data.unused_settings(capture),
@@ -192,8 +204,8 @@ class FitJob(Job):
 
     def _take_samples(
         self, scan: Scan, rays: RayScene, photos: LitPhotos, lights: Lights
-    ) -> Generator[Step, None, Taken]:
-        """Step through the photos; every material's sinks get its samples as they come."""
+    ) -> Generator[Step, None, PhotoSamples]:
+        """Sample all photos; each material's samples go to its sinks as they are taken."""
         sinks = {material.name: self.sinks(material.name) for material in self.capture.materials}
         taken = yield from relayed(
             take_samples(self.capture, scan, rays, photos, lights, sinks, self.threads),
@@ -202,16 +214,17 @@ class FitJob(Job):
         self._check_light(taken)
         return taken
 
-    def given(self, index: int, table: SampleTable) -> SampleTable:
-        """What the fit of a material is given of its samples."""
+    def samples_to_fit(self, index: int, table: SampleTable) -> SampleTable:
+        """The samples that a material is fitted to, from all of its samples. Subclasses override
+        it."""
         return table
 
     def sinks(self, material: str) -> Sequence[SampleSink]:
-        """Who wants all samples of a material, beside the reservoir that the paper's fit reads."""
+        """The sinks that get all samples of a material, in addition to the reservoir."""
         return ()
 
     def _fit_material(
-        self, index: int, taken: Taken, basis: Basis, known: bool
+        self, index: int, taken: PhotoSamples, basis: Basis, known: bool
     ) -> Generator[Step, None, MaterialResult]:
         capture = self.capture
         name = capture.materials[index].name
@@ -230,7 +243,7 @@ class FitJob(Job):
             yield from self._material(index, table, basis, (known, scale), counts, start, share)
         )
 
-    def fitted_again(
+    def fit_again(
         self,
         index: int,
         table: SampleTable,
@@ -239,8 +252,12 @@ class FitJob(Job):
         share: float,
         judge: Judge | None = None,
     ) -> Generator[Step, None, MaterialResult]:
-        """A material from other samples, in the unit of those it was fitted to before. judge: how
-        photos that are held out are predicted, None: as the samples are."""
+        """Fit a material again to other samples, in the same unit as before.
+
+        index: of the material; before: its result so far. start, share: the part of the job that
+        this takes. judge: predicts a held-out photo and measures the error (None: from
+        ``table``).
+        """
         basis, counts = finished(self.result).basis, np.array(before.per_photo)
         unit = before.irradiance_known, before.scale
         return (yield from self._material(index, table, basis, unit, counts, start, share, judge))
@@ -256,14 +273,14 @@ class FitJob(Job):
         share: float,
         judge: Judge | None = None,
     ) -> Generator[Step, None, MaterialResult]:
-        """unit: whether irradiance is known, and the samples' scale; counts: taken of every
-        photo."""
+        """Fit one material. unit: (whether the irradiance is known, scale of the samples); counts:
+        (photos,) samples taken from each photo."""
         capture, name = self.capture, self.capture.materials[index].name
         known, scale = unit
         found = yield from self._estimate(index, table, basis, start, 0.8 * share, judge)
         warnings = material_warnings(table, found.fit, known)
-        warnings += trust_warnings(found, capture)
-        warnings += black_photos(table, capture) + found.notes
+        warnings += quality_warnings(found, capture)
+        warnings += black_photo_warnings(table, capture) + found.notes
         material = MaterialResult(
             name=name,
             fit=found.fit,
@@ -291,12 +308,12 @@ class FitJob(Job):
         share: float,
         judge: Judge | None = None,
     ) -> Generator[Step, None, Estimate]:
-        """The fit itself, which takes the part ``share`` of the job from ``start`` on."""
+        """Run the estimator; it takes the fraction ``share`` of the job from ``start`` on."""
         name = self.capture.materials[index].name
-        given = yield from in_background(
-            lambda: self.given(index, table), Step(f"fitting {name}", start)
+        samples_to_fit = yield from in_background(
+            lambda: self.samples_to_fit(index, table), Step(f"fitting {name}", start)
         )
-        steps = estimate(given, basis, self.capture, name, judge)
+        steps = estimate(samples_to_fit, basis, self.capture, name, judge)
         while True:
             try:
                 stage, done = next(steps)
@@ -308,55 +325,61 @@ class FitJob(Job):
             yield Step(stage, start + share * done)
 
     def _face_material(self, scan: Scan, votes: FaceVotes) -> NDArray[np.int32]:
-        """What masks say, and over it what the mesh says where a material is given by its faces."""
+        """(f,) material of each face: by votes of the masked pixels; face attributes override."""
         found = votes.winners(scan.mesh)
         for index, material in enumerate(self.capture.materials):
-            attribute = capture_data.face_attribute(material)
+            attribute = face_attribute(material)
             if attribute is not None:
                 found[scan.mesh.face_attributes[attribute] == index] = index
         return found
 
-    def _check_light(self, taken: Taken) -> None:
+    def _check_light(self, taken: PhotoSamples) -> None:
         seen_by, lit_by = (Counter[str](), Counter[str]())
         for place, photo in enumerate(self.capture.photos):
             seen_by[photo.light] += int(taken.seen[place])
             lit_by[photo.light] += int(taken.lit[place])
         if not any(seen_by.values()):
-            raise self.capture.error("no lit photo shows any of the mesh", "scan", "mesh")
+            raise self.capture.error(
+                "no lit photo shows any part of the mesh; check that mesh and cameras belong "
+                "together",
+                "scan",
+                "mesh",
+            )
         for place, light in enumerate(self.capture.lights):
             if seen_by[light.name] and lit_by[light.name] == 0:
                 raise self.capture.error(
-                    f"the light {light.name!r} stands behind everything its photos see: no pixel "
-                    "is lit; "
+                    f"the light {light.name!r} is behind every surface that its photos show: no "
+                    "pixel is lit; "
                     + (
-                        "direction points from the surface TO the light, in the scan's frame"
+                        "expected a direction from the surface TO the light, in the scan's frame"
                         if light.distant
-                        else "expected its place outside the object, in scan units"
+                        else "expected a position outside the object, in scan units"
                     ),
-                    "light", place, _way(light),
+                    "light", place, _location_key(light),
                 )  # fmt: skip
 
     def _check_samples(self, index: int, table: SampleTable, marked: int, known: bool) -> None:
         name = self.capture.materials[index].name
         if len(table):
             level = float(np.median(table.rho.mean(axis=1)))
-            if level <= 0 or (known and not LEAST_RHO < level < LARGEST_RHO):
+            if level <= 0 or (known and not MIN_RHO < level < MAX_RHO):
                 raise self.capture.error(
-                    f"the typical reflectance of {name!r} is {level:.3g} / sr, which no surface "
-                    "has: check that light directions point from the surface TO the light, that "
-                    "the photos are linear and not black, exposure and irradiance",
+                    f"the median BRDF of {name!r} is {level:.3g} 1/sr, which no real surface has; "
+                    "check that light directions point from the surface TO the light, that the "
+                    "photos are linear and not black, and check exposure and irradiance",
                     *self._entry(index),
                 )
             return
         painted = self.capture.named_by_masks(name)
         found = (
-            f"all pixels are masked out: no mask marks any surface as {name!r}"
+            f"all pixels are masked out: no mask marks any part of the mesh as {name!r}"
             if painted and marked == 0
             else f"none of the {marked} pixels of {name!r} is lit and away from shadow edges"
         )
         raise self.capture.error(found, *self._entry(index))
 
     def _entry(self, index: int) -> tuple[str | int, ...]:
-        """The key to speak of a material: its own, or the photos' where the file names none."""
+        """The key that errors about a material name: its own, or the first photo's file where the
+        capture has no [[material]] table."""
         own = ("material", index, "name")
         return own if own in self.capture.lines else ("photo", 0, "file")

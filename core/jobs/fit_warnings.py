@@ -1,4 +1,4 @@
-"""What a user should know about a material before trusting it, in sentences."""
+"""Warnings about a fitted material, in sentences for the user."""
 
 from __future__ import annotations
 
@@ -8,114 +8,131 @@ from ..appearance.energy import directional_albedo
 from ..basis import PrincipalBRDF
 from ..capture import Capture
 from ..fit import PaperFit
-from ..fit.measured_result import NINETY, MeasuredResult
+from ..fit.measured_result import NINETY_PERCENT, MeasuredResult
 from ..samples import SampleTable
 from .estimators import Estimate
 
-FEW_AT_PEAK = 200  # samples within 5° of the half vector
-POOR = 0.2  # typical held-out error, and spread of the trials, that deserve a word
-ODD_PHOTO = 5.0  # times the median held-out error of the photos
-ODD_GAIN = 0.1  # of a photo against the others
-BAD_NORMALS = 5.0  # degrees along each tangent
-VIEWS = (0.0, 20.0, 40.0, 60.0, 70.0, 80.0)  # degrees from the normal
-TOO_MUCH = 1.01  # of the light that falls on a surface: within the quadrature's error
-BLACK, TOO_MANY_BLACK = 0.002, 0.1  # of the bright end; fraction of a photo's samples
+MIN_PEAK_SAMPLES = 200  # samples with the half vector within 5° of the normal
+MAX_TYPICAL_ERROR = 0.2  # limit of the held-out error and of the uncertainty, relative
+ODD_PHOTO_RATIO = 5.0  # held-out error of a photo over the median of all photos
+ODD_GAIN = 0.1  # relative brightness of a photo against the others
+MAX_NORMAL_ERROR = 5.0  # degrees along each tangent
+VIEW_ANGLES = (0.0, 20.0, 40.0, 60.0, 70.0, 80.0)  # degrees from the normal
+MAX_ALBEDO = 1.01  # reflected over incident light: 1 plus the error of the quadrature
+BLACK_LEVEL, MAX_BLACK_SHARE = 0.002, 0.1  # of a photo's 95th percentile; of its samples
 
 
 def material_warnings(
     table: SampleTable, fit: PaperFit | MeasuredResult, irradiance_known: bool
 ) -> tuple[str, ...]:
-    """What an artist should know about this material before trusting it."""
+    """Warnings about the samples and the BRDF of one material, one sentence or more each.
+
+    table: the samples that the material was fitted to; irradiance_known: False where the BRDF is
+    known only up to one scale factor.
+    """
     found = list(fit.warnings)
     peak = table.read & (table.theta_h < np.radians(5))
     near_peak = round(float(table.weight[peak].sum(dtype=np.float64)))
-    if near_peak < FEW_AT_PEAK:
+    if near_peak < MIN_PEAK_SAMPLES:
         found.append(
-            f"only {near_peak} samples lie within 5° of the highlight: its height is a guess; "
-            "add a photo that shows the highlight"
+            f"The number of samples within 5° of the highlight's peak is only {near_peak}. The "
+            "height of the highlight is uncertain. Add a photo that shows the highlight."
         )
     far = float(np.percentile(table.theta_d, 98)) if len(table) else 0.0
     if far < np.radians(50):
         found.append(
-            f"no photo has the light more than {2 * np.degrees(far):.0f}° from the camera: "
-            "grazing reflection comes from the basis, not from this object"
+            "The angle between light and camera is less than "
+            f"{2 * np.degrees(far):.0f}° for 98 % of the samples. Reflectance at grazing angles "
+            "comes from the basis, not from this object. Add photos with the light farther from "
+            "the camera."
         )
     if irradiance_known:
-        found += _too_much_light(fit.brdf)
+        found += _energy_warnings(fit.brdf)
     else:
-        found.append("irradiance unknown: the BRDF is known up to one scale")
+        found.append(
+            "The irradiance of the lights is unknown, so the BRDF is known only up to one scale "
+            "factor. To get absolute values, add a white target or give the irradiance."
+        )
     return tuple(found)
 
 
-def _too_much_light(brdf: PrincipalBRDF) -> list[str]:
-    albedo = directional_albedo(brdf.evaluate, np.radians(VIEWS)).max(axis=1)
-    most = int(albedo.argmax())
-    if albedo[most] <= TOO_MUCH:
+def _energy_warnings(brdf: PrincipalBRDF) -> list[str]:
+    """A warning where the BRDF reflects more light than it receives (directional albedo > 1)."""
+    albedo = directional_albedo(brdf.evaluate, np.radians(VIEW_ANGLES)).max(axis=1)
+    worst = int(albedo.argmax())
+    if albedo[worst] <= MAX_ALBEDO:
         return []
     return [
-        f"seen from {VIEWS[most]:.0f}° it reflects {100 * albedo[most]:.0f} % of the light that "
-        "falls on it; its material in Cycles is held to 100 %: check the irradiance of the lights"
+        f"Seen from {VIEW_ANGLES[worst]:.0f}° to the normal, the material reflects "
+        f"{100 * albedo[worst]:.0f} % of the incident light. Its material in Cycles is limited to "
+        "100 %. Check the irradiance of the lights."
     ]
 
 
-def trust_warnings(found: Estimate, capture: Capture) -> tuple[str, ...]:
-    """Where the fit itself says that it is poor, or that one photo does not belong."""
-    held, spread, said = found.held_out, found.spread, []
-    if held is not None and held.typical > POOR:
-        said.append(
-            "poor: the typical pixel of a photo it has not seen is off by "
-            f"{100 * held.typical:.0f} %"
+def quality_warnings(found: Estimate, capture: Capture) -> tuple[str, ...]:
+    """Warnings from the quality measures of the fit: held-out error, uncertainty, and photos that
+    do not agree with the others."""
+    held, spread, warnings = found.held_out, found.spread, []
+    if held is not None and held.typical > MAX_TYPICAL_ERROR:
+        warnings.append(
+            "Large error: the typical pixel of a held-out photo is off by "
+            f"{100 * held.typical:.0f} %. Run Check to find the cause."
         )
     if isinstance(found.fit, MeasuredResult):
-        said += _doubts(found.fit, spread.median, capture)
-    elif spread.median > POOR:
-        said.append(
-            f"unstable: other random pixels give another material (± {100 * spread.median:.0f} %)"
+        warnings += _measured_warnings(found.fit, spread.median, capture)
+    elif spread.median > MAX_TYPICAL_ERROR:
+        warnings.append(
+            "Unstable: trials with other random pixels give a different material "
+            f"(± {100 * spread.median:.0f} %). Add photos from more angles."
         )
     if held is not None and len(held.per_photo) > 2:
-        usual = float(np.median(list(held.per_photo.values())))
-        said += [
-            f"{capture.photo_name(photo)} is predicted {error / usual:.0f} times worse than the "
-            "others: check its camera, light and exposure, or it shows an angle that they do not"
+        median = float(np.median(list(held.per_photo.values())))
+        warnings += [
+            f"The held-out error of {capture.photo_name(photo)} is {error / median:.0f} times the "
+            "median of all photos. Check its camera, light and exposure. If they are right, it "
+            "shows angles that no other photo shows."
             for photo, error in held.per_photo.items()
-            if error > ODD_PHOTO * usual
+            if error > ODD_PHOTO_RATIO * median
         ]
-    return tuple(said)
+    return tuple(warnings)
 
 
-def _doubts(fit: MeasuredResult, deviation: float, capture: Capture) -> list[str]:
-    """What the measured fit knows of its own input."""
-    said = [
+def _measured_warnings(fit: MeasuredResult, std: float, capture: Capture) -> list[str]:
+    """Warnings of the measured method. std: median standard deviation of ln ρ."""
+    warnings = [
         f"{capture.photo_name(photo)} is {abs(100 * (gain - 1)):.0f} % "
-        f"{'brighter' if gain > 1 else 'darker'} than the other photos say: check its exposure "
-        "and its light's irradiance"
-        for photo, gain in fit.odd_gains(ODD_GAIN).items()
+        f"{'brighter' if gain > 1 else 'darker'} than the other photos predict. Check its exposure "
+        "and the irradiance of its light."
+        for photo, gain in fit.gains_beyond(ODD_GAIN).items()
     ]
-    if fit.normal_deviation > BAD_NORMALS:
-        said.append(
-            f"the mesh's normals are off by {fit.normal_deviation:.0f}°: check that mesh and "
-            "cameras belong together, or make a finer mesh"
+    if fit.normal_deviation > MAX_NORMAL_ERROR:
+        warnings.append(
+            f"The mesh's normals are off by about {fit.normal_deviation:.0f}° along each tangent. "
+            "Check that mesh and cameras belong together, or use a finer mesh."
         )
-    if deviation > POOR:
-        off = 100 * np.expm1(NINETY * deviation)
-        said.append(
-            f"unsure: in half of all directions the reflectance may be off by more than {off:.0f} "
-            "% (90 % interval); photos under more angles would tell"
+    if std > MAX_TYPICAL_ERROR:
+        off = 100 * np.expm1(NINETY_PERCENT * std)
+        warnings.append(
+            "Uncertain: in half of all directions the reflectance may be off by more than "
+            f"{off:.0f} % (90 % interval). Add photos from more angles."
         )
-    return said
+    return warnings
 
 
-def black_photos(table: SampleTable, capture: Capture) -> tuple[str, ...]:
-    """Photos where much of what should be lit is black: they show something else."""
+def black_photo_warnings(table: SampleTable, capture: Capture) -> tuple[str, ...]:
+    """A warning for each photo in which many samples are black although the light reaches them.
+
+    The usual cause is a wrong camera or a wrong light.
+    """
     found = []
     level = table.radiance.mean(axis=1)
     for photo in np.unique(table.photo).tolist():
         which = table.photo == photo
         own, weight = level[which], table.weight[which].astype(np.float64)
-        dark = own < BLACK * np.percentile(own, 95)
-        if weight[dark].sum() > TOO_MANY_BLACK * weight.sum():
+        dark = own < BLACK_LEVEL * np.percentile(own, 95)
+        if weight[dark].sum() > MAX_BLACK_SHARE * weight.sum():
             found.append(
-                f"{capture.photo_name(photo)} is black where its light should reach: is this the "
-                "camera it was taken with, and this its light?"
+                f"{capture.photo_name(photo)} is black in places that its light should reach. "
+                "Check that the photo has the right camera and the right light."
             )
     return tuple(found)

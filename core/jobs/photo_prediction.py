@@ -1,4 +1,4 @@
-"""What a fit predicts of the photos of a capture, which may be photos it was not fitted to."""
+"""Predict the photos of a capture from a fit, including photos that it was not fitted to."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ BAND_PIXELS = 1 << 17  # of a photo at a time: some tens of MB
 class PhotoPrediction:
     """The prediction of one photo of h × w pixels.
 
-    place: of the photo in its capture, from 0; name: its file. radiance: (h, w, 3) predicted
-    linear radiance in the unit of the fitted photos (pixel value / exposure), 0 in shadow, NaN
-    where no surface is seen. encoded: (h, w, 3) the same in the photo's own encoding, measured:
-    (h, w, 3) the photo in that encoding, both with Rec.709 primaries and 0..1 for integer formats.
-    compared: (h, w) the pixels that the errors are of: those that see the mesh, are not beside
-    outlines and not in the mask "ignore".
+    place: index of the photo in its capture, from 0; name: its file. radiance: (h, w, 3)
+    predicted linear radiance in the unit of the fitted photos (pixel value / exposure), 0 in
+    shadow, NaN where no surface is seen. encoded: (h, w, 3) the same in the photo's own encoding;
+    measured: (h, w, 3) the photo in that encoding; both with Rec.709 primaries, 0..1 for integer
+    formats. compared: (h, w) pixels that ``errors`` are computed from: they see the mesh, are not
+    near an outline and not in the mask "ignore".
     """
 
     place: int
@@ -49,7 +49,7 @@ class PhotoPrediction:
 
 @dataclass(frozen=True)
 class PredictionInputs:
-    """What the photos of a capture are predicted with; see ``prediction_inputs``."""
+    """Everything that the prediction of a capture's photos needs; see ``prediction_inputs``."""
 
     capture: Capture
     fitted: CaptureResult
@@ -60,25 +60,26 @@ class PredictionInputs:
 
 
 def prediction_inputs(capture: Capture, fitted: CaptureResult) -> PredictionInputs:
-    """Open a capture for prediction. Nothing is estimated from its photos: lights that the fit
-    knows by the same entry are the fit's, also those that it refined; other lights are where their
-    entries say. Raises InputError where the capture has another mesh, or light or exposures whose
-    unit is not that of the fit.
+    """Open a capture for prediction. Nothing is estimated from its photos.
+
+    A light with the same entry as in the fitted capture is taken from the fit, with any refinement;
+    other lights follow from their own entries. Raises InputError where the capture has another
+    mesh, or where its lights or exposures are not in the unit of the fit.
     """
     if capture is fitted.capture:
         return PredictionInputs(
             capture, fitted, fitted.scan, fitted.rays, fitted.photos, fitted.lights
         )
     scan, rays = fitted.scan, fitted.rays
-    if not same(capture.scan, fitted.capture.scan):
+    if not entries_equal(capture.scan, fitted.capture.scan):
         scan = capture_data.open_scan(capture)
         if not (
             np.array_equal(scan.mesh.faces, fitted.scan.mesh.faces)
             and np.array_equal(scan.mesh.vertices, fitted.scan.mesh.vertices)
         ):
             raise capture.error(
-                "this is another mesh than the fit's; expected the same one, whose faces the "
-                "fitted materials belong to",
+                "this is not the mesh of the fit; expected the same mesh, because the fitted "
+                "materials are assigned to its faces",
                 "scan", "mesh",
             )  # fmt: skip
     capture_data.check_photos(capture, scan)
@@ -89,7 +90,10 @@ def prediction_inputs(capture: Capture, fitted: CaptureResult) -> PredictionInpu
 
 
 def predict_one(given: PredictionInputs, place: int) -> Generator[float, None, PhotoPrediction]:
-    """Predict one photo, a band of rows at a time; yields the fraction done. Raises InputError."""
+    """Predict one photo, one band of rows at a time; yields the fraction done.
+
+    place: index of the photo in ``given.capture``. Raises InputError.
+    """
     capture, fitted = given.capture, given.fitted
     camera = capture_data.camera_of(capture, given.scan, place)
     light = given.lights.of(capture, place)
@@ -111,7 +115,7 @@ def predict_one(given: PredictionInputs, place: int) -> Generator[float, None, P
         ]
         wanted = view.pixel[view.wanted]
         radiance[wanted] = predict_photo(view, lighting, parts)[view.wanted]
-        inner[wanted] = ~_beside_outline(view, margins.silhouette)[view.wanted]
+        inner[wanted] = ~_near_outline(view, margins.silhouette)[view.wanted]
     yield len(windows) / (1 + len(windows))
     compared = inner & np.isfinite(radiance[:, 0])
     if IGNORE_MASK in capture.photos[place].masks:
@@ -132,18 +136,18 @@ def predict_one(given: PredictionInputs, place: int) -> Generator[float, None, P
     )
 
 
-def same(one: Any, other: Any) -> bool:
-    """Whether two entries of capture files hold the same, arrays included."""
+def entries_equal(one: Any, other: Any) -> bool:
+    """Whether two entries of capture files are equal, arrays included."""
     if is_dataclass(one) and not isinstance(one, type):
         return type(one) is type(other) and all(
-            same(getattr(one, f.name), getattr(other, f.name)) for f in fields(one)
+            entries_equal(getattr(one, f.name), getattr(other, f.name)) for f in fields(one)
         )
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
         return one is not None and other is not None and np.array_equal(one, other)
     return bool(one == other)
 
 
-def _beside_outline(view: SurfaceView, margin: int) -> NDArray[np.bool_]:
+def _near_outline(view: SurfaceView, margin: int) -> NDArray[np.bool_]:
     """(n,) pixels of a view within ``margin`` pixels of an outline."""
     if margin <= 0:
         return np.zeros(len(view.pixel), bool)
@@ -151,14 +155,14 @@ def _beside_outline(view: SurfaceView, margin: int) -> NDArray[np.bool_]:
 
 
 def _photos_in_unit_of(capture: Capture, fitted: CaptureResult) -> tuple[LitPhotos, float]:
-    """(the photos with exposures in the fit's unit, what radiance in the capture's own unit is to
-    be multiplied with)."""
+    """(the photos with exposures in the fit's unit, the factor from the capture's own unit of
+    radiance to the fit's)."""
     own = LitPhotos.open(capture)
     first = fitted.photos.first
     if (own.first is None) != (first is None):
         raise capture.error(
-            "the exposures of these photos and of the fitted ones are in different units: one has "
-            "EXIF's, the other's are given in the capture file; give exposure in both",
+            "the exposures of these photos and of the fitted photos are in different units: one "
+            "capture takes them from EXIF, the other gives them in its file; give exposure in both",
             "photo", 0, "exposure",
         )  # fmt: skip
     if own.first is None or first is None or own.first == first:
@@ -171,10 +175,11 @@ def _photos_in_unit_of(capture: Capture, fitted: CaptureResult) -> tuple[LitPhot
 def _lights(
     capture: Capture, fitted: CaptureResult, scan: Scan, photos: LitPhotos, unit: float
 ) -> Lights:
-    """The lights in the fit's unit of radiance."""
+    """The lights of the capture, with strengths in the fit's unit of radiance. unit: factor from
+    the capture's unit to the fit's."""
     known: Sequence[Any] = fitted.capture.lights
     entries = {entry.name: entry for entry in known}
-    shared = [e for e in capture.lights if e.name in entries and same(e, entries[e.name])]
+    shared = [e for e in capture.lights if e.name in entries and entries_equal(e, entries[e.name])]
     found = {entry.name: fitted.lights.by_name[entry.name] for entry in shared}
     others = tuple(entry for entry in capture.lights if entry.name not in found)
     if others:
@@ -183,8 +188,9 @@ def _lights(
             light = more.by_name[entry.name]
             if not (light.known and fitted.lights.known and fitted.capture.fit.absolute):
                 raise capture.error(
-                    f"the light {entry.name!r} is not one of the fitted capture, and how strong it "
-                    "is against those is not known: give irradiance or intensity in both captures",
+                    f"the light {entry.name!r} is not in the fitted capture, and its strength "
+                    "relative to the fitted lights is unknown; give irradiance or intensity in "
+                    "both captures",
                     "light", capture.lights.index(entry), "name",
                 )  # fmt: skip
             found[entry.name] = light if entry.strength is None else _scaled(light, unit)
@@ -192,7 +198,7 @@ def _lights(
 
 
 def _scaled(light: Light, factor: float) -> Light:
-    """The light, so many times as strong."""
+    """The light with its strength multiplied by ``factor``."""
     if isinstance(light, DistantLight):
         return replace(light, irradiance=light.effective_irradiance * factor)
     if isinstance(light, (NearLight, MountedLight)) and light.intensity is not None:

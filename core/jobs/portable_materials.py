@@ -1,4 +1,4 @@
-"""A measured material as other renderers show it: Principled, and a stack of lobes."""
+"""Approximations of a fitted BRDF for other renderers: Principled BSDF and a stack of lobes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..concurrency.thread_pool import thread_count, thread_pool
 
 @dataclass(frozen=True)
 class Portable:
-    """What is nearest to a BRDF of what exporters and EEVEE know."""
+    """The best approximations of a BRDF that exporters and EEVEE can use."""
 
     principled: PrincipledFit
     lobes: LobeStackFit
@@ -24,8 +24,12 @@ class Portable:
 def fit_portable(
     brdf: PrincipalBRDF, name: str, start: float, threads: int | None
 ) -> Generator[Step, None, Portable]:
-    """Of a material of that name, ``start`` of the job done; threads: None: one a core."""
-    step = Step(f"{name} in other renderers", start)
+    """Fit both approximations in the background.
+
+    name: of the material, for the progress display; start: fraction of the job that is done;
+    threads: None for one per core.
+    """
+    step = Step(f"fitting {name} for other renderers", start)
     yield step
 
     def principled() -> PrincipledFit:

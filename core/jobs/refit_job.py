@@ -1,4 +1,4 @@
-"""Fit the materials again, from samples that are rid of what a diagnosis named."""
+"""Fit the materials again, from samples that are corrected for the causes a diagnosis named."""
 
 from __future__ import annotations
 
@@ -20,30 +20,32 @@ from ..diagnose.solver.model_fit import ModelFit
 from ..errors import PatinaError
 from ..fit.held_out import Judge
 from ..samples import SampleTable
-from .acceptance import Refit, Rejection, seen_jointly, worse
+from .acceptance import Refit, Rejection, evidence_against, joint_log_growth
 from .applied_effects import AppliedEffect
 from .diagnose_job import DiagnoseJob, normal_deviation
 from .fit_job import CaptureResult, MaterialResult, with_portable
-from .highlight_deconvolution_passes import fitted_sharply
+from .highlight_deconvolution_passes import fit_with_deconvolution
 
-STAGE = "fitting with what was found"
-FEWEST = 50  # samples of a material that are left
-CORRECTING = 0.3  # of the time
-AS_WIDE = (
-    "its highlights are as wide as the photos show them: made sharper, they predict unseen photos "
-    "no better; a photo under a smaller lamp would tell"
+STAGE = "fitting with the named causes"
+MIN_SAMPLES = 50  # of a material after correction
+CORRECTION_SHARE = 0.3  # fraction of a second fit's time that the correction of samples takes
+STILL_BLURRED = (
+    "The highlights of this material are as wide as in the photos, because narrower ones do not "
+    "predict held-out photos better. A photo under a smaller lamp would show their true width."
 )
 
 
 class RefitJob(Job):
-    """``result`` is the fit with the effects in the model; where none is, the fit as it was.
-    ``doubted`` are causes that were left out for what they do to unseen photos, and what that is;
-    ``unused`` are those of which only the second fit makes nothing. ``fitted`` is the joint fit
-    that the second one rests on, None where it rests on none.
+    """Sets ``result``, the fit with the effects taken into account; the first fit if there are
+    none.
 
-    checked: a finished diagnosis. without: causes that it named and that are left out. exactly: the
-    rest is taken into account even where unseen photos are then predicted worse. portable: whether
-    the materials' portable forms are fitted too.
+    ``contradicted``: causes that were dropped because held-out photos are predicted worse with
+    them, each with the evidence. ``unused``: the same, where only the second fit is worse.
+    ``fitted``: the joint fit that the second one is based on, None if there is none.
+
+    checked: a finished diagnosis. without: causes that it named and that are not corrected.
+    exactly: correct for all others even if held-out photos are then predicted worse. portable:
+    whether portable forms of the materials are fitted too.
     """
 
     def __init__(
@@ -64,41 +66,41 @@ class RefitJob(Job):
         self.fitted: ModelFit | None = None
 
     def run(self) -> Iterator[Step]:
-        """With all causes; where unseen photos are then predicted worse, without the one of them
-        that gained least, and so on. What was left out in vain before that helped is put back."""
+        """Fit with all causes. While held-out photos are predicted worse, drop the cause with the
+        smallest gain. Then add back each dropped cause that does no harm."""
         before, found = finished(self.checked.result), finished(self.checked.found)
         order = [t for t in correctable_effects(found) if t.effect.cause not in self.without]
-        chosen, left_out = list(order), list[Trial]()
+        selected, dropped = list(order), list[Trial]()
         again: list[Refit] = []
         begin = 0.0
-        while chosen:
-            again, fitted, refusal = yield from self._with(before, found, chosen, begin)
+        while selected:
+            again, fitted, rejection = yield from self._with(before, found, selected, begin)
             begin += 0.5 * (1 - begin)
-            if refusal is None:
+            if rejection is None:
                 self.fitted = fitted
                 break
-            left_out.append(chosen.pop())
-            told = self.contradicted if refusal.of_cause else self.unused
-            told[left_out[-1].effect.cause] = refusal.words
-        for trial in left_out[-2::-1]:
-            more = [t for t in order if t in chosen or t is trial]
-            other, fitted, refusal = yield from self._with(before, found, more, begin)
+            dropped.append(selected.pop())
+            reasons_of = self.contradicted if rejection.of_cause else self.unused
+            reasons_of[dropped[-1].effect.cause] = rejection.evidence
+        for trial in dropped[-2::-1]:
+            more = [t for t in order if t in selected or t is trial]
+            other, fitted, rejection = yield from self._with(before, found, more, begin)
             begin += 0.5 * (1 - begin)
-            if refusal is None:
-                chosen, again, self.fitted = more, other, fitted
-                for told in (self.contradicted, self.unused):
-                    told.pop(trial.effect.cause, None)
+            if rejection is None:
+                selected, again, self.fitted = more, other, fitted
+                for reasons_of in (self.contradicted, self.unused):
+                    reasons_of.pop(trial.effect.cause, None)
         reasons = {**self.contradicted, **self.unused}.items()
-        said = [f"{cause} is not taken into account: {why}" for cause, why in reasons]
+        notes = [f"The cause {cause} is not taken into account. {why}" for cause, why in reasons]
         if self.fitted is None:
-            materials = [replace(m, warnings=(*m.warnings, *said)) for m in before.materials]
+            materials = [replace(m, warnings=(*m.warnings, *notes)) for m in before.materials]
             yield from self._finish(before, materials, begin)
             return
         materials = [
-            replace(m, warnings=(*m.warnings, *a.warnings, *said))
+            replace(m, warnings=(*m.warnings, *a.warnings, *notes))
             for m, a in zip(_proposed(before, again), again, strict=True)
         ]
-        taken = chosen if any(a.material is not None for a in again) else []
+        taken = selected if any(a.material is not None for a in again) else []
         if all(a.blurred for a in again if a.material is not None):
             taken = [t for t in taken if not isinstance(t.effect, WidensHighlights)]
         used = tuple(_applied(trial, self.fitted.model) for trial in taken)
@@ -107,7 +109,8 @@ class RefitJob(Job):
     def _finish(
         self, result: CaptureResult, materials: Sequence[MaterialResult], start: float
     ) -> Iterator[Step]:
-        """With the portable forms of those materials that have none, from ``start`` of the job."""
+        """Set the result. Portable forms are fitted for materials that have none; ``start``:
+        fraction of the job that is done."""
         done = list(materials)
         share = (1 - start) / len(done)
         for index, material in enumerate(materials if self.portable else ()):
@@ -116,50 +119,57 @@ class RefitJob(Job):
         self.result = replace(result, materials=tuple(done))
 
     def _with(
-        self, before: CaptureResult, found: Diagnosis, chosen: Sequence[Trial], done: float
+        self, before: CaptureResult, found: Diagnosis, selected: Sequence[Trial], done: float
     ) -> Generator[Step, None, tuple[list[Refit], ModelFit, Rejection | None]]:
-        """Second fits, the joint fit they are of, and why they are refused; done: of the job, of
-        which this takes half the rest."""
+        """(second fits, the joint fit they are based on, the evidence against them). done: fraction
+        of the job; this takes half of the rest."""
         step = Step(STAGE, done)
         yield step
-        causes = [trial.effect.cause for trial in chosen]
+        causes = [trial.effect.cause for trial in selected]
         fitted = yield from in_background(lambda: with_causes(found, causes), step)
         again = []
         share = 0.5 * (1 - done) / len(before.materials)
         for index, material in enumerate(before.materials):
             start = done + index * share
             try:
-                one = yield from self._again(index, material, fitted.model, start, share)
+                one = yield from self._refit_material(index, material, fitted.model, start, share)
             except PatinaError as error:
-                said = f"fitted without {', '.join(causes)}: {error}"
-                one = Refit(None, {}, (said,))
+                note = (
+                    f"The material could not be fitted with a correction for {', '.join(causes)} "
+                    f"({error}). Its first fit is kept."
+                )
+                one = Refit(None, {}, (note,))
             again.append(one)
         if self.exactly:
             return again, fitted, None
-        jointly = yield from in_background(lambda: seen_jointly(found, fitted), step)
-        return again, fitted, worse(before.materials, again, jointly)
+        jointly = yield from in_background(lambda: joint_log_growth(found, fitted), step)
+        return again, fitted, evidence_against(before.materials, again, jointly)
 
-    def _again(
+    def _refit_material(
         self, index: int, material: MaterialResult, model: Model, start: float, share: float
     ) -> Generator[Step, None, Refit]:
-        found = yield from self._corrected(index, material.name, model, Step(STAGE, start))
+        found = yield from self._corrected_samples(index, material.name, model, Step(STAGE, start))
         count = np.count_nonzero(found.table.read)
-        if count < FEWEST:
-            raise PatinaError(f"too few samples can be corrected: {count}")
-        start, share = start + CORRECTING * share, (1 - CORRECTING) * share
+        if count < MIN_SAMPLES:
+            raise PatinaError(
+                f"samples that can be corrected: {count}; expected at least {MIN_SAMPLES}"
+            )
+        start, share = start + CORRECTION_SHARE * share, (1 - CORRECTION_SHARE) * share
 
-        def fitted_again(
+        def fit_again(
             table: SampleTable, judge: Judge | None, start: float, share: float
         ) -> Generator[Step, None, MaterialResult]:
             fit = self.checked.fit
-            return (yield from fit.fitted_again(index, table, material, start, share, judge))
+            return (yield from fit.fit_again(index, table, material, start, share, judge))
 
-        fitted, sharp = yield from fitted_sharply(found, fitted_again, start, share, self.exactly)
+        fitted, sharp = yield from fit_with_deconvolution(
+            found, fit_again, start, share, self.exactly
+        )
         blurred = found.blur is not None and not sharp
-        warnings = (*_of_clipped(found.table), *((AS_WIDE,) if blurred else ()))
+        warnings = (*_clipping_warnings(found.table), *((STILL_BLURRED,) if blurred else ()))
         return Refit(fitted, found.light, warnings, blurred)
 
-    def _corrected(
+    def _corrected_samples(
         self, index: int, name: str, model: Model, step: Step
     ) -> Generator[Step, None, CorrectedSamples]:
         before, setting = finished(self.checked.result), finished(self.checked.context)
@@ -172,33 +182,34 @@ class RefitJob(Job):
         return (yield from relayed(correcting, lambda _: step))
 
 
-def _of_clipped(table: SampleTable) -> tuple[str, ...]:
-    """In words, where channels of samples are predictions."""
+def _clipping_warnings(table: SampleTable) -> tuple[str, ...]:
+    """A warning if channels of samples are imputed (clipping_imputation.py)."""
     filled = np.count_nonzero(~table.read)
     if not filled:
         return ()
     part = 100 * filled / len(table)
     return (
-        f"{part:.2g} % of its samples are clipped: how bright they are is what the rest of the "
-        "photos and measured materials say; a photo at a quarter of the exposure would tell",
+        f"{part:.2g} % of the samples of this material are clipped. Their radiance is estimated "
+        "from the other samples and the measured materials. A photo at a quarter of the exposure "
+        "would measure it.",
     )
 
 
 def _proposed(before: CaptureResult, again: Sequence[Refit]) -> list[MaterialResult]:
-    """The second fit's where there is one."""
+    """The second fit of each material; its first fit where there is none."""
     both = zip(before.materials, again, strict=True)
     return [one if a.material is None else a.material for one, a in both]
 
 
 def _applied(trial: Trial, model: Model) -> AppliedEffect:
-    """With the numbers that it has in a model."""
+    """The effect with its parameters in a model."""
     x = trial.effect.identified(model.parameters_of(trial.effect.cause))
-    numbers = trial.effect.parameters
+    declared = trial.effect.parameters
     return AppliedEffect(
         trial.effect.cause,
         trial.effect.sentence(x, trial.standard_errors),
-        numbers.names,
-        numbers.units,
+        declared.names,
+        declared.units,
         tuple(x.tolist()),
         tuple(trial.standard_errors.tolist()),
     )

@@ -1,8 +1,8 @@
-"""All samples of all photos, a piece of a photo at a time.
+"""Take the samples of all photos, one band of rows at a time.
 
-A photo is cut into bands of rows; each gives the samples of its materials to whoever wants them and
-is forgotten. Memory depends on the size of one photo, not on their number. Bands may be worked on
-by several threads; what comes out is handed on in their order, and is the same on any number.
+Each band passes the samples of each material to that material's sinks and is then freed. Memory
+depends on the size of one photo, not on the number of photos. Several threads may process bands;
+the results are passed on in order, so they do not depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from ..concurrency.thread_pool import thread_count, thread_pool
 from ..geometry import PixelRays, RayScene, Window, bands, view_window
 from ..inputs import capture_data
 from ..inputs.lights import Lights
+from ..inputs.material_pixels import material_pixels
 from ..inputs.photos import LitPhoto, LitPhotos
 from ..light import Light
 from ..samples import SampleReservoir, SampleSink, SampleTable, sample_photo
@@ -28,15 +29,18 @@ from ..samples.face_votes import FaceVotes
 from ..samples.take import halo, inner_pixels, light_surface, trusted_pixels
 from ..scan import Scan
 
-MANY_CLIPPED = 1e-3  # of a photo's lit pixels
+MAX_CLIPPED_SHARE = 1e-3  # of a photo's lit pixels; more gives a note
 
 
 @dataclass
-class Taken:
-    """What the photos gave. kept: a uniform part of each material's samples; counts: (photos,) how
-    many there were; marked: surface pixels that its masks mark; votes: of the faces, empty where
-    there is one material; notes: what was noted while reading, and of how many photos; seen, lit:
-    (photos,) pixels that see the surface, and those of them in the light."""
+class PhotoSamples:
+    """The samples of all photos.
+
+    kept: a uniform random subset of each material's samples. counts: {material: (photos,) number
+    of samples}. marked: {material: number of surface pixels that its masks mark}. votes: material
+    votes of the faces, empty where there is one material. notes: {sentence: number of photos it
+    applies to}. seen, lit: (photos,) pixels that see the surface, and those of them in the light.
+    """
 
     kept: dict[str, SampleReservoir]
     counts: dict[str, NDArray[np.int64]]
@@ -49,7 +53,7 @@ class Taken:
 
 @dataclass(frozen=True)
 class _Shot:
-    """One photo and everything that its bands need to know."""
+    """One photo and everything that its bands need."""
 
     capture: Capture
     scan: Scan
@@ -63,7 +67,8 @@ class _Shot:
 
 @dataclass(frozen=True)
 class _Band:
-    """What one band gave; tables, faces: one a material. faces: of the pixels its masks mark."""
+    """The result of one band. tables, faces: one entry per material; faces: those of the pixels
+    that the material's masks mark."""
 
     tables: list[SampleTable]
     faces: list[NDArray[np.int32]]
@@ -81,11 +86,14 @@ def take_samples(
     lights: Lights,
     sinks: Mapping[str, Sequence[SampleSink]] | None = None,
     threads: int | None = None,
-) -> Generator[float, None, Taken]:
-    """Yields the fraction done. sinks: who wants the samples of each material beside the reservoir;
-    they are called from this thread only. Raises InputError."""
+) -> Generator[float, None, PhotoSamples]:
+    """Take the samples of all photos; yields the fraction done.
+
+    sinks: {material: sinks that get its samples in addition to the reservoir}; they are called
+    from this thread only. threads: None for one per core. Raises InputError.
+    """
     count, names = len(capture.photos), [m.name for m in capture.materials]
-    taken = Taken(
+    taken = PhotoSamples(
         kept={name: SampleReservoir(count) for name in names},
         counts={name: np.zeros(count, np.int64) for name in names},
         marked=dict.fromkeys(names, 0),
@@ -113,12 +121,12 @@ def take_samples(
 
 def _take_photo(
     shot: _Shot,
-    taken: Taken,
+    taken: PhotoSamples,
     wanted: Mapping[str, Iterable[SampleSink]],
     pool: ThreadPoolExecutor | None,
     workers: int,
 ) -> Generator[float, None, None]:
-    """The bands of one photo."""
+    """Sample one photo and add the result to ``taken``; yields the fraction of all photos done."""
     capture, place = shot.capture, shot.place
     camera, count = shot.lines.camera, len(capture.photos)
     trusted = clipped = 0
@@ -135,7 +143,7 @@ def _take_photo(
             name = material.name
             taken.counts[name][place] += len(table)
             taken.marked[name] += len(shown)
-            if len(faces) > 1:  # of one material every face is
+            if len(faces) > 1:  # with one material, every face is of that material
                 faces[name].append(shown)
             for sink in wanted[name]:
                 if len(table):
@@ -144,10 +152,10 @@ def _take_photo(
     for index, shown_by_band in enumerate(faces.values()):
         if shown_by_band:
             taken.votes.add(index, np.concatenate(shown_by_band))
-    if clipped > MANY_CLIPPED * trusted:
+    if clipped > MAX_CLIPPED_SHARE * trusted:
         taken.notes[
-            "lit pixels are clipped and left out: highlights are missing; expose less, or "
-            "take a bracket"
+            "lit pixels are clipped and left out, so highlights are missing. Use a shorter "
+            "exposure or a bracket."
         ] += 1
     taken.notes.update(shot.photo.notes)
 
@@ -159,9 +167,7 @@ def _band(shot: _Shot, window: Window) -> _Band:
     wanted = np.zeros(len(view.pixel), bool)
     wanted[view.wanted] = True
     lighting = light_surface(shot.rays, view, shot.light, shot.lines.camera)
-    where, in_shadow = capture_data.material_pixels(
-        capture, shot.scan, view, shot.place, shot.masks
-    )
+    where, in_shadow = material_pixels(capture, shot.scan, view, shot.masks)
     trusted = trusted_pixels(view, lighting, margins) & ~in_shadow & wanted
     usable = shot.photo.usable.ravel().take(view.pixel)
     keep = trusted & usable

@@ -1,4 +1,4 @@
-"""A capture of some of the photos, so that others can be held out of a fit."""
+"""Restrict a capture to some of its photos, so that the others can be held out of a fit."""
 
 from __future__ import annotations
 
@@ -10,9 +10,12 @@ from ..errors import InputError
 from ..inputs.photos import LitPhotos
 
 
-def places_of(capture: Capture, photos: Sequence[str | int]) -> list[int]:
-    """Places (from 0) of photos that are given by place or by name: the file as the capture file
-    has it, or its last part where that is unique. Raises InputError."""
+def photo_indices(capture: Capture, photos: Sequence[str | int]) -> list[int]:
+    """Indices (from 0) of photos that are given by index or by file name.
+
+    A name is the path as in the capture file, or its last part where that is unique. Raises
+    InputError.
+    """
     names = [capture.photo_name(place) for place in range(len(capture.photos))]
     found = []
     for photo in photos:
@@ -22,10 +25,10 @@ def places_of(capture: Capture, photos: Sequence[str | int]) -> list[int]:
             fits = [i for i, name in enumerate(names) if name == photo]
             fits = fits or [i for i, name in enumerate(names) if name.split("/")[-1] == photo]
         if len(fits) != 1:
-            what = "no photo is" if not fits else f"{len(fits)} photos are"
+            what = "no photo is named" if not fits else f"{len(fits)} photos are named"
             raise InputError(
-                f"{what} {photo!r}; expected a place from 0 to {len(names) - 1}, or one of "
-                f"{', '.join(names[:3])} …",
+                f"{what} {photo!r}; expected an index from 0 to {len(names) - 1}, or a file such "
+                f"as {', '.join(names[:3])} …",
                 file=capture.file,
                 key="photo",
             )
@@ -34,18 +37,22 @@ def places_of(capture: Capture, photos: Sequence[str | int]) -> list[int]:
 
 
 def select_photos(capture: Capture, photos: Sequence[str | int]) -> Capture:
-    """The capture with these photos only, in its own order, and the lights that they were taken
-    under. Raises InputError for a photo that is not there, for none at all, and where leaving out
-    the first photo would change the unit of radiance that the lights' strengths are given in."""
-    keep = sorted(set(places_of(capture, photos)))
+    """The capture with only these photos, in its own order, and only their lights.
+
+    Raises InputError for a photo that does not exist, for an empty selection, and where leaving
+    out the first photo would change the unit of radiance of the given light strengths.
+    """
+    keep = sorted(set(photo_indices(capture, photos)))
     if not keep:
-        raise InputError("no photo is left; expected at least one", file=capture.file, key="photo")
+        raise InputError(
+            "no photo is selected; expected at least one", file=capture.file, key="photo"
+        )
     if keep[0] != 0 and any(light.strength is not None for light in capture.lights):
         lit = LitPhotos.open(capture)
         if lit.first is not None and lit.exposures[keep[0]][0] != 1.0:
             raise capture.error(
-                "exposures are EXIF's, relative to this photo, and so is the strength of the "
-                "lights: keep this photo, or give exposure for all photos",
+                "exposures come from EXIF, relative to this photo, and so does the unit of the "
+                "lights' strength; keep this photo, or give exposure for all photos",
                 "photo", 0, "exposure",
             )  # fmt: skip
     used = {capture.photos[place].light for place in keep}

@@ -1,4 +1,4 @@
-"""Direction and irradiance of the light."""
+"""Lights: direction, position, irradiance and intensity, and how they are measured."""
 
 from .distant import DistantLight
 from .incidence import Incidence, Light

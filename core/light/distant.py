@@ -1,4 +1,4 @@
-"""One distant light: the same direction and irradiance everywhere on the object."""
+"""A distant light: the same direction and irradiance everywhere on the object."""
 
 from __future__ import annotations
 
@@ -15,9 +15,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class DistantLight:
-    """direction: (3,) unit, surface → light, scan frame. irradiance: (3,) at normal incidence, in
+    """A distant light.
+
+    direction: (3,) unit, surface → light, scan frame. irradiance: (3,) at normal incidence, in
     radiance units of the photos × sr; None where unknown (the BRDF is then known up to a scale).
-    angular_radius: radians, of the source as the object sees it (the sun's is 0.00465)."""
+    angular_radius: of the source, radians (the sun's is 0.00465).
+    """
 
     name: str
     direction: Array
@@ -26,7 +29,7 @@ class DistantLight:
 
     @property
     def known(self) -> bool:
-        """True where the irradiance is."""
+        """True where the irradiance is known."""
         return self.irradiance is not None
 
     @property
@@ -35,7 +38,7 @@ class DistantLight:
         return np.ones(3) if self.irradiance is None else self.irradiance
 
     def incidence(self, points: Array, camera: Camera) -> Incidence:
-        """The same at all points (n, 3)."""
+        """Incident light at points (n, 3), the same at all of them."""
         n = len(points)
         return Incidence(
             np.broadcast_to(self.direction, (n, 3)),

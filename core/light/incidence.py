@@ -1,4 +1,4 @@
-"""Light as a surface point receives it."""
+"""Direction and irradiance of the light at surface points."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Incidence:
-    """At n surface points. towards: (n, 3) unit, surface → light, scan frame. irradiance: (n, 3) at
-    normal incidence, photo units × sr. distance: (n,) to the light, scan units; None: distant."""
+    """Incident light at n surface points. towards: (n, 3) unit, surface → light, scan frame.
+    irradiance: (n, 3) at normal incidence, photo units × sr. distance: (n,) to the light, scan
+    units; None for a distant light."""
 
     towards: Array
     irradiance: Array
@@ -29,7 +30,7 @@ class Incidence:
 
 
 def _rows(values: Array, which: NDArray) -> Array:
-    """Rows of (n, 3); of one row that stands for all (a distant light's) it stays one."""
+    """Rows of (n, 3) values; a broadcast row (of a distant light) stays a broadcast view."""
     if values.strides[0] == 0 and len(values):
         count = int(np.count_nonzero(which)) if which.dtype == bool else len(which)
         return np.broadcast_to(values[0], (count, values.shape[1]))
@@ -37,15 +38,15 @@ def _rows(values: Array, which: NDArray) -> Array:
 
 
 class Light(Protocol):
-    """What lights a photo."""
+    """A light of a capture."""
 
     @property
     def name(self) -> str:
-        """As the capture file calls it."""
+        """Its name in the capture file."""
 
     @property
     def known(self) -> bool:
         """False where irradiance or intensity is unknown: reflectance then has no scale."""
 
     def incidence(self, points: Array, camera: Camera) -> Incidence:
-        """At points (n, 3), scan frame, while ``camera`` takes its photo."""
+        """Incident light at points (n, 3), scan frame, in the photo that ``camera`` takes."""

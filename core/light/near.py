@@ -16,11 +16,12 @@ Array = NDArray[np.float64]
 def irradiance_of_point(
     points: Array, position: Array, intensity: Array, axis: Array | None, beam: float | None
 ) -> Incidence:
-    """Irradiance at normal incidence, E = I g(ϑ) / d², of a lamp that is small against d.
+    """Irradiance at normal incidence, E = I g(ϑ) / d², of a lamp much smaller than the distance d.
 
     points: (n, 3); position: (3,); intensity: (3,) irradiance at distance 1 on the axis. axis:
-    (3,) unit, where the lamp points; beam: radians, the angle ϑ from the axis at which half of the
-    axis' intensity is left, g = 2^−(ϑ/beam)²; None for a lamp that shines alike everywhere.
+    (3,) unit, direction in which the lamp points; beam: radians, angle ϑ from the axis at which
+    half of the intensity is left, g = 2^−(ϑ/beam)²; None for a lamp with the same intensity in all
+    directions.
     """
     offset = position - points
     distance = np.linalg.norm(offset, axis=1)
@@ -34,8 +35,9 @@ def irradiance_of_point(
 
 @dataclass(frozen=True)
 class NearLight:
-    """position: (3,) scan frame. intensity: (3,) irradiance at distance 1 (scan units), falling off
-    with the distance's square; None where unknown. radius: of the source, scan units."""
+    """A lamp near the object. position: (3,) scan frame. intensity: (3,) irradiance at distance 1
+    (scan units), with inverse-square falloff; None where unknown. radius: of the source, scan
+    units."""
 
     name: str
     position: Array
@@ -44,11 +46,11 @@ class NearLight:
 
     @property
     def known(self) -> bool:
-        """True where the intensity is."""
+        """True where the intensity is known."""
         return self.intensity is not None
 
     def incidence(self, points: Array, camera: Camera) -> Incidence:
-        """At points (n, 3), scan frame."""
+        """Incident light at points (n, 3), scan frame."""
         intensity = np.ones(3) if self.intensity is None else self.intensity
         return irradiance_of_point(points, self.position, intensity, None, None)
 
@@ -56,8 +58,8 @@ class NearLight:
 @dataclass(frozen=True)
 class MountedLight:
     """A flash fixed to the camera. offset: (3,) in the camera's frame (x right, y down, z forward),
-    scan units. intensity, radius: as of a NearLight. beam: radians from the camera's axis at which
-    half of the intensity is left; None for a flash that shines alike everywhere."""
+    scan units. intensity, radius: as for NearLight. beam: angle from the camera's axis at which
+    half of the intensity is left, radians; None for the same intensity in all directions."""
 
     name: str
     offset: Array
@@ -67,15 +69,15 @@ class MountedLight:
 
     @property
     def known(self) -> bool:
-        """True where the intensity is."""
+        """True where the intensity is known."""
         return self.intensity is not None
 
     def position(self, camera: Camera) -> Array:
-        """(3,) where it stood for a photo, scan frame."""
+        """(3,) its position in the photo of ``camera``, scan frame."""
         return camera.pose.rotation.T @ (self.offset - camera.pose.translation)
 
     def incidence(self, points: Array, camera: Camera) -> Incidence:
-        """At points (n, 3), scan frame."""
+        """Incident light at points (n, 3), scan frame."""
         intensity = np.ones(3) if self.intensity is None else self.intensity
         axis = camera.pose.rotation[2]
         return irradiance_of_point(points, self.position(camera), intensity, axis, self.beam)

@@ -1,4 +1,4 @@
-"""The highlights on a sphere in a photo: which pixels, how bright, clipped or not."""
+"""Find the highlights on a sphere in a photo: their pixels, brightness and clipping."""
 
 from __future__ import annotations
 
@@ -10,23 +10,21 @@ from scipy import ndimage
 
 Array = NDArray[np.float64]
 
-FAINTEST = (
-    0.1  # of the brightest highlight's height above the sphere's median: below it none is seen
-)
-NOISE = 8.0  # median absolute deviations above the median
-CUT = 0.2  # of a highlight's height: what is above it is the highlight
-FOOT = 2  # pixels around it that belong to a highlight that stands alone
-CLIPPED_CUT = 0.9  # the same where the height is that of the clipped plateau
-PLATEAU = 0.995  # of the brightest value: pixels of a clipped plateau are all above it
-MOST = 12  # highlights reported
-EIGHT = np.ones((3, 3), bool)
+MIN_HEIGHT = 0.1  # of the brightest highlight's height above the sphere's median
+MIN_SIGMA = 8.0  # height of a highlight above the median, in robust standard deviations
+CUT = 0.2  # of a highlight's height: pixels above it belong to the highlight
+FOOT_PIXELS = 2  # margin that is added to a single highlight
+CLIPPED_CUT = 0.9  # the same as CUT where the height is that of the clipped plateau
+PLATEAU = 0.995  # of the brightest value: all pixels of a clipped plateau are above it
+MAX_HIGHLIGHTS = 12  # reported
+EIGHT_NEIGHBOURS = np.ones((3, 3), bool)
 
 
 @dataclass(frozen=True)
 class Blob:
-    """One highlight. rows, columns: (n,) its pixels. weights: (n,) what each counts for its place.
-    background: (3,) radiance around it. peak: (3,) of its brightest pixel. clipped: whether that is
-    the sensor's limit."""
+    """One highlight. rows, columns: (n,) its pixels. weights: (n,) of each pixel for the centroid.
+    background: (3,) radiance around it. peak: (3,) radiance of its brightest pixel. clipped:
+    whether the peak is at the sensor's limit."""
 
     rows: NDArray[np.intp]
     columns: NDArray[np.intp]
@@ -41,9 +39,9 @@ def find_highlights(
 ) -> list[Blob]:
     """The bright spots of (h, w, 3) linear radiance where ``inside`` (h, w), unordered.
 
-    saturation: the value from which a channel is clipped; where None, a plateau of three or more
-    equally bright pixels tells. Regions above a faint level are split where they hold several
-    peaks of more than half the region's height; each is then cut at a part of its own height.
+    saturation: the value from which a channel is clipped; None: detected by a plateau of three or
+    more equally bright pixels. Regions above a low threshold are split where they have several
+    peaks above half of the region's height; each peak is then cut at a fraction of its own height.
     """
     light = np.asarray(pixels, float)
     grey = light.mean(axis=2)
@@ -57,14 +55,14 @@ def find_highlights(
         return []
     limit = _limit(light, inside, saturation)
     over = (light >= limit).any(axis=2) & inside
-    low = level + max(FAINTEST * (top - level), NOISE * spread)
-    regions, count = ndimage.label((grey > low) & inside, EIGHT)
+    low = level + max(MIN_HEIGHT * (top - level), MIN_SIGMA * spread)
+    regions, count = ndimage.label((grey > low) & inside, EIGHT_NEIGHBOURS)
     blobs: list[Blob] = []
     if count == 0:
         return blobs
     boxes = ndimage.find_objects(regions)
     sums = ndimage.sum_labels(grey, regions, np.arange(1, count + 1))
-    for index in np.argsort(-sums)[: 4 * MOST]:
+    for index in np.argsort(-sums)[: 4 * MAX_HIGHLIGHTS]:
         box = _grown(boxes[index], 8, grey.shape)
         own = regions[box] == index + 1
         blobs += _split(light[box], grey[box], own, inside[box], regions[box] > 0, over[box], box)
@@ -90,18 +88,18 @@ def _split(
     over: NDArray[np.bool_],
     box: tuple[slice, slice],
 ) -> list[Blob]:
-    ring = ndimage.binary_dilation(own, EIGHT, iterations=6) & inside
-    ring &= ~ndimage.binary_dilation(any_region, EIGHT, iterations=1)
+    ring = ndimage.binary_dilation(own, EIGHT_NEIGHBOURS, iterations=6) & inside
+    ring &= ~ndimage.binary_dilation(any_region, EIGHT_NEIGHBOURS, iterations=1)
     if ring.sum() < 8:
         ring = inside & ~any_region
     around = np.median(light[ring], axis=0) if ring.any() else np.zeros(3)
     floor = float(around.mean())
     height = float(grey[own].max()) - floor
-    peaks, count = ndimage.label(own & (grey - floor > 0.5 * height), EIGHT)
+    peaks, count = ndimage.label(own & (grey - floor > 0.5 * height), EIGHT_NEIGHBOURS)
     found: list[Blob] = []
     taken = np.zeros(grey.shape, bool)
     sums = ndimage.sum_labels(grey, peaks, np.arange(1, count + 1))
-    for index in np.argsort(-sums)[:MOST]:
+    for index in np.argsort(-sums)[:MAX_HIGHLIGHTS]:
         core = (peaks == index + 1) & ~taken
         if not core.any():
             continue
@@ -113,8 +111,10 @@ def _split(
         peak = light[region][np.argmax(grey[region])]
         taken |= region | core
         if count == 1 and not clipped:
-            # with the foot of its blur: of a highlight of a few pixels, what a cut leaves is biased
-            region = ndimage.binary_dilation(region, EIGHT, iterations=FOOT) & inside
+            # include the tail of its blur: without it the centroid of a few pixels is biased
+            region = (
+                ndimage.binary_dilation(region, EIGHT_NEIGHBOURS, iterations=FOOT_PIXELS) & inside
+            )
             cut = floor
         rows, columns = np.nonzero(region)
         weights = np.clip(grey[region], cut, floor + tall) - cut
@@ -130,9 +130,9 @@ def _split(
 def _largest(
     region: NDArray[np.bool_], core: NDArray[np.bool_], height: Array
 ) -> NDArray[np.bool_]:
-    """The connected part of the region with most light that touches the core: of a clipped
-    highlight with specks around it no single pixel is the brightest."""
-    labels, _ = ndimage.label(region, EIGHT)
+    """The connected part of the region that touches the core and has the most light. A clipped
+    highlight with specks around it has no single brightest pixel."""
+    labels, _ = ndimage.label(region, EIGHT_NEIGHBOURS)
     within = np.unique(labels[core & region])
     sums = ndimage.sum_labels(height, labels, within)
     return labels == within[int(np.argmax(sums))]

@@ -1,4 +1,4 @@
-"""What a mirror sphere shows where: the law of reflection on it."""
+"""The law of reflection on a mirror sphere."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ Array = NDArray[np.float64]
 
 
 def mirror(sphere: Sphere, camera: Camera, pixels: Array) -> tuple[Array, Array]:
-    """(directions to the light, normals) (n, 3) where the pixels (n, 2) see the sphere; NaN
-    beside it."""
+    """((n, 3) unit directions to the mirrored light, (n, 3) unit normals), scan frame, for pixels
+    (n, 2); NaN for pixels that do not see the sphere."""
     starts, rays = sphere.rays(camera, pixels)
     towards = sphere.centre - starts
     along = (towards * rays).sum(axis=1)
@@ -25,8 +25,8 @@ def mirror(sphere: Sphere, camera: Camera, pixels: Array) -> tuple[Array, Array]
 
 
 def mirrored_at(normal: Array, sphere: Sphere, camera: Camera, near: Array) -> Array:
-    """(3,) direction to the light that the point with that unit normal mirrors; near: (2,) a pixel
-    close to it, which without perspective tells the rays' direction."""
+    """(3,) unit direction to the light that is mirrored at the point with this unit normal. near:
+    (2,) a pixel close to the point; it gives the rays' direction of an orthographic camera."""
     point = sphere.centre + sphere.radius * normal
     if sphere.origin is None:
         ray = camera.rays(near[None])[0]
@@ -36,6 +36,6 @@ def mirrored_at(normal: Array, sphere: Sphere, camera: Camera, near: Array) -> A
 
 
 def solid_angle(corners: Array) -> Array:
-    """(n,) steradians of small quadrangles (n, 4, 3) of unit directions."""
+    """(n,) solid angle, in steradians, of small quadrilaterals (n, 4, 3) of unit directions."""
     diagonals = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
     return 0.5 * np.linalg.norm(np.cross(*diagonals), axis=1)

@@ -1,4 +1,4 @@
-"""Where in the photo is a sphere? A circle by votes of the edges, then its outline."""
+"""Search a photo for a sphere: circles by a Hough transform, then a refined outline."""
 
 from __future__ import annotations
 
@@ -13,23 +13,22 @@ from .sphere_outline import Circle, circle_pixels, fit_sphere, pixel_radius
 
 Array = NDArray[np.float64]
 
-LONGEST = 240  # pixels of the reduced photo
-SMALLEST = 0.04  # radius, of the photo's longer side
-LARGEST = 0.6
-EDGES = 0.12  # of the pixels vote: those with the strongest gradient
-TRIED = 8  # circles refined
-LEAST_SUPPORT = 0.5  # of the outline found, when nobody pointed at it
+REDUCED_SIDE = 240  # pixels, longer side of the reduced photo
+MIN_RADIUS = 0.04  # of the photo's longer side
+MAX_RADIUS = 0.6  # the same
+EDGE_SHARE = 0.12  # of the pixels that vote: those with the strongest gradient
+MAX_CIRCLES = 8  # that are refined
+MIN_SUPPORT = 0.5  # share of the outline that must be found where the user gave no outline
 
 
 def search_sphere(pixels: NDArray, camera: Camera) -> RefinedOutline | None:
-    """The sphere of (h, w, 3) linear pixels whose outline is seen best; None where none is.
+    """The sphere with the clearest outline in (h, w, 3) linear pixels; None where there is none.
 
-    Each edge of the reduced photo votes for the centres that lie along its gradient (Hough
-    transform for circles); the circles with most votes are refined, the one with most of its
-    outline found wins.
+    Each edge of the reduced photo votes for the centres along its gradient (Hough transform for
+    circles). The circles with most votes are refined, and the best refined outline wins.
     """
     grey = np.asarray(pixels, float).mean(axis=2)
-    step = max(1, -(-max(grey.shape) // LONGEST))
+    step = max(1, -(-max(grey.shape) // REDUCED_SIDE))
     rows, columns = (grey.shape[0] // step) * step, (grey.shape[1] // step) * step
     small = grey[:rows, :columns].reshape(rows // step, step, columns // step, step)
     small = small.mean(axis=(1, 3))
@@ -44,16 +43,17 @@ def search_sphere(pixels: NDArray, camera: Camera) -> RefinedOutline | None:
         except InputError:
             continue
         found = refine_outline(pixels, camera, start, search=0.12)
-        if found is None or found.support < LEAST_SUPPORT:
+        if found is None or found.support < MIN_SUPPORT:
             continue
-        if best is None or _worth(found, camera) > _worth(best, camera):
+        if best is None or _size_score(found, camera) > _size_score(best, camera):
             best = found
     return best
 
 
-def _worth(found: RefinedOutline, camera: Camera) -> float:
-    """The outline's share that is seen; of two alike the larger (the other is inside it)."""
-    return found.worth * pixel_radius(found.sphere, camera) ** 0.25
+def _size_score(found: RefinedOutline, camera: Camera) -> float:
+    """The outline's score, weighted by size: of two similar outlines the smaller one is usually
+    inside the sphere."""
+    return found.score * pixel_radius(found.sphere, camera) ** 0.25
 
 
 def _circles(small: Array) -> list[tuple[float, float, float]]:
@@ -62,12 +62,12 @@ def _circles(small: Array) -> list[tuple[float, float, float]]:
     down = ndimage.gaussian_filter(small, 1.0, order=(1, 0))
     across = ndimage.gaussian_filter(small, 1.0, order=(0, 1))
     slope = np.hypot(down, across)
-    strong = slope > max(float(np.quantile(slope, 1 - EDGES)), 1e-6)
+    strong = slope > max(float(np.quantile(slope, 1 - EDGE_SHARE)), 1e-6)
     y, x = np.nonzero(strong)
     if len(y) == 0:
         return []
     unit_y, unit_x = down[strong] / slope[strong], across[strong] / slope[strong]
-    radii = np.arange(max(5.0, SMALLEST * max(small.shape)), LARGEST * max(small.shape), 1.5)
+    radii = np.arange(max(5.0, MIN_RADIUS * max(small.shape)), MAX_RADIUS * max(small.shape), 1.5)
     scores = np.zeros((len(radii), height, width), np.float32)
     for layer, radius in enumerate(radii):
         for sign in (-1, 1):
@@ -76,11 +76,11 @@ def _circles(small: Array) -> list[tuple[float, float, float]]:
             ok = (at_x >= 0) & (at_x < width) & (at_y >= 0) & (at_y < height)
             votes = np.bincount(at_y[ok] * width + at_x[ok], minlength=height * width)
             scores[layer] += votes.reshape(height, width)
-        # votes spread over more pixels the farther they are cast: 2° of gradient
+        # an error of 2° in the gradient's direction spreads votes in proportion to the radius
         wide = 0.7 + 0.02 * radius
         scores[layer] = ndimage.gaussian_filter(scores[layer], wide) * wide / np.sqrt(radius)
     found = []
-    for _ in range(TRIED):
+    for _ in range(MAX_CIRCLES):
         place = np.unravel_index(int(np.argmax(scores)), scores.shape)
         index, row, column = (int(axis) for axis in place)
         if scores[index, row, column] <= 0:

@@ -1,4 +1,4 @@
-"""Where the sun stands, and which way that is in the scan's frame."""
+"""Compute the position of the sun and its direction in the scan's frame."""
 
 from __future__ import annotations
 
@@ -13,11 +13,9 @@ from ..errors import InputError
 
 Array = NDArray[np.float64]
 
-FIRST_YEAR, LAST_YEAR = 1800, 2149  # what the polynomials of delta_t cover
-HIGHEST = (
-    9000.0  # metres: above it no photo of a scan is taken, but feet and millimetres land there
-)
-LEAST_LEVEL = math.sin(math.radians(1.0))  # north may not lie within 1° of up
+FIRST_YEAR, LAST_YEAR = 1800, 2149  # range of the polynomials of delta_t
+MAX_ALTITUDE = 9000.0  # metres; a larger value is usually in feet or millimetres
+MIN_NORTH_SINE = math.sin(math.radians(1.0))  # north must be at least 1° away from up
 
 # Espenak & Meeus, "Five Millennium Canon of Solar Eclipses" (NASA TP-2006-214141), polynomial
 # expressions for ΔT: (first year, year t is counted from, coefficients of t⁰, t¹, …), seconds
@@ -36,9 +34,9 @@ _DELTA_T: tuple[tuple[float, float, tuple[float, ...]], ...] = (
 
 @dataclass(frozen=True)
 class SunPosition:
-    """azimuth: radians from true north through east, 0 … 2π. elevation: radians above the
-    horizon, with refraction where it was asked for. enu: (3,) unit, place → sun, (east, north,
-    up)."""
+    """Position of the sun. azimuth: radians from true north through east, 0 … 2π. elevation:
+    radians above the horizon, including refraction unless switched off. enu: (3,) unit, place →
+    sun, (east, north, up)."""
 
     azimuth: float
     elevation: float
@@ -48,8 +46,8 @@ class SunPosition:
 def delta_t(year: float) -> float:
     """Terrestrial minus universal time, seconds, for a decimal year between 1800 and 2150.
 
-    Espenak & Meeus 2006. It says 74.5 s for 2025, where 69.2 s were measured: the sun moves by
-    0.0002° in those 5 s, so no newer table is needed for a shadow.
+    Espenak & Meeus 2006. It gives 74.5 s for 2025, where 69.2 s were measured. The sun moves by
+    0.0002° in those 5 s, so a newer table is not needed here. Raises ValueError for another year.
     """
     if not FIRST_YEAR <= year < LAST_YEAR + 1:
         raise ValueError(f"ΔT is known from {FIRST_YEAR} to {LAST_YEAR}, not for {year}")
@@ -69,18 +67,18 @@ def sun_direction(
     pressure: float | None = None,
     temperature: float | None = None,
 ) -> SunPosition:
-    """The sun's azimuth and elevation at a place and time.
+    """Compute the sun's azimuth and elevation at a place and time.
 
-    latitude, longitude: degrees, WGS 84, north and east positive. time: with its zone. altitude:
-    metres. pressure (hPa) and temperature (°C) bend the light; the standard atmosphere at that
-    altitude where not given. Raises InputError: a time without a zone or out of 1800 … 2149, a
-    place that is none, a sun below the horizon.
+    latitude, longitude: degrees, WGS 84, north and east positive. time: with time zone. altitude:
+    metres. pressure (hPa), temperature (°C): of the air, for refraction; None for the standard
+    atmosphere at that altitude. Raises InputError for a time without zone or outside 1800 … 2149,
+    an impossible place, and a sun below the horizon.
 
     Reda & Andreas, "Solar position algorithm for solar radiation applications", Solar Energy
-    76(5), 2004 (±0.0003° from year −2000 to 6000), by the library `sunposition`. UTC is taken for
-    UT1, which is less than 0.9 s or 0.004° of azimuth.
+    76(5), 2004 (±0.0003° from year −2000 to 6000), from the library `sunposition`. UTC is used as
+    UT1; the difference is less than 0.9 s or 0.004° of azimuth.
     """
-    from sunposition import sunposition  # as it brings numba along where there is one
+    from sunposition import sunposition  # imported late: it imports numba if installed
 
     _check_place(latitude, longitude, altitude)
     moment = _utc(time)
@@ -107,8 +105,8 @@ def sun_direction(
     if elevation <= 0:
         raise InputError(
             f"the sun is {-math.degrees(elevation):.1f}° below the horizon at latitude "
-            f"{latitude:g}, longitude {longitude:g} on {moment:%Y-%m-%d %H:%M:%S} UTC; check the "
-            "time's zone and the longitude's sign (east is positive)"
+            f"{latitude:g}, longitude {longitude:g} on {moment:%Y-%m-%d %H:%M:%S} UTC; expected it "
+            "above: check the time zone and the longitude's sign (east is positive)"
         )
     flat = math.cos(elevation)
     enu = np.array([flat * math.sin(azimuth), flat * math.cos(azimuth), math.sin(elevation)])
@@ -116,18 +114,18 @@ def sun_direction(
 
 
 def sun_in_scan(enu: Array, north: Array, up: Array) -> Array:
-    """(3,) unit direction in the scan's frame of an (east, north, up) direction.
+    """Convert an (east, north, up) direction to a (3,) unit direction in the scan's frame.
 
-    north, up: (3,) where north and up point in the scan's frame, any length. up is taken as it is;
-    of north only what is perpendicular to up. Raises InputError where they are no directions, or
-    within 1° of one line.
+    north, up: (3,) directions of north and up in the scan's frame, any length. up is used as given;
+    of north only the part perpendicular to up. Raises InputError for vectors of length 0, and for
+    north within 1° of up or down.
     """
     vertical = _unit(up, "up")
     pointing = _unit(north, "north")
     level = pointing - (pointing @ vertical) * vertical
-    if np.linalg.norm(level) < LEAST_LEVEL:
+    if np.linalg.norm(level) < MIN_NORTH_SINE:
         raise InputError(
-            "north and up point the same way; expected north to lie near the ground's plane",
+            "north and up are parallel; expected north to be roughly horizontal",
             key="north",
         )
     level /= np.linalg.norm(level)
@@ -141,7 +139,7 @@ def _unit(vector: Array, key: str) -> Array:
     with np.errstate(over="ignore"):
         length = np.linalg.norm(direction) if direction.shape == (3,) else 0.0
     if not (np.isfinite(length) and length > 1e-12):
-        raise InputError(f"is {vector}; expected three numbers that point somewhere", key=key)
+        raise InputError(f"is {vector}; expected three finite numbers, not all 0", key=key)
     return direction / length
 
 
@@ -149,20 +147,20 @@ def _check_place(latitude: float, longitude: float, altitude: float) -> None:
     for key, value, low, high, unit in (
         ("latitude", latitude, -90.0, 90.0, "degrees, north positive"),
         ("longitude", longitude, -180.0, 360.0, "degrees, east positive"),
-        ("altitude", altitude, -500.0, HIGHEST, "metres"),
+        ("altitude", altitude, -500.0, MAX_ALTITUDE, "metres"),
     ):
-        if not low <= value <= high:  # NaN fails it too
+        if not low <= value <= high:  # true for NaN too
             raise InputError(f"is {value}; expected {low:g} to {high:g} ({unit})", key=key)
 
 
 def _utc(time: datetime) -> datetime:
     if time.tzinfo is None or time.utcoffset() is None:
         raise InputError(
-            f"{time:%Y-%m-%d %H:%M:%S} has no zone; give it, as in "
-            f"{time:%Y-%m-%dT%H:%M:%S}+02:00 (an hour is about 14° of the sun's azimuth)",
+            f"{time:%Y-%m-%d %H:%M:%S} has no time zone; expected one, as in "
+            f"{time:%Y-%m-%dT%H:%M:%S}+02:00 (one hour changes the sun's azimuth by about 14°)",
             key="time",
         )
-    if not FIRST_YEAR < time.year < LAST_YEAR:  # whole years, so that no zone leaves the range
+    if not FIRST_YEAR < time.year < LAST_YEAR:  # strict, so that UTC is in the range too
         raise InputError(
             f"the year {time.year} is not covered; expected {FIRST_YEAR + 1} to {LAST_YEAR - 1}",
             key="time",

@@ -1,4 +1,4 @@
-"""The light's irradiance, from a photo of a matte target of known reflectance."""
+"""Measure the irradiance of a light from a photo of a matte target of known reflectance."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from ..scan.camera import Camera
 
 Array = NDArray[np.float64]
 
-FEWEST = 25  # pixels of the target
-BLOCKS = 5  # each way: noise that neighbouring pixels share shows between blocks, not pixels
-OUTLIER = 4.0  # robust standard deviations: dust, scratches, a printed mark
-UNEVEN = 0.05  # of the mean, from one side of the target to the other
-CLIPPED = 0.005  # of its pixels
+MIN_PIXELS = 25  # of the target
+BLOCKS = 5  # per side: correlated noise of neighbouring pixels shows only between blocks
+OUTLIER_SIGMA = 4.0  # robust standard deviations: dust, scratches, a printed mark
+MAX_UNEVENNESS = 0.05  # of the mean, from one side of the target to the other; more gives a note
+MAX_CLIPPED_SHARE = 0.005  # of its pixels
 PLATEAU = 0.995  # of the brightest value
-LEAST_COSINE = 0.1  # 84°: beyond it a degree of the target's tilt is 20 % of irradiance
-BRIGHTEST = 1.2  # reflectance: paper with optical brightener can be above 1
+MIN_COSINE = 0.1  # 84°: beyond it 1° of the target's tilt changes the irradiance by 20 %
+MAX_REFLECTANCE = 1.2  # paper with optical brightener can be above 1
 
 
 @dataclass(frozen=True)
 class WhiteIrradiance:
-    """irradiance: (3,) at normal incidence, radiance units × sr. standard_error: (3,) of it, from
-    noise and blotches of the target alone. unevenness: share of the mean by which the target
-    differs from side to side. notes: sentences for the user."""
+    """Irradiance from a white target. irradiance: (3,) at normal incidence, radiance units × sr.
+    standard_error: (3,) of it, only from noise and blotches of the target. unevenness: difference
+    between two sides of the target, relative to the mean. notes: sentences for the user."""
 
     irradiance: Array
     standard_error: Array
@@ -44,35 +44,39 @@ def irradiance_from_white(
     direction: Sequence[float] | NDArray | None = None,
     saturation: float | None = None,
 ) -> WhiteIrradiance:
-    """E = π L / (ρ n·l): the irradiance at normal incidence of a distant light on a Lambertian
-    target.
+    """Measure the irradiance at normal incidence of a distant light, E = π L / (ρ n·l), from a
+    Lambertian target.
 
-    pixels: (h, w, 3) linear radiance of the photo; camera: the one that took it, None where it is
-    no camera of the scan (then nobody checks that the normal faces it). region: mask (h, w), white
-    = target, or polygon (n, 2) in pixels. reflectance: ρ, hemispherical (0.9; or one a channel).
-    normal: (3,) of the target, scan frame; direction: (3,) surface → light: any length. Where one
-    is missing the target is taken to face the light, n·l = 1, and a note says so. saturation:
-    radiance from which a pixel is clipped; guessed from a plateau where None.
+    pixels: (h, w, 3) linear radiance of the photo; camera: of the photo, None where it is not a
+    camera of the scan (then it is not checked that the normal faces the camera). region: mask
+    (h, w), white = target, or polygon (n, 2) in pixels. reflectance: hemispherical ρ, one number or
+    one per channel. normal: (3,) of the target, scan frame; direction: (3,) surface → light; any
+    length. Where one is missing, the target is assumed to face the light (n·l = 1), with a note.
+    saturation: radiance from which a pixel is clipped; None: detected by a plateau.
 
-    L is a mean without outliers, at the target's middle: a linear run of brightness is fitted and
-    reported. Raises InputError: a region that is none, a clipped, black or averted target.
+    L is the radiance at the target's centre from a linear fit without outliers; the slope is
+    reported as unevenness. Raises InputError for an invalid region and for a clipped, black or
+    averted target.
     """
     light = np.asarray(pixels)
     if camera is not None and light.shape != (camera.height, camera.width, 3):
         raise InputError(
-            f"the white target's photo is {light.shape[1]} × {light.shape[0]} pixels, its camera "
-            f"{camera.width} × {camera.height}",
+            f"the white target's photo is {light.shape[1]} × {light.shape[0]} pixels; expected "
+            f"{camera.width} × {camera.height}, the size of its camera",
             key="white",
         )
     rho = _reflectance(reflectance)
     rows, columns = np.nonzero(_mask(region, (light.shape[0], light.shape[1])))
-    if len(rows) < FEWEST:
+    if len(rows) < MIN_PIXELS:
         raise InputError(
-            f"the white target covers {len(rows)} pixels; expected {FEWEST} or more", key="white"
+            f"the white target covers {len(rows)} pixels; expected {MIN_PIXELS} or more",
+            key="white",
         )
     values = light[rows, columns].astype(float)
     if not np.isfinite(values).all():
-        raise InputError("the white target holds NaN or infinite pixels", key="white")
+        raise InputError(
+            "the white target has NaN or infinite pixels; expected finite numbers", key="white"
+        )
     notes: list[str] = []
     notes += _check_clipping(values, saturation)
     cosine = _cosine(normal, direction, notes)
@@ -81,39 +85,45 @@ def irradiance_from_white(
 
     radiance, error, unevenness = _level(values, rows, columns)
     if not (radiance > 0).all():
-        raise InputError("the white target is black in a channel", key="white")
-    if unevenness > UNEVEN:
+        raise InputError(
+            "the white target is black in a channel; expected light in all channels: check the "
+            "photo and the region",
+            key="white",
+        )
+    if unevenness > MAX_UNEVENNESS:
         notes.append(
-            f"the white target is {100 * unevenness:.0f} % brighter on one side than on the other: "
-            "a lamp that is near (then its irradiance is not the same on the object), vignetting, "
-            "or a shadow"
+            f"the white target is {100 * unevenness:.0f} % brighter on one side than on the other. "
+            "Possible causes: a near lamp (its irradiance then differs on the object), vignetting, "
+            "or a shadow."
         )
     factor = np.pi / (rho * cosine)
     return WhiteIrradiance(radiance * factor, error * factor, unevenness, tuple(notes))
 
 
-def _reflectance(told: float | Sequence[float]) -> Array:
+def _reflectance(given: float | Sequence[float]) -> Array:
+    """(3,) checked reflectance per channel."""
     try:
-        rho = np.broadcast_to(np.asarray(told, float), (3,))
+        rho = np.broadcast_to(np.asarray(given, float), (3,))
     except (TypeError, ValueError):
         rho = np.full(3, np.nan)
-    if not ((rho > 0) & (rho <= BRIGHTEST)).all():
+    if not ((rho > 0) & (rho <= MAX_REFLECTANCE)).all():
         raise InputError(
-            f"is {told}; expected a number above 0 and up to 1, or three of them (R, G, B)",
+            f"is {given}; expected a number above 0 and up to 1.2, or three of them (R, G, B)",
             key="reflectance",
         )
     return rho
 
 
 def _mask(region: NDArray, shape: tuple[int, int]) -> NDArray[np.bool_]:
-    told = np.asarray(region)
-    if told.shape == shape:
-        return told > 0.5 if told.dtype != bool else told
-    if told.ndim == 2 and told.shape[1] == 2 and len(told) >= 3:
-        return _polygon(told.astype(float), shape)
+    """(h, w) pixels of a region that is given as mask or polygon."""
+    given = np.asarray(region)
+    if given.shape == shape:
+        return given > 0.5 if given.dtype != bool else given
+    if given.ndim == 2 and given.shape[1] == 2 and len(given) >= 3:
+        return _polygon(given.astype(float), shape)
     raise InputError(
-        f"the white target's region has the shape {told.shape}; expected the photo's "
-        f"{shape[1]} × {shape[0]} pixels as a mask, or a polygon of three or more corners",
+        f"the white target's region has the shape {given.shape}; expected a mask of the photo's "
+        f"{shape[1]} × {shape[0]} pixels, or a polygon of three or more corners",
         key="white",
     )
 
@@ -121,7 +131,9 @@ def _mask(region: NDArray, shape: tuple[int, int]) -> NDArray[np.bool_]:
 def _polygon(corners: Array, shape: tuple[int, int]) -> NDArray[np.bool_]:
     """Pixels whose centre is inside, by the even-odd rule."""
     if not np.isfinite(corners).all():
-        raise InputError("a corner of the white target is no number", key="white")
+        raise InputError(
+            "a corner of the white target is NaN or infinite; expected finite pixels", key="white"
+        )
     y = np.arange(shape[0])[:, None] + 0.5
     x = np.arange(shape[1])[None] + 0.5
     inside = np.zeros(shape, bool)
@@ -136,17 +148,17 @@ def _check_clipping(values: Array, saturation: float | None) -> list[str]:
     top = float(values.max())
     if saturation is None:
         exact = (values == top).any(axis=1).mean()
-        # a plateau among other values is the sensor's limit; the same value everywhere is it only
-        # where that is the file's limit (else the picture is a made one, without noise)
+        # a plateau among other values is the sensor's limit; a constant value is clipped only if
+        # it is the file's limit 1.0 (otherwise the image is synthetic, without noise)
         flat = exact > 0.2 and (np.ptp(values, axis=0).any() or top == 1.0)
         limit = PLATEAU * top if flat else np.inf
     else:
         limit = saturation
     share = float((values >= limit).any(axis=1).mean())
-    if share > CLIPPED:
+    if share > MAX_CLIPPED_SHARE:
         raise InputError(
-            f"{100 * share:.0f} % of the white target's pixels are clipped; expose it less, or "
-            "give a part of it that is not",
+            f"{100 * share:.1f} % of the white target's pixels are clipped; expected at most "
+            "0.5 %: use a shorter exposure, or a part of the target that is not clipped",
             key="white",
         )
     return []
@@ -157,33 +169,34 @@ def _cosine(
     direction: Sequence[float] | NDArray | None,
     notes: list[str],
 ) -> float:
-    told = [
+    """n·l of the target; 1 with a note where the normal or the direction is missing."""
+    units = [
         None if vector is None else _unit(vector, key)
         for vector, key in ((normal, "normal"), (direction, "direction"))
     ]
-    if told[0] is None or told[1] is None:
-        missing = "normal" if told[0] is None else "light's direction"
+    if units[0] is None or units[1] is None:
+        missing = "normal of the white target" if units[0] is None else "direction of the light"
         notes.append(
-            f"the white target's {missing} is not known: it is taken to face the light (20° off "
-            "would be 6 % of irradiance)"
+            f"the {missing} is unknown, so the target is assumed to face the light (if it is "
+            "turned by 20°, the irradiance is wrong by 6 %)."
         )
         return 1.0
-    cosine = float(told[0] @ told[1])
-    if cosine < LEAST_COSINE:
+    cosine = float(units[0] @ units[1])
+    if cosine < MIN_COSINE:
         raise InputError(
             f"the white target is turned {np.degrees(np.arccos(cosine)):.0f}° from the light; "
-            "expected less than 84° (is its normal's sign right?)",
+            "expected less than 84°: check the sign of its normal",
             key="normal",
         )
     return cosine
 
 
 def _unit(vector: Sequence[float] | NDArray, key: str) -> Array:
-    told = np.asarray(vector, float)
-    length = float(np.linalg.norm(told)) if told.shape == (3,) else 0.0
+    values = np.asarray(vector, float)
+    length = float(np.linalg.norm(values)) if values.shape == (3,) else 0.0
     if not (np.isfinite(length) and length > 0):
-        raise InputError(f"is {vector}; expected three numbers, not all 0", key=key)
-    return told / length
+        raise InputError(f"is {vector}; expected three finite numbers, not all 0", key=key)
+    return values / length
 
 
 def _check_facing(
@@ -194,13 +207,15 @@ def _check_facing(
     middle = np.array([[columns.mean() + 0.5, rows.mean() + 0.5]])
     if float(camera.rays(middle)[0] @ _unit(normal, "normal")) >= 0:
         raise InputError(
-            "the white target's normal points away from the camera that sees it; turn its sign",
+            "the white target's normal points away from its camera; expected it to face the "
+            "camera: change its sign",
             key="normal",
         )
 
 
 def _level(values: Array, rows: NDArray, columns: NDArray) -> tuple[Array, Array, float]:
-    """((3,) mean radiance at the target's middle, (3,) its standard error, side-to-side share)."""
+    """((3,) radiance at the target's centre, (3,) its standard error, unevenness) from a robust
+    linear fit."""
     y, x = (axis - axis.mean() for axis in (rows.astype(float), columns.astype(float)))
     reach = max(float(np.abs(x).max()), float(np.abs(y).max()), 1.0)
     design = np.stack([np.ones(len(x)), x / reach, y / reach], axis=1)
@@ -210,8 +225,8 @@ def _level(values: Array, rows: NDArray, columns: NDArray) -> tuple[Array, Array
         fit, *_ = np.linalg.lstsq(design[kept], values[kept], rcond=None)
         left = values - design @ fit
         spread = 1.4826 * np.median(np.abs(left[kept]), axis=0) + 1e-12 * np.abs(fit[0])
-        inside = (np.abs(left) <= OUTLIER * spread).all(axis=1)
-        # a target of one value throughout (made up, or 8-bit) has no spread to judge by
+        inside = (np.abs(left) <= OUTLIER_SIGMA * spread).all(axis=1)
+        # a target of constant value (synthetic, or 8-bit) has no spread to compare with
         kept = inside if inside.sum() >= 0.5 * len(x) else kept
     left = values - design @ fit
     height, width = np.ptp(y) + 1, np.ptp(x) + 1

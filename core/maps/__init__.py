@@ -1,4 +1,5 @@
-"""Maps over the mesh's UVs: base colour without light, roughness, coverage, materials' shares."""
+"""Texture maps over the UVs of the mesh: base colour without lighting, roughness, coverage, and
+the share of each material."""
 
 from .maps_job import MapsJob, MapsSettings
 from .texels import Texels, rasterise

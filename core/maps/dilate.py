@@ -1,4 +1,4 @@
-"""Maps continued beyond the borders of their islands: no seam shows when they are filtered."""
+"""Padding of maps beyond the borders of UV islands, so that filtering shows no seams."""
 
 from __future__ import annotations
 
@@ -6,21 +6,23 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-MARGIN = 64  # a texture of so many texels a side has a margin of one, at least LEAST
-LEAST = 4
-STRIP = 1024  # rows that are looked at together, and their margin: memory
+TEXELS_PER_MARGIN = 64  # one texel of margin for each so many texels of a side
+MIN_MARGIN = 4  # texels
+STRIP = 1024  # rows processed at once, to limit memory
 
 
 def margin_of(size: int) -> int:
-    """Texels that maps are continued by in a texture of ``size`` a side."""
-    return max(LEAST, size // MARGIN)
+    """Width in texels of the padding in a texture of ``size`` texels a side."""
+    return max(MIN_MARGIN, size // TEXELS_PER_MARGIN)
 
 
 def dilated(
     images: list[NDArray], known: NDArray[np.bool_], margin: int
 ) -> tuple[list[NDArray], NDArray[np.bool_]]:
-    """(the images (h, w, …), each texel within ``margin`` of a known one as the nearest of them,
-    (h, w) where there is a value now). known: (h, w)."""
+    """(the images (h, w, …), padded; (h, w) True where there is a value now).
+
+    Each texel within ``margin`` of a known one takes the value of the nearest. known: (h, w).
+    """
     out = [image.copy() for image in images]
     reached = known.copy()
     for first in range(0, len(known), STRIP):

@@ -1,4 +1,4 @@
-"""All photos' samples of a band of texels, each texel's scale from them, and the masks' votes."""
+"""The samples of a band of texels from all photos, the scale of each texel, and the mask votes."""
 
 from __future__ import annotations
 
@@ -11,18 +11,19 @@ from numpy.typing import NDArray
 from ..concurrency.job import Step
 from ..scan import Mesh
 from .level import MaterialLevel
-from .look import PhotoLook
+from .look import PhotoSampler
 from .slots import TexelSlots
 from .solve import TexelScales, solve_texels
 from .texels import Texels
 
-CHUNK = 1 << 17  # texels that are looked at together
+CHUNK = 1 << 17  # texels processed at once, to limit memory
 
 
 @dataclass(frozen=True)
 class Gathered:
-    """n texels. scales: of each; photos: (n,) uint16, how many see it lit; votes: (n, materials)
-    float32, what the photos' masks say; material: (n,) uint8, the one with most votes."""
+    """Results for n texels. scales: of each texel; photos: (n,) uint16, number of photos that show
+    it lit; votes: (n, materials) float32, votes of the photos' masks for each material; material:
+    (n,) uint8, the one with most votes."""
 
     scales: TexelScales
     photos: NDArray[np.uint16]
@@ -31,7 +32,7 @@ class Gathered:
 
     @staticmethod
     def join(parts: list[Gathered]) -> Gathered:
-        """Bands one after the other."""
+        """Concatenate bands in order."""
         names = [f.name for f in fields(TexelScales)]
         scales = TexelScales(
             **{n: np.concatenate([getattr(p.scales, n) for p in parts]) for n in names}
@@ -48,10 +49,10 @@ def gather_band(
     mesh: Mesh,
     texels: Texels,
     band: slice,
-    looks: Iterable[tuple[Step, PhotoLook]],
+    looks: Iterable[tuple[Step, PhotoSampler]],
     levels: tuple[MaterialLevel, ...],
 ) -> Generator[Step, None, Gathered]:
-    """Texels ``band`` in one photo after the other."""
+    """Sample the texels ``band`` in one photo after the other, then solve for their scales."""
     n = band.stop - band.start
     slots, votes = TexelSlots.empty(n), np.zeros((n, len(levels)), np.float32)
     for step, look in looks:
@@ -59,8 +60,8 @@ def gather_band(
         for start in range(0, n, CHUNK):
             rows = slice(band.start + start, band.start + min(start + CHUNK, n))
             points, normals = texels.points(mesh, rows), texels.normals(mesh, rows)
-            samples, seen, said = look.at(points, normals)
-            votes[seen + start] += said
+            samples, seen, photo_votes = look.at(points, normals)
+            votes[seen + start] += photo_votes
             slots.add(samples.moved(start))
     material = votes.argmax(axis=1).astype(np.uint8)
     channels = np.stack([level.channels for level in levels])

@@ -1,4 +1,4 @@
-"""Which pixels of a photo show which material, and which of them a fit would trust."""
+"""The material that each pixel of a photo shows, and the pixels that are reliable."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from numpy.typing import NDArray
 from ..capture import Capture
 from ..geometry import PixelRays, RayScene, bands, view_window
 from ..inputs import capture_data
+from ..inputs.material_pixels import material_pixels
 from ..inputs.photos import LitPhoto
 from ..light import Light
 from ..samples.take import halo, inner_pixels, light_surface, trusted_pixels
 from ..scan import Camera, Scan
 
-MOST_MATERIALS = 250
+MAX_MATERIALS = 250  # labels are uint8, 0 means no material
 
 
 @dataclass(frozen=True)
 class PixelLabels:
-    """shown: (h, w) uint8, 1 + place of the material that a pixel shows, 0 for none. trusted: the
+    """shown: (h, w) uint8, 1 + index of the material that a pixel shows, 0 for none. trusted: the
     same where the pixel is lit, not clipped, and away from outlines, shadow edges and the borders
     of masks; 0 elsewhere."""
 
@@ -37,7 +38,8 @@ def label_pixels(
     photo: LitPhoto,
     light: Light,
 ) -> PixelLabels:
-    """Look at one photo in bands, as sampling for a fit does. Raises InputError for its masks."""
+    """Label the pixels of photo ``place`` in bands, by the same criteria as the samples of a fit.
+    Raises InputError for masks that cannot be used."""
     masks = capture_data.photo_masks(capture, place)
     margins = capture.fit.margins
     lines = PixelRays.of(camera)
@@ -51,7 +53,7 @@ def label_pixels(
         if not wanted.any():
             continue
         lighting = light_surface(rays, view, light, camera)
-        where, in_shadow = capture_data.material_pixels(capture, scan, view, place, masks)
+        where, in_shadow = material_pixels(capture, scan, view, masks)
         good = trusted_pixels(view, lighting, margins) & ~in_shadow & wanted
         good &= usable.take(view.pixel)
         for index, material in enumerate(capture.materials):
@@ -59,6 +61,6 @@ def label_pixels(
             shown[view.pixel[pixels & wanted]] = index + 1
             inner = inner_pixels(view, pixels, margins)
             trusted[view.pixel[good & inner]] = index + 1
-    trusted[trusted != shown] = 0  # masks that overlap: nobody knows
+    trusted[trusted != shown] = 0  # overlapping masks: the material is ambiguous
     shape = camera.height, camera.width
     return PixelLabels(shown.reshape(shape), trusted.reshape(shape))

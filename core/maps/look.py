@@ -1,4 +1,4 @@
-"""Texels looked up in one photo: where they are in it, whether it sees them, and what it shows."""
+"""Texels projected into one photo: position, visibility, and the reflectance that it shows."""
 
 from __future__ import annotations
 
@@ -21,19 +21,20 @@ from .slots import TexelSamples
 
 Array = NDArray[np.floating]
 
-LEAST_COSINE = 0.1  # of light and view: as of a fit's samples
-RELATIVE = 0.03  # of the radiance: misregistration, resampling, what no model explains
-NOISE = 0.002  # of the photo's bright end: what dark pixels may be off by
-GRAZING = 0.03  # times 1/cos − 1, light's and view's: fitted BRDFs are least sure there
-SHINY = 0.1  # share of the reflectance: less is no highlight to judge gloss by
-SPECULAR_TRUST = 0.25  # of the specular part: the surface's gloss may vary by so much
-LIMB = 4  # rays to the rim of a light with a size
+MIN_COSINE = 0.1  # of light and view: the default of the samples of a fit
+RELATIVE_ERROR = 0.03  # of the radiance: misregistration, resampling, model error
+NOISE = 0.002  # error of dark pixels, as a fraction of the photo's 95th percentile
+GRAZING_ERROR = 0.03  # relative, times 1/cos − 1 of light and view: fits are least accurate there
+MIN_SPECULAR_SHARE = 0.1  # of the reflectance: with less, a sample has no information on gloss
+SPECULAR_ERROR = 0.25  # of the specular part, since the gloss of the surface may vary
+RIM_RAYS = 4  # shadow rays to the rim of a light with a size
 
 
 @dataclass(frozen=True)
-class PhotoLook:
-    """One photo, ready to be asked. radiance: (h, w, 3) linear. bright: its bright end. levels:
-    what the fit knows of each material, in the order of the capture."""
+class PhotoSampler:
+    """One photo, prepared for sampling texels. radiance: (h, w, 3) linear. bright: the 95th
+    percentile of the mean radiance of reliable pixels. levels: the fitted materials, in the order
+    of the capture."""
 
     rays: RayScene
     camera: Camera
@@ -54,18 +55,19 @@ class PhotoLook:
         photo: LitPhoto,
         light: Light,
         levels: tuple[MaterialLevel, ...],
-    ) -> PhotoLook:
-        """Label the photo's pixels and measure its bright end on what is trusted."""
+    ) -> PhotoSampler:
+        """Label the pixels of the photo and measure the radiance of its bright pixels."""
         labels = label_pixels(capture, scan, rays, camera, place, photo, light)
         lit = photo.radiance[labels.trusted > 0].mean(axis=1)
         bright = float(np.percentile(lit, 95)) if len(lit) else 0.0
         return cls(rays, camera, light, photo.radiance, labels, levels, bright)
 
     def at(self, points: Array, normals: Array) -> tuple[TexelSamples, NDArray[np.intp], Array]:
-        """(samples of the texels that are seen lit, rows (k,) of those that are seen at all, their
-        votes (k, materials): how much of the pixels around shows each material).
+        """(samples of the texels that are visible and lit; rows (k,) of all visible texels; their
+        votes (k, materials), the bilinear share of the pixels that show each material, times cos
+        θo).
 
-        points, normals: (n, 3), scan frame."""
+        points, normals: (n, 3) of the texels, scan frame."""
         facing, view, pixels = self._facing(points, normals)
         weights, corners = _corners(pixels, self.camera)
         shown = self.labels.shown.ravel()[corners]
@@ -91,7 +93,8 @@ class PhotoLook:
         return samples, facing, votes
 
     def _facing(self, points: Array, normals: Array) -> tuple[NDArray[np.intp], Array, Array]:
-        """(rows that face the camera and lie in the photo, their directions to it, pixels)."""
+        """(rows (k,) of the points that face the camera and lie inside the photo, unit directions
+        to the camera (k, 3), pixel positions (k, 2))."""
         centre = self.camera.pose.centre
         if self.camera.orthographic:
             view = np.broadcast_to(-self.camera.pose.rotation[2], points.shape)
@@ -99,7 +102,7 @@ class PhotoLook:
             offset = centre - points
             view = offset / np.maximum(np.linalg.norm(offset, axis=1, keepdims=True), 1e-12)
         cosine = np.einsum("ij,ij->i", normals, view)
-        rows = np.flatnonzero(cosine > LEAST_COSINE)
+        rows = np.flatnonzero(cosine > MIN_COSINE)
         pixels = self.camera.project(points[rows])
         with np.errstate(invalid="ignore"):
             inside = (pixels >= 0.5).all(axis=1) & (pixels[:, 0] <= self.camera.width - 0.5)
@@ -108,7 +111,7 @@ class PhotoLook:
         return rows, view[rows], pixels[inside]
 
     def _hidden(self, points: Array, normals: Array, view: Array) -> NDArray[np.bool_]:
-        """(n,) whether the mesh hides a point from the camera."""
+        """(n,) True where the mesh hides a point from the camera."""
         limits = None
         if not self.camera.orthographic:
             limits = np.linalg.norm(self.camera.pose.centre - points, axis=1)
@@ -125,10 +128,14 @@ class PhotoLook:
         corners: NDArray[np.intp],
         material: NDArray[np.uint8],
     ) -> TexelSamples:
+        """The body's scale and its error from the pixels around each texel, for lit texels.
+
+        points, normals: (n, 3); texel: (k,) rows of these; view: (k, 3); weights, corners: (k, 4)
+        bilinear weights and flat pixels; material: (k,)."""
         point, normal = points[texel], normals[texel]
         incidence = self.light.incidence(point, self.camera)
         cos_i = np.einsum("ij,ij->i", normal, incidence.towards)
-        lit = np.flatnonzero((cos_i > LEAST_COSINE) & (incidence.irradiance > 1e-30).all(axis=1))
+        lit = np.flatnonzero((cos_i > MIN_COSINE) & (incidence.irradiance > 1e-30).all(axis=1))
         some = incidence.select(lit)
         point, normal = point[lit], normal[lit]
         lit = lit[~self._shadowed(point, normal, some)]
@@ -156,38 +163,38 @@ class PhotoLook:
             body = np.maximum(part.body.mean(axis=1), 1e-9)
             shine = part.specular.mean(axis=1)
             tilt = level.normal_error * sine[own] / cos_i[own]
-            steep = GRAZING * (1 / cos_i[own] + 1 / cos_o[own] - 2)
+            steep = GRAZING_ERROR * (1 / cos_i[own] + 1 / cos_o[own] - 2)
             variance = (
                 (level.scale * noise[own]) ** 2
-                + (RELATIVE**2 + tilt**2 + steep**2) * grey**2
-                + (SPECULAR_TRUST * shine) ** 2
+                + (RELATIVE_ERROR**2 + tilt**2 + steep**2) * grey**2
+                + (SPECULAR_ERROR * shine) ** 2
                 + part.slope**2
             )
             scale[own] = (rho - part.specular) / np.maximum(part.body, 1e-9)
             error[own] = np.sqrt(variance) / body
             specular[own] = shine / np.maximum(shine + body, 1e-12)
-            shiny = level.split.whole | (specular[own] > SHINY)
+            shiny = level.split.whole | (specular[own] > MIN_SPECULAR_SHARE)
             gloss[own] = np.where(shiny, part.gloss / body, 0.0)
         return TexelSamples(texel, scale, error, specular, gloss, material)
 
     def _shadowed(self, points: Array, normals: Array, light: Incidence) -> NDArray[np.bool_]:
-        """(n,) whether any of the light's disc is hidden: penumbras count as shadow."""
+        """(n,) True where any part of the light's disc is hidden: penumbras count as shadow."""
         blocked = cast_shadow(self.rays, points, normals, light.towards, light.distance)
         radius = angular_radius(self.light, light)
         if radius is None:
             return blocked
         first, second = tangents(light.towards)
-        for k in range(LIMB):
-            turn = 2 * np.pi * k / LIMB
-            aside = np.tan(radius)[:, None] * (np.cos(turn) * first + np.sin(turn) * second)
-            towards = light.towards + aside
+        for k in range(RIM_RAYS):
+            turn = 2 * np.pi * k / RIM_RAYS
+            offset = np.tan(radius)[:, None] * (np.cos(turn) * first + np.sin(turn) * second)
+            towards = light.towards + offset
             towards = towards / np.linalg.norm(towards, axis=1, keepdims=True)
             blocked |= cast_shadow(self.rays, points, normals, towards, light.distance)
         return blocked
 
 
 def angular_radius(light: Light, incidence: Incidence) -> Array | None:
-    """(n,) radians, half of what the light spans at each point; None for a point-like one."""
+    """(n,) angular radius of the light in radians at each point; None for a light without size."""
     if isinstance(light, DistantLight):
         return None if light.angular_radius <= 0 else np.full(
             len(incidence.towards), light.angular_radius
@@ -199,8 +206,8 @@ def angular_radius(light: Light, incidence: Incidence) -> Array | None:
 
 
 def _corners(pixels: Array, camera: Camera) -> tuple[Array, NDArray[np.intp]]:
-    """(weights (n, 4), flat pixels (n, 4)) of bilinear interpolation at pixels (n, 2), whose
-    centres are at halves."""
+    """(weights (n, 4), flat pixels (n, 4)) of bilinear interpolation at positions (n, 2); pixel
+    centres are at half-integers."""
     at = pixels - 0.5
     low = np.floor(at).astype(np.intp)
     low[:, 0] = np.clip(low[:, 0], 0, max(camera.width - 2, 0))

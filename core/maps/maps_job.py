@@ -1,4 +1,4 @@
-"""A capture and the result of its fit → maps over the mesh's texture coordinates, in steps."""
+"""The job that makes texture maps over the UVs of the mesh, from a capture and its fit."""
 
 from __future__ import annotations
 
@@ -22,27 +22,29 @@ from ..samples import SampleTable
 from ..scan import Mesh, Scan
 from .gather import Gathered, gather_band
 from .level import MaterialLevel
-from .look import PhotoLook
+from .look import PhotoSampler
 from .material import MapMaterial, from_fit, from_result
 from .normals import TurnedNormals, tangent_normals
 from .painted import painted_principled
 from .refit import Paint, PaintlessFitJob, levels_without_paint, scaled
-from .settle import TexelMaps, settle
+from .settle import TexelMaps, complete_maps
 from .texels import Texels, check_size, rasterise
 
-BAND = 3 << 20  # texels that are gathered at once: 100 bytes each
-PREVIEW = 512  # texels a side of the maps that a fit without paint is made with
-REFITS = 2  # the second brings the error of what the first was made from down to a few per cent
-VARIED = 0.08  # of the mean: standard deviation of a material's scale that calls for such a fit
-SURE = 0.1  # relative error of texels that are asked
+BAND = 3 << 20  # texels that are sampled at once: 100 bytes each
+REFIT_SIZE = 512  # texels a side of the maps that refits use
+REFITS = 2  # with the second, the error of the maps that the refit uses is a few per cent
+MAX_VARIATION = (
+    0.08  # standard deviation of a material's scale, relative: above it, a refit is made
+)
+MAX_SCALE_ERROR = 0.1  # relative error of the texels that this decision uses
 
 Unwrap = Callable[[Mesh], NDArray[np.float32]]
 
 
 @dataclass(frozen=True)
 class MapsSettings:
-    """size: texels a side. refits: how often the BRDF is fitted again on samples without their
-    paint, where the colour varies. normal: make a normal map too."""
+    """size: texels a side. refits: number of refits of the BRDF to samples with the colour
+    variation removed, if the colour varies over the surface. normal: make a normal map too."""
 
     size: int = 2048
     refits: int = REFITS
@@ -51,11 +53,11 @@ class MapsSettings:
 
 @dataclass(frozen=True)
 class MapsResult:
-    """texels: where the mesh is in the texture; maps: what was found there; levels, materials: in
-    the order of the capture; unwrapped: whether the texture coordinates were made here; refit: the
-    fit without paint, None where the result given was good enough; normal: (n, 3) of the texels in
-    their tangent frames, None where none was asked for or the photos say nothing; notes: sentences
-    for the user."""
+    """texels: those that the mesh covers; maps: their values; levels, materials: in the order of
+    the capture; unwrapped: True if the texture coordinates were made by this job; refit: the fit
+    with the colour variation removed, None if none was needed; normal: (n, 3) unit normals of the
+    texels in their tangent frames, None if not requested or without enough samples; notes:
+    sentences for the user."""
 
     capture: Capture
     scan: Scan
@@ -70,10 +72,10 @@ class MapsResult:
 
 
 class MapsJob(Job):
-    """Maps of every material of a capture; ``result`` is there when the job is done.
+    """Make the maps of every material of a capture; ``result`` holds them when the job is done.
 
-    unwrap: what makes texture coordinates (f, 3, 2) for a mesh without; None: such a mesh is
-    refused.
+    unwrap: a function that makes texture coordinates (f, 3, 2) for a mesh without any; None: such
+    a mesh raises InputError.
     """
 
     def __init__(
@@ -90,7 +92,7 @@ class MapsJob(Job):
         self.result: MapsResult | None = None
 
     def run(self) -> Iterator[Step]:
-        """Scan and lights, then every photo, then what is between the texels."""
+        """Read the scan and the lights, sample every photo, then smooth and fill the maps."""
         capture = self.capture
         check_size(self.settings.size)
         own = from_result(capture, self.fitted)
@@ -107,7 +109,7 @@ class MapsJob(Job):
         rays = RayScene.build(scan.mesh)
         photos = LitPhotos.open(capture)
         lights = yield from self._lights(scan, photos, rays)
-        see = _Seeing(capture, scan, rays, photos, lights)
+        see = _PhotoInputs(capture, scan, rays, photos, lights)
         levels = _levels(own)
         refit = yield from self._without_paint(see, texels, levels)
         if refit is not None:
@@ -128,11 +130,11 @@ class MapsJob(Job):
         )
 
     def _normal(
-        self, see: _Seeing, paint: Paint
+        self, see: _PhotoInputs, paint: Paint
     ) -> Generator[Step, None, NDArray[np.float32] | None]:
-        """The normal map, from samples taken again and rid of their paint."""
+        """The normal map, from new samples with the colour variation removed."""
         tables = yield from self._samples(see, 0.96, 0.01)
-        step = Step("normals", 0.97)
+        step = Step("computing the normal map", 0.97)
         yield step
 
         def work() -> NDArray[np.float32] | None:
@@ -143,12 +145,12 @@ class MapsJob(Job):
         return (yield from in_background(work, step))
 
     def _without_paint(
-        self, see: _Seeing, texels: Texels, levels: tuple[MaterialLevel, ...]
+        self, see: _PhotoInputs, texels: Texels, levels: tuple[MaterialLevel, ...]
     ) -> Generator[Step, None, CaptureResult | None]:
-        """The fit again where the colour varies, else None."""
+        """The refit with the colour variation removed; None if the colour varies little."""
         capture, basis, rounds = self.capture, self.fitted.basis, self.settings.refits
         mesh = see.scan.mesh
-        few = texels if texels.size <= PREVIEW else rasterise(mesh, PREVIEW)
+        few = texels if texels.size <= REFIT_SIZE else rasterise(mesh, REFIT_SIZE)
         tables: list[SampleTable] = []
         for number in range(rounds):
             begin, share = 0.05 + 0.75 * number / rounds, 0.75 / rounds
@@ -160,7 +162,7 @@ class MapsJob(Job):
                 again = PaintlessFitJob(capture, basis, paint)
                 while again.step():
                     done = begin + share * (0.3 + 0.7 * again.now.fraction)
-                    yield Step(f"without the paint: {again.now.stage}", done)
+                    yield Step(f"refitting without colour variation: {again.now.stage}", done)
                 return again.result
             if not tables:
                 tables = yield from self._samples(see, begin + 0.3 * share, 0.2 * share)
@@ -168,16 +170,16 @@ class MapsJob(Job):
             while True:
                 try:
                     done = begin + share * (0.5 + 0.5 * next(steps))
-                    yield Step("without the paint: fitting", done)
+                    yield Step("refitting without colour variation", done)
                 except StopIteration as end:
                     levels = end.value
                     break
         return None
 
     def _samples(
-        self, see: _Seeing, begin: float, share: float
+        self, see: _PhotoInputs, begin: float, share: float
     ) -> Generator[Step, None, list[SampleTable]]:
-        """One table a material."""
+        """The samples of all photos, one table for each material."""
         steps = take_samples(self.capture, see.scan, see.rays, see.photos, see.lights)
         while True:
             try:
@@ -188,13 +190,14 @@ class MapsJob(Job):
 
     def _maps(
         self,
-        see: _Seeing,
+        see: _PhotoInputs,
         texels: Texels,
         levels: tuple[MaterialLevel, ...],
         begin: float,
         share: float,
     ) -> Generator[Step, None, TexelMaps]:
-        """All photos, a band of texels at a time, then what is between the texels."""
+        """Sample all photos, one band of texels at a time, then smooth and fill the maps. Raises
+        InputError where no photo shows a lit texel."""
         mesh = see.scan.mesh
         bands = [slice(i, min(i + BAND, len(texels))) for i in range(0, len(texels), BAND)]
         parts: list[Gathered] = []
@@ -205,16 +208,17 @@ class MapsJob(Job):
         gathered = Gathered.join(parts)
         if not (gathered.scales.weight > 0).any():
             raise self.capture.error(
-                "no texel is seen lit by any photo: does the result belong to this capture?",
+                "no texel is seen lit by any photo; expected the result of a fit of this capture; "
+                "give that result, and check the camera poses and the lights",
                 "photo", 0, "file",
             )  # fmt: skip
-        yield Step("between the photos", begin + 0.9 * share)
-        return settle(mesh, texels, gathered, levels)
+        yield Step("smoothing and filling the maps", begin + 0.9 * share)
+        return complete_maps(mesh, texels, gathered, levels)
 
     def _lights(
         self, scan: Scan, photos: LitPhotos, rays: RayScene
     ) -> Generator[Step, None, Lights]:
-        """Where the fit had them: refined where the capture says so."""
+        """The lights of the capture, refined where the capture requests it, as in the fit."""
         lights = find_lights(self.capture, scan, photos)
         if not any(entry.refine for entry in self.capture.lights):
             return lights
@@ -228,8 +232,8 @@ class MapsJob(Job):
 
 
 @dataclass(frozen=True)
-class _Seeing:
-    """What a photo is looked at with."""
+class _PhotoInputs:
+    """The inputs for sampling texels in photos."""
 
     capture: Capture
     scan: Scan
@@ -239,14 +243,16 @@ class _Seeing:
 
     def looks(
         self, levels: tuple[MaterialLevel, ...], begin: float, share: float
-    ) -> Iterator[tuple[Step, PhotoLook]]:
-        """One photo after the other, with what is to be told before it."""
+    ) -> Iterator[tuple[Step, PhotoSampler]]:
+        """Each photo, prepared for sampling, with the progress step to report before it."""
         capture, count = self.capture, len(self.capture.photos)
         for place in range(count):
             camera = capture_data.camera_of(capture, self.scan, place)
             photo, light = self.photos.read(place), self.lights.of(capture, place)
-            look = PhotoLook.of(capture, self.scan, self.rays, camera, place, photo, light, levels)
-            yield Step("texels in the photos", begin + share * place / count), look
+            look = PhotoSampler.of(
+                capture, self.scan, self.rays, camera, place, photo, light, levels
+            )
+            yield Step("sampling texels in the photos", begin + share * place / count), look
 
 
 def _levels(materials: tuple[MapMaterial, ...]) -> tuple[MaterialLevel, ...]:
@@ -254,16 +260,16 @@ def _levels(materials: tuple[MapMaterial, ...]) -> tuple[MaterialLevel, ...]:
 
 
 def _painted(maps: TexelMaps, levels: tuple[MaterialLevel, ...]) -> bool:
-    """Whether any material's colour varies by more than a fit without maps puts up with: most of
-    its well-seen texels, not a few that something else is wrong with."""
+    """True if the colour of any material varies by more than a fit of one BRDF tolerates. Judged by
+    the central 68 % of the well-measured texels, so that a few wrong ones do not matter."""
     for index, (own, level) in enumerate(zip(maps.materials, levels, strict=True)):
-        well = (maps.material == index) & (maps.photos > 1) & (maps.error < SURE)
+        well = (maps.material == index) & (maps.photos > 1) & (maps.error < MAX_SCALE_ERROR)
         if not well.any():
             continue
         scale = own.scale[well] @ level.channels
         low, middle, high = np.percentile(scale, (16, 50, 84))
-        told = float(np.median(maps.error[well]))
-        if (0.5 * (high - low) / max(middle, 1e-6)) ** 2 > VARIED**2 + told**2:
+        noise = float(np.median(maps.error[well]))
+        if (0.5 * (high - low) / max(middle, 1e-6)) ** 2 > MAX_VARIATION**2 + noise**2:
             return True
     return False
 
@@ -271,28 +277,31 @@ def _painted(maps: TexelMaps, levels: tuple[MaterialLevel, ...]) -> bool:
 def _notes(
     texels: Texels, levels: tuple[MaterialLevel, ...], unwrapped: bool, refitted: bool
 ) -> tuple[str, ...]:
-    said = []
+    notes = []
     if refitted:
-        said.append(
-            "the colour varies over the surface: the BRDF was fitted again without it, and that "
-            "fit is written beside the maps; its held-out errors are those of photos without paint"
+        notes.append(
+            "The colour varies over the surface. The BRDF was fitted again to samples with this "
+            "variation removed; the new fit is written to the folder of the maps. Its errors on "
+            "held-out photos are those of photos without the variation."
         )
     if unwrapped:
-        said.append("the mesh had no texture coordinates: Blender's Smart UV Project made some")
+        notes.append(
+            "The mesh has no texture coordinates. They were made by Blender's Smart UV Project."
+        )
     if texels.overlapped:
         share = 100 * texels.overlapped / len(texels)
-        said.append(
-            f"{share:.1f} % of the texels are claimed by more than one face (overlapping UVs): the "
-            "first of them is shown"
+        notes.append(
+            f"{share:.1f} % of the texels are covered by more than one face (overlapping UVs). The "
+            "first of these faces is used."
         )
     if texels.outside:
-        said.append(
-            f"{texels.outside:,} faces have texture coordinates outside of 0 … 1: they have no map"
+        notes.append(
+            f"{texels.outside:,} faces have texture coordinates outside 0 … 1. They get no map."
         )
-    said += [
-        f"{level.name}: {100 * level.split.share:.0f} % of what it reflects is diffuse: too little "
-        "to map, so its whole reflectance varies"
+    notes += [
+        f"{level.name}: only {100 * level.split.share:.0f} % of the reflected light is diffuse. "
+        "The maps therefore scale the whole reflectance."
         for level in levels
         if level.split.whole
     ]
-    return tuple(said)
+    return tuple(notes)

@@ -1,4 +1,4 @@
-"""A fitted material as maps need it, from a result on disk or from a fit just done."""
+"""A fitted material as the maps need it, from a result file or from a fit in memory."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from ..errors import InputError
 from ..fit.measured_result import MeasuredResult
 from ..jobs import CaptureResult
 from ..result import FittedResult
-from .labels import MOST_MATERIALS
+from .labels import MAX_MATERIALS
 
 
 @dataclass(frozen=True)
 class MapMaterial:
-    """name; brdf: ρ in 1/sr; principled: the Principled that was fitted to it; scale: what the
-    photos' reflectance was multiplied by; normal_deviation: degrees per tangent."""
+    """brdf: ρ in 1/sr; principled: the Principled BSDF fitted to it; scale: factor of the photos'
+    reflectance in the fit (1 where irradiance is known); normal_deviation: standard deviation of
+    the normals, degrees along each tangent."""
 
     name: str
     brdf: PrincipalBRDF
@@ -27,18 +28,20 @@ class MapMaterial:
 
 
 def from_result(capture: Capture, fitted: FittedResult) -> tuple[MapMaterial, ...]:
-    """The materials in the capture's order. Raises InputError where one is missing."""
-    if len(capture.materials) > MOST_MATERIALS:
+    """The materials in the order of the capture. Raises InputError if one is missing in the result,
+    or if there are more than MAX_MATERIALS."""
+    if len(capture.materials) > MAX_MATERIALS:
         raise InputError(
-            f"has {len(capture.materials)} materials, maps are made of {MOST_MATERIALS} at most",
+            f"found {len(capture.materials)} materials; expected at most {MAX_MATERIALS} for "
+            "maps; combine some of them",
             file=capture.file,
         )
     there = {m.name: m for m in fitted.materials}
     for entry in capture.materials:
         if entry.name not in there:
             raise InputError(
-                f"holds no material {entry.name!r} of {capture.file.name}; it has: "
-                f"{', '.join(there)}. Give the result of this capture's fit",
+                f"found the materials {', '.join(there)}; expected {entry.name!r} of "
+                f"{capture.file.name} too; give the result of a fit of this capture",
                 file=fitted.file,
             )
     return tuple(
@@ -48,7 +51,7 @@ def from_result(capture: Capture, fitted: FittedResult) -> tuple[MapMaterial, ..
 
 
 def from_fit(result: CaptureResult) -> tuple[MapMaterial, ...]:
-    """The materials of a fit just done, in the capture's order."""
+    """The materials of a fit in memory, in the order of the capture."""
     return tuple(
         MapMaterial(
             m.name,

@@ -1,13 +1,14 @@
-"""A normal map from what photos say of the surface's normals, given the BRDF.
+"""A normal map, estimated from the photos given the BRDF.
 
-The estimator turns the scan's normals patch by patch (core/fit/measured/normals.py) to be rid of
-their errors. Here the same turns, from samples without paint, are kept: between patches' centres
-they are interpolated, and each texel's normal is written in its tangent frame: red along growing u,
-green along growing v, blue along the smooth normal (what Blender's Normal Map node and glTF read).
+The estimator corrects the normals of the scan, one correction for each surface patch
+(core/fit/measured/normals.py). Here the same corrections are computed from samples with the colour
+variation removed. They are interpolated between the centres of the patches. The normal of each
+texel is written in its tangent frame: red along increasing u, green along increasing v, blue along
+the smooth normal, as in glTF and Blender's Normal Map node.
 
-Tangents are the mean of the faces' ∂P/∂u around a vertex of one island, weighted by the corners'
-angles, square to the normal: MikkTSpace's but for its order of sums. Turns are some degrees; a
-tangent's own error of a degree matters in the second order.
+The tangent at a vertex is the mean of ∂P/∂u over the faces of one UV island, weighted by the angles
+of their corners and orthogonalised to the normal. This is MikkTSpace except for the order of the
+sums. The corrections are a few degrees, so an error of one degree in a tangent is of second order.
 """
 
 from __future__ import annotations
@@ -29,17 +30,18 @@ from .texels import Texels
 
 Array = NDArray[np.float64]
 
-NEAREST = 6  # patches that a texel's turn is taken from
-REACH = 3.0  # patch sizes: farther away nothing was seen
-FEWEST = 50  # samples of a material
-MOST_SAMPLES = 1_000_000
-CHUNK = 1 << 17
+NEIGHBOUR_PATCHES = 6  # patches that the correction of a texel is interpolated from
+MAX_DISTANCE = 3.0  # in patch sizes: patches farther away have no influence
+MIN_SAMPLES = 50  # of a material
+MAX_SAMPLES = 1_000_000  # of a material; a regular subset is used of more
+CHUNK = 1 << 17  # texels processed at once, to limit memory
 
 
 @dataclass(frozen=True)
 class TurnedNormals:
-    """p patches of the surface. points: (p, 3) their centres, scan frame; turn: (p, 3) is added to
-    the scan's unit normal; size: a patch's edge, scan units."""
+    """Corrections of the normals of p surface patches. points: (p, 3) their centres, scan frame;
+    turn: (p, 3) vectors that are added to the unit normals of the scan; size: edge length of a
+    patch, scan units."""
 
     points: Array
     turn: Array
@@ -49,14 +51,15 @@ class TurnedNormals:
     def of(
         cls, tables: Sequence[SampleTable], levels: Sequence[MaterialLevel]
     ) -> TurnedNormals | None:
-        """From samples without paint, one table a material; None where none has enough."""
+        """Estimate the corrections from samples with the colour variation removed, one table for
+        each material. None if no material has MIN_SAMPLES."""
         points: list[Array] = []
         turns: list[Array] = []
         sizes = []
         for table, level in zip(tables, levels, strict=True):
-            if len(table) < FEWEST:
+            if len(table) < MIN_SAMPLES:
                 continue
-            step = -(-len(table) // MOST_SAMPLES)
+            step = -(-len(table) // MAX_SAMPLES)
             some = table if step == 1 else table.select(np.arange(0, len(table), step))
             patches = Patches.of_points(some.point)
             brdf = LogTable.of(level.brdf.basis, level.brdf.coefficients)
@@ -74,15 +77,16 @@ class TurnedNormals:
         return cls(np.concatenate(points), np.concatenate(turns), float(np.max(sizes)))
 
     def at(self, points: Array, normals: Array) -> Array:
-        """(n, 3) unit normals at points (n, 3) whose smooth normals are ``normals`` (n, 3)."""
+        """(n, 3) corrected unit normals at points (n, 3) with the smooth normals ``normals`` (n,
+        3)."""
         out = np.empty_like(normals)
-        tree, count = cKDTree(self.points), min(NEAREST, len(self.points))
+        tree, count = cKDTree(self.points), min(NEIGHBOUR_PATCHES, len(self.points))
         for begin in range(0, len(points), CHUNK):
             part = slice(begin, begin + CHUNK)
             away, near = tree.query(points[part], k=count)
             away = away.reshape(-1, count) / self.size
-            weight = np.exp(-0.5 * away**2) * (away < REACH)
-            # what is far from all patches keeps its normal
+            weight = np.exp(-0.5 * away**2) * (away < MAX_DISTANCE)
+            # texels far from all patches keep their normals
             total = np.maximum(weight.sum(axis=1, keepdims=True), 0.2)
             turn = np.einsum("nk,nkc->nc", weight / total, self.turn[near.reshape(-1, count)])
             normal = normals[part]
@@ -92,7 +96,8 @@ class TurnedNormals:
 
 
 def tangent_normals(mesh: Mesh, texels: Texels, turned: TurnedNormals) -> NDArray[np.float32]:
-    """(n, 3) unit normals of all texels in their tangent frames: (0, 0, 1) is the mesh's own."""
+    """(n, 3) corrected unit normals of all texels in their tangent frames; (0, 0, 1) is the smooth
+    normal of the mesh."""
     corner, tangents, sign = corner_tangents(mesh)
     out = np.empty((len(texels), 3), np.float32)
     for begin in range(0, len(texels), CHUNK):
@@ -112,9 +117,9 @@ def tangent_normals(mesh: Mesh, texels: Texels, turned: TurnedNormals) -> NDArra
 
 
 def corner_tangents(mesh: Mesh) -> tuple[NDArray[np.int64], Array, Array]:
-    """(tangent of each face's corner (f, 3) as a place in the next, tangents (t, 3) unit, (f,) +1
-    or −1 where a face is mirrored in the texture). Corners share one where they share vertex,
-    texture coordinates and handedness."""
+    """((f, 3) index of the tangent of each corner of each face, (t, 3) unit tangents, (f,) +1, or
+    −1 for faces that are mirrored in the texture). Corners with the same vertex, texture
+    coordinates and handedness share a tangent."""
     assert mesh.uv is not None
     uv = mesh.uv.astype(np.float64)
     point = mesh.vertices[mesh.faces]

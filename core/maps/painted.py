@@ -1,9 +1,9 @@
-"""The Principled that a base-colour map belongs to.
+"""The Principled BSDF that is used with a base-colour map.
 
-A map of the diffuse part must not colour the highlight. A Principled that is partly metal, which
-may come as near to a BRDF as one that is not, takes its highlight's colour from the base colour;
-under a map the highlight would be painted too. So a material whose body alone varies gets the
-nearest Principled without metal.
+A map of the diffuse part must not change the colour of the highlight. A Principled BSDF that is
+partly metallic can approximate a BRDF as well as a dielectric one, but its highlight takes the base
+colour; with a map the highlight would vary too. Therefore a material of which only the diffuse body
+varies gets the best-fitting Principled BSDF with metallic 0.
 """
 
 from __future__ import annotations
@@ -19,14 +19,18 @@ from .level import MaterialLevel
 
 Array = NDArray[np.float64]
 
-GLASS, MOST_BY_LEVEL = 0.04, 0.08  # reflectance at normal incidence: of IOR 1.5, by level alone
-# unknowns: base colour and that reflectance (square roots), roughness, diffuse roughness
+# reflectance at normal incidence: of IOR 1.5, and the largest that is set by the Specular IOR Level
+# alone (a level of 1 at IOR 1.5)
+GLASS, MAX_BY_LEVEL = 0.04, 0.08
+# bounds of the parameters: square roots of base colour and of that reflectance, roughness, diffuse
+# roughness
 LOW = np.array([0, 0, 0, 0, MIN_ROUGHNESS, 0])
 HIGH = np.array([1, 1, 1, 1, 1, 1.0])
 
 
 def painted_principled(level: MaterialLevel, fitted: Principled) -> Principled:
-    """``fitted``, or where it is partly metal and the body alone varies, the nearest dielectric."""
+    """``fitted``, or the best-fitting dielectric if ``fitted`` is partly metallic and only the
+    diffuse body varies."""
     if level.split.whole or fitted.metallic == 0:
         return fitted
     goal = Target.of(level.brdf.evaluate, COARSE)
@@ -44,8 +48,9 @@ def painted_principled(level: MaterialLevel, fitted: Principled) -> Principled:
 
 
 def _dielectric(x: Array) -> Principled:
+    """The Principled BSDF of a parameter vector (6,), see LOW and HIGH."""
     f0 = float(x[3]) ** 2
-    by_level = f0 <= MOST_BY_LEVEL
+    by_level = f0 <= MAX_BY_LEVEL
     return Principled(
         base_color=np.clip(x[:3] ** 2, 0, 1),
         roughness=float(x[4]),

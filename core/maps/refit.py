@@ -1,14 +1,13 @@
-"""The fit again, on photos without the paint.
+"""The refit of the BRDF to samples with the colour variation ("paint") removed.
 
-A fit takes all of a material for one BRDF. Where its colour varies, dark and light patches pull at
-one another, and what they differ by is taken for a lobe's shape or for wrong normals. Once maps
-tell what each place of the surface is painted with, every sample can be brought to the typical
-paint t, the median of all:
+A fit assumes one BRDF for a material. If its colour varies, the differences between dark and light
+areas bias the shape of the lobe and the normals. The maps give the scale s of the diffuse body at
+each point of the surface. Every sample is then converted to the typical scale t, the median:
 
     L' = L · (t·body + specular) / (s·body + specular)
 
-with s the map's scale there and body + specular the BRDF of the fit before. The fit of these
-samples is the BRDF of the surface under its paint, and better maps follow from it.
+where body + specular is the BRDF of the previous fit. The fit of these samples is the BRDF without
+the variation, and it gives better maps.
 """
 
 from __future__ import annotations
@@ -34,14 +33,14 @@ from .level import MaterialLevel
 from .settle import TexelMaps
 from .texels import Texels
 
-CHUNK = 1 << 17
-SMALLEST = 0.05  # of the fitted reflectance: no paint is darker by more
-NEIGHBOURS = 4  # texels that a sample's scale is taken from
+CHUNK = 1 << 17  # samples processed at once, to limit memory
+MIN_REFLECTANCE_RATIO = 0.05  # of painted to fitted reflectance: limits the conversion factor
+NEIGHBOURS = 4  # texels that the scale of a sample is interpolated from
 
 
 @dataclass(frozen=True)
 class Paint:
-    """What the surface is painted with, as maps say that were made with these levels."""
+    """The colour variation of the surface: the maps, and the materials they were made with."""
 
     mesh: Mesh
     texels: Texels
@@ -49,7 +48,7 @@ class Paint:
     levels: tuple[MaterialLevel, ...]
 
     def removed(self, index: int, table: SampleTable) -> SampleTable:
-        """A material's samples as the typical paint would show them."""
+        """The samples of material ``index``, converted to its typical (median) scale."""
         scale = self.maps.materials[index].scale
         known = np.flatnonzero(self.maps.material == index)
         if not len(known):
@@ -75,7 +74,7 @@ class Paint:
         scale: NDArray[np.float32],
         typical: NDArray[np.float32],
     ) -> NDArray[np.float32]:
-        """(m, 3) what samples' radiance is multiplied by."""
+        """(m, 3) conversion factor of the radiance of the samples ``rows``."""
         count = min(NEIGHBOURS, tree.n)
         away, near = tree.query(table.point[rows], k=count)
         away, near = away.reshape(-1, count), near.reshape(-1, count)
@@ -85,26 +84,27 @@ class Paint:
         level = self.levels[index]
         rho = level.brdf.evaluate(Angles(*(a[rows] for a in table.angles)))
         body, specular = level.split.parts(rho)
-        painted = np.maximum(paint * body + specular, SMALLEST * rho)
+        painted = np.maximum(paint * body + specular, MIN_REFLECTANCE_RATIO * rho)
         return np.asarray((typical * body + specular) / np.maximum(painted, 1e-12), np.float32)
 
 
 class PaintlessFitJob(FitJob):
-    """A FitJob whose samples are rid of their paint first."""
+    """A FitJob that removes the colour variation from its samples first."""
 
     def __init__(self, capture: Capture, basis: Basis, paint: Paint) -> None:
         super().__init__(capture, basis)
         self.paint = paint
 
-    def given(self, index: int, table: SampleTable) -> SampleTable:
+    def samples_to_fit(self, index: int, table: SampleTable) -> SampleTable:
+        """The samples of a material with the colour variation removed."""
         return self.paint.removed(index, table)
 
 
 def levels_without_paint(
     capture: Capture, basis: Basis, paint: Paint, tables: Sequence[SampleTable]
 ) -> Generator[float, None, tuple[MaterialLevel, ...]]:
-    """The BRDFs alone, from samples (one table a material) that were taken before; yields the
-    fraction done. Raises FitError."""
+    """Fit the BRDFs only, to existing samples (one table for each material) with the colour
+    variation removed; yields the fraction done. Raises FitError."""
     quick = replace(capture, fit=replace(capture.fit, held_out=False))
     found = []
     for index, table in enumerate(tables):
@@ -124,7 +124,7 @@ def levels_without_paint(
 
 
 def scaled(table: SampleTable, level: MaterialLevel) -> SampleTable:
-    """Samples in the unit of a material's BRDF: the photos' where irradiance is known."""
+    """Samples in the scale of the material's BRDF; unchanged where the irradiance is known."""
     if level.scale == 1.0:
         return table
     unit = np.float32(level.scale)

@@ -1,5 +1,5 @@
-"""From what photos say of single texels to whole maps: each texel leans on the surface around it as
-far as its own photos are unsure."""
+"""Complete maps from the estimates of single texels: the posterior mean of each texel, with the
+surface around it as the prior."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from .level import MaterialLevel
 from .surround import VertexScales
 from .texels import Texels
 
-VARIES = 0.2  # standard deviation of a texel's scale about that of its surroundings
-GLOSS_VARIES = 0.15  # likewise of ln α
-GLOSS_HOME = 0.05  # how soon gloss falls back to the fitted one where no highlight was seen
-CHUNK = 1 << 18
-FEW_VOTES = 1e-3
+SCALE_PRIOR = 0.2  # standard deviation of a texel's scale about that of its surroundings
+GLOSS_PRIOR = 0.15  # the same for ln α
+GLOSS_PULL = 0.05  # pull of ln α towards 0 (the fitted gloss), relative to a well-measured vertex
+CHUNK = 1 << 18  # texels processed at once, to limit memory
+MIN_VOTES = 1e-3  # sum of the votes of a texel; below, its shares come from the surroundings
 
 
 @dataclass(frozen=True)
 class MaterialMaps:
-    """One material at n texels. scale: (n, 3) of its body; gloss: (n,) ln of the factor of α;
-    share: (n,) 0 … 1 how much the surface is of it."""
+    """One material at n texels. scale: (n, 3) factor of its diffuse body; gloss: (n,) ln of the
+    factor of α; share: (n,) 0 … 1, share of the surface that has this material."""
 
     scale: NDArray[np.float32]
     gloss: NDArray[np.float32]
@@ -33,9 +33,9 @@ class MaterialMaps:
 
 @dataclass(frozen=True)
 class TexelMaps:
-    """materials: in the capture's order. photos: (n,) how many see the texel lit; error: (n,)
-    relative standard error of its scale; material: (n,) the one with the largest share; highlight:
-    (n,) whether its gloss was measured."""
+    """Maps of n texels. materials: in the order of the capture; photos: (n,) number of photos that
+    show the texel lit; error: (n,) relative standard error of the scale; material: (n,) index of
+    the one with the largest share; highlight: (n,) True where the gloss was measured."""
 
     materials: tuple[MaterialMaps, ...]
     photos: NDArray[np.uint16]
@@ -44,10 +44,10 @@ class TexelMaps:
     highlight: NDArray[np.bool_]
 
 
-def settle(
+def complete_maps(
     mesh: Mesh, texels: Texels, gathered: Gathered, levels: tuple[MaterialLevel, ...]
 ) -> TexelMaps:
-    """The maps of all materials."""
+    """The maps of all materials from the gathered estimates."""
     n, v = len(texels), len(mesh.vertices)
     scales = gathered.scales
     share = _shares(mesh, texels, gathered.votes)
@@ -62,43 +62,44 @@ def settle(
             shiny = rows[np.isfinite(scales.gloss_error[rows])]
             certain = scales.gloss_error[shiny] ** -2.0
             gloss.add(mesh, texels, shiny, scales.gloss[shiny, None], certain)
-        around = body.carried(mesh, 1.0, trust=levels[index].trust)
-        around_gloss = gloss.carried(mesh, 0.0, GLOSS_HOME)
+        around = body.interpolated(mesh, 1.0, trust=levels[index].trust)
+        around_gloss = gloss.interpolated(mesh, 0.0, GLOSS_PULL)
         scale, shine = np.empty((n, 3), np.float32), np.empty(n, np.float32)
         for rows in _chunks(np.arange(n)):
-            said = own[rows]
-            weight = np.where(said, scales.weight[rows], 0.0)
+            measured = own[rows]
+            weight = np.where(measured, scales.weight[rows], 0.0)
             prior = texels.blend(mesh, around, rows)
-            heard = np.where(said[:, None], scales.scale[rows], 0.0)
+            data = np.where(measured[:, None], scales.scale[rows], 0.0)
             each = weight[:, None] * levels[index].trust
-            scale[rows] = (each * heard + VARIES**-2 * prior) / (each + VARIES**-2)
-            total = weight + VARIES**-2
+            scale[rows] = (each * data + SCALE_PRIOR**-2 * prior) / (each + SCALE_PRIOR**-2)
+            total = weight + SCALE_PRIOR**-2
             level = np.maximum(scale[rows] @ levels[index].channels, 1e-3)
             error[rows] = np.where(material[rows] == index, 1 / np.sqrt(total) / level, error[rows])
-            certain = np.where(said, scales.gloss_error[rows], np.inf) ** -2.0
+            certain = np.where(measured, scales.gloss_error[rows], np.inf) ** -2.0
             near = texels.blend(mesh, around_gloss, rows)[:, 0]
-            total = certain + GLOSS_VARIES**-2
-            shine[rows] = (certain * scales.gloss[rows] + GLOSS_VARIES**-2 * near) / total
+            total = certain + GLOSS_PRIOR**-2
+            shine[rows] = (certain * scales.gloss[rows] + GLOSS_PRIOR**-2 * near) / total
         made.append(MaterialMaps(scale, shine, share[:, index].astype(np.float32)))
     return TexelMaps(tuple(made), gathered.photos, error, material, np.isfinite(scales.gloss_error))
 
 
 def _shares(mesh: Mesh, texels: Texels, votes: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(n, materials) votes as shares; where nobody looked, as the surface around."""
+    """(n, materials) share of each material, from the votes; texels without votes take the shares
+    of the surface around them."""
     n, count = votes.shape
     if count == 1:
         return np.ones((n, 1), np.float32)
     total = votes.sum(axis=1)
     around = VertexScales.empty(len(mesh.vertices), count)
-    for rows in _chunks(np.flatnonzero(total > FEW_VOTES)):
+    for rows in _chunks(np.flatnonzero(total > MIN_VOTES)):
         around.add(mesh, texels, rows, votes[rows] / total[rows, None], np.full(len(rows), 1e3))
-    carried = np.maximum(around.carried(mesh, 1.0 / count), 0.0)
+    interpolated = np.maximum(around.interpolated(mesh, 1.0 / count), 0.0)
     out = np.empty((n, count), np.float32)
     for rows in _chunks(np.arange(n)):
-        near = texels.blend(mesh, carried, rows)
+        near = texels.blend(mesh, interpolated, rows)
         near /= np.maximum(near.sum(axis=1, keepdims=True), 1e-12)
         own = total[rows, None]
-        out[rows] = np.where(own > FEW_VOTES, votes[rows] / np.maximum(own, 1e-12), near)
+        out[rows] = np.where(own > MIN_VOTES, votes[rows] / np.maximum(own, 1e-12), near)
     return out
 
 

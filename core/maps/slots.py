@@ -1,5 +1,4 @@
-"""What photos say of each texel: the best few of their samples, in memory that the number of photos
-does not change."""
+"""The most accurate samples of each texel, in memory independent of the number of photos."""
 
 from __future__ import annotations
 
@@ -8,15 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-SLOTS = 8  # samples kept of a texel: the best; a ninth would add little
+SLOTS = 8  # samples kept for each texel, those with the smallest errors; a ninth would add little
 
 
 @dataclass(frozen=True)
 class TexelSamples:
-    """m samples of one photo. texel: (m,) rows of the band. scale: (m, 3) what the body had to be
-    multiplied by to show this radiance. error: (m,) its standard error. specular: (m,) share of the
-    fitted BRDF that is specular there. gloss: (m,) what ln α would change the sample's scale by.
-    material: (m,) uint8."""
+    """m samples of one photo. texel: (m,) rows of the band. scale: (m, 3) factor of the diffuse
+    body that gives the observed radiance. error: (m,) its standard error. specular: (m,) specular
+    share of the fitted BRDF. gloss: (m,) derivative of the scale by ln α. material: (m,) uint8."""
 
     texel: NDArray[np.intp]
     scale: NDArray[np.floating]
@@ -26,14 +24,15 @@ class TexelSamples:
     material: NDArray[np.uint8]
 
     def moved(self, by: int) -> TexelSamples:
-        """The same samples with other row numbers."""
+        """The same samples with ``by`` added to the row numbers."""
         return replace(self, texel=self.texel + by)
 
 
 @dataclass
 class TexelSlots:
-    """scale: (SLOTS, n, 3); error, specular, gloss: (SLOTS, n), error infinite where a slot is
-    empty; material: (SLOTS, n); count: (n,) samples that came."""
+    """The best samples of n texels, with the fields of TexelSamples. scale: (SLOTS, n, 3); error,
+    specular, gloss: (SLOTS, n), the error of an empty slot is infinite; material: (SLOTS, n);
+    count: (n,) number of samples that were added."""
 
     scale: NDArray[np.float16]
     error: NDArray[np.float16]
@@ -44,7 +43,7 @@ class TexelSlots:
 
     @classmethod
     def empty(cls, n: int) -> TexelSlots:
-        """For n texels."""
+        """Empty slots for n texels."""
         return cls(
             np.zeros((SLOTS, n, 3), np.float16),
             np.full((SLOTS, n), np.inf, np.float16),
@@ -55,7 +54,8 @@ class TexelSlots:
         )
 
     def add(self, samples: TexelSamples) -> None:
-        """Put a photo's samples (each texel at most once) in the place of worse ones."""
+        """Add the samples of a photo, at most one for each texel; each replaces the sample with the
+        largest error if its own error is smaller."""
         texel = samples.texel
         self.count[texel] += 1
         worst = self.error[:, texel].argmax(axis=0)

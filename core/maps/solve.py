@@ -1,8 +1,9 @@
-"""Each texel's scale from its samples: weighted, robust, with what is typical around it behind it.
+"""The scale of each texel from its samples, by robust weighted least squares.
 
-A sample says a = s + g·q + e: what the body must be multiplied by, s; what a change g of ln α would
-add, q; and an error of known size e. Student's t takes the weight from what does not agree with the
-others of its texel: a shadow that the mesh does not explain, a misplaced highlight.
+The model of a sample is a = s + g·q + e: a is the observed factor of the diffuse body, s the scale
+of the texel, g the change of ln α, q the derivative of a by ln α, and e an error of known standard
+deviation. Student-t errors reduce the weight of samples that disagree with the others of the same
+texel: a shadow that the mesh does not cast, a misplaced highlight.
 """
 
 from __future__ import annotations
@@ -12,24 +13,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..statistics.student_t import weights_of_squares
 from .slots import TexelSlots
 
 Array = NDArray[np.floating]
 
-ROUNDS = 4
-DEGREES = 4.0  # of freedom of the Student t
-WORST = 3.0  # errors of a sample beyond it: it says nothing
-LEAST_GLOSS, MOST_GLOSS = np.log(0.5), np.log(2.0)  # of ln α
+ROUNDS = 4  # of iteratively reweighted least squares
+MAX_ERROR = 3.0  # standard error of a sample's scale: samples with larger ones are not used
+MIN_GLOSS, MAX_GLOSS = np.log(0.5), np.log(2.0)  # bounds of the change of ln α
 GLOSS_PRIOR = 0.35  # standard deviation of ln α over a surface
-GLOSS_KNOWN = 0.25  # standard error of ln α below which it is told
+MAX_GLOSS_ERROR = 0.25  # standard error of ln α: with a larger one, the gloss counts as unknown
 
 
 @dataclass(frozen=True)
 class TexelScales:
-    """n texels. scale: (n, 3), NaN where no sample speaks. weight: (n,) inverse variance of it, 0
-    there. photos: (n,) samples that agree. spread: (n,) what the samples disagree by, in units of
-    their errors (1 where there are fewer than two). gloss: (n,) ln of the factor of α, 0 where no
-    highlight was seen; gloss_error: (n,) its standard error, infinite there."""
+    """Results for n texels. scale: (n, 3), factor of the diffuse body, NaN without usable samples.
+    weight: (n,) inverse variance of the scale, 0 there. photos: (n,) effective number of samples.
+    spread: (n,) RMS residual of the samples in units of their errors (1 with fewer than two).
+    gloss: (n,) ln of the factor of α, 0 where it is unknown; gloss_error: (n,) its standard error,
+    infinite there."""
 
     scale: NDArray[np.float32]
     weight: NDArray[np.float32]
@@ -45,14 +47,17 @@ def solve_texels(
     part: slice,
     channels: NDArray[np.floating] | None = None,
 ) -> TexelScales:
-    """The texels of ``part`` of a band, each from its samples of its own ``material`` (n,).
+    """Solve the texels ``part`` of a band, each from its samples of its own ``material`` (n,).
 
-    channels: (materials, 3) what each channel counts in judging samples, rows' sum 1; None: alike.
+    channels: (materials, 3) weights of the channels in the grey value that weights and gloss are
+    computed from, rows sum to 1; None: equal weights.
     """
     scale = slots.scale[:, part].astype(np.float32)
     error = slots.error[:, part].astype(np.float32)
     q = slots.gloss[:, part].astype(np.float32)
-    good = np.isfinite(error) & (error < WORST) & (slots.material[:, part] == material[None, part])
+    good = (
+        np.isfinite(error) & (error < MAX_ERROR) & (slots.material[:, part] == material[None, part])
+    )
     own = np.where(good, 1.0 / np.maximum(error, 1e-3) ** 2, 0.0).astype(np.float32)
     if channels is None:
         grey = scale.mean(axis=2)
@@ -64,14 +69,14 @@ def solve_texels(
     weight = own
     for _ in range(ROUNDS):
         away = (grey - gloss * q - centre) ** 2 * own
-        weight = own * ((DEGREES + 1) / (DEGREES + away)).astype(np.float32)
+        weight = own * weights_of_squares(away).astype(np.float32)
         total = np.maximum(weight.sum(axis=0), 1e-30)
         mean_q = (weight * q).sum(axis=0) / total
         mean = (weight * grey).sum(axis=0) / total
-        # the gloss from what differs between samples of one texel: its body is free
+        # the gloss is fitted to differences between samples of one texel: its scale is free
         information = (weight * (q - mean_q) ** 2).sum(axis=0)
         pull = (weight * (q - mean_q) * (grey - mean)).sum(axis=0)
-        gloss = np.clip(pull / (information + GLOSS_PRIOR**-2), LEAST_GLOSS, MOST_GLOSS)
+        gloss = np.clip(pull / (information + GLOSS_PRIOR**-2), MIN_GLOSS, MAX_GLOSS)
         centre = mean - gloss * mean_q
     total = weight.sum(axis=0)
     seen = total > 0
@@ -84,7 +89,7 @@ def solve_texels(
     with np.errstate(invalid="ignore", divide="ignore"):
         found = np.where(seen[:, None], found / total[:, None], np.nan)
         gloss_error = np.where(information > 0, 1 / np.sqrt(information), np.inf)
-    known = seen & (gloss_error < GLOSS_KNOWN)
+    known = seen & (gloss_error < MAX_GLOSS_ERROR)
     return TexelScales(
         scale=np.maximum(found, 0.0).astype(np.float32),
         weight=(total / np.maximum(spread, 1.0) ** 2).astype(np.float32),
@@ -96,7 +101,7 @@ def solve_texels(
 
 
 def weighted_median(values: Array, weight: Array) -> Array:
-    """(n,) lower weighted median over the first axis of values (s, n); 0 where nothing weighs."""
+    """(n,) lower weighted median over the first axis of values (s, n); 0 if all weights are 0."""
     order = np.argsort(values, axis=0)
     ordered = np.take_along_axis(values, order, axis=0)
     below = np.cumsum(np.take_along_axis(weight, order, axis=0), axis=0)

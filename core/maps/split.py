@@ -1,17 +1,17 @@
-"""A BRDF divided into a body, which has the surface's own colour, and the specular remainder.
+"""A BRDF split into a diffuse body, which has the colour of the surface, and the specular rest.
 
 ρ = body + specular, body = min(ρ, D), D (3,) the level of the BRDF away from its highlight. A texel
 scales the body: ρ' = s·min(ρ, D) + (ρ − min(ρ, D)).
 
-Why so: min(ρ, D) lies below the BRDF everywhere, so no part is negative for any s ≥ 0, whatever
-shape the measured lobe has; where the BRDF is below D (shadowed grazing directions) all of it
-scales. It needs no lobe model to be right, and is one line in a shader. D is the lower quartile of
-well-seen directions: a diffuse surface under a coat has one value in nearly all of them, a
-lobe's tails raise some, and few directions are so grazing that they fall below.
+min(ρ, D) is at most ρ everywhere, so neither part is negative for any s ≥ 0 and any shape of the
+measured lobe. Where the BRDF is below D (shadowed grazing directions), all of it is scaled. The
+split needs no lobe model, and is one line in a shader. D is the lower quartile over directions
+within LIMIT of the normal: a diffuse surface under a coat has one value in nearly all of them, the
+tails of the lobe raise some, and few are so grazing that they are below it.
 
-A metal has no body: what is left beside its highlight is the lobe's own tail. Where the body
-reflects less than BODY of the light, the whole BRDF scales instead, as Principled's base colour
-scales a metal.
+A metal has no diffuse body: away from its highlight there is only the tail of the lobe. If the body
+reflects less than MIN_BODY_SHARE of the light, the whole BRDF is scaled instead, as the base colour
+of a Principled BSDF scales a metal.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ from numpy.typing import NDArray
 
 from ..angles import Angles, half_difference
 
-LIMIT = 60.0  # degrees of light and view from the normal
-POLAR, AZIMUTH = 12, 24  # directions
-QUANTILE = 0.25
-BODY = 0.15  # share of the reflected light that makes a body
-EVERYTHING = 1e9  # 1/sr: D of a material that scales as a whole
+LIMIT = 60.0  # degrees, largest angle of light and view to the normal
+POLAR, AZIMUTH = 12, 24  # number of directions along each angle
+QUANTILE = 0.25  # of ρ over these directions: the level D
+MIN_BODY_SHARE = 0.15  # of the reflected light: with less, the whole BRDF is scaled
+EVERYTHING = 1e9  # 1/sr: D of a material that is scaled as a whole
 
 
 @dataclass(frozen=True)
 class BodySplit:
-    """body: (3,) D in 1/sr, EVERYTHING where the material scales as a whole. share: of the light
-    reflected at normal incidence and at 45°, what the body reflects."""
+    """body: (3,) the level D in 1/sr, EVERYTHING if the material is scaled as a whole. share: the
+    body's share of the light reflected at normal incidence and at 45°."""
 
     body: NDArray[np.float64]
     share: float
 
     @property
     def whole(self) -> bool:
-        """True where all of the BRDF scales, for want of a body."""
+        """True if the whole BRDF is scaled, because it has no diffuse body."""
         return bool(self.body[0] >= EVERYTHING)
 
     def parts(self, rho: NDArray[np.floating]) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
@@ -56,13 +56,13 @@ def split_body(evaluate: Callable[[Angles], NDArray[np.floating]]) -> BodySplit:
     rho = np.maximum(np.asarray(evaluate(angles), np.float64), 0.0)
     level = np.array([_quantile(channel, weight) for channel in rho.T])
     share = _share(evaluate, level)
-    if share < BODY:
+    if share < MIN_BODY_SHARE:
         return BodySplit(np.full(3, EVERYTHING), share)
     return BodySplit(level, share)
 
 
 def _directions() -> tuple[Angles, NDArray[np.float64]]:
-    """Light and view within LIMIT of the normal; weight: (n,) projected solid angles."""
+    """(light and view within LIMIT of the normal, (n,) weights: projected solid angles)."""
     edges = np.linspace(0.0, np.sin(np.radians(LIMIT)) ** 2, POLAR + 1)
     polar = np.arcsin(np.sqrt(0.5 * (edges[1:] + edges[:-1])))  # equal projected solid angles
     azimuth = np.pi * (np.arange(AZIMUTH) + 0.5) / AZIMUTH
@@ -74,15 +74,16 @@ def _directions() -> tuple[Angles, NDArray[np.float64]]:
 
 
 def _quantile(values: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
+    """Weighted QUANTILE of values (n,)."""
     order = np.argsort(values)
     below = np.cumsum(weight[order])
     return float(values[order[np.searchsorted(below, QUANTILE * below[-1])]])
 
 
 def _share(evaluate: Callable[[Angles], NDArray[np.floating]], level: NDArray[np.float64]) -> float:
-    """What min(ρ, level) reflects of what ρ does, all channels, light at 0° and 45°.
+    """The light reflected by min(ρ, level) relative to that by ρ, all channels, view at 0° and 45°.
 
-    Half vectors are drawn finely near the normal, where lobes are: dω_i = 4 (l·h) dω_h.
+    Integrated over half vectors, densely near the normal, where lobes are: dω_i = 4 (l·h) dω_h.
     """
     own = total = 0.0
     theta = np.radians(90.0) * ((np.arange(160) + 0.5) / 160) ** 2

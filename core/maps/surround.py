@@ -1,6 +1,5 @@
-"""What is typical around each vertex: scales gathered on the mesh's vertices and carried along its
-edges into what no photo saw. Along the surface, so no seam of the texture shows, and nothing leaks
-between islands that lie side by side in it."""
+"""Smooth values on the vertices of the mesh, interpolated along its edges into areas that no photo
+shows. Along the surface there are no texture seams, and adjacent UV islands do not mix."""
 
 from __future__ import annotations
 
@@ -16,22 +15,24 @@ from .texels import Texels
 
 Array = NDArray[np.float64]
 
-STIFF = 0.25  # of what a well-seen vertex weighs: how much it follows its neighbours
-HOME = 1e-4  # likewise: how much everything is drawn to 1
-ENOUGH = 400.0  # inverse variance of a well-seen vertex (± 5 %); more counts as this
-ROUNDS = 400
+# weights relative to the data term of a well-measured vertex:
+SMOOTHNESS = 0.25  # of the difference from each neighbour
+DEFAULT_PULL = 1e-4  # of the difference from the default value
+MAX_WEIGHT = 400.0  # inverse variance of a well-measured vertex (± 5 %); larger ones are clipped
+MAX_ITERATIONS = 400  # of the conjugate gradient solver
 
 
 @dataclass
 class VertexScales:
-    """Sums at each vertex over a material's texels: total (v, c) of weight × value, weight (v,)."""
+    """Sums over the texels of a material at each vertex. total: (v, c) weight × value; weight:
+    (v,)."""
 
     total: Array
     weight: Array
 
     @classmethod
     def empty(cls, vertices: int, channels: int) -> VertexScales:
-        """Nothing seen."""
+        """Zero sums."""
         return cls(np.zeros((vertices, channels)), np.zeros(vertices))
 
     def add(
@@ -42,7 +43,7 @@ class VertexScales:
         values: NDArray[np.floating],
         weight: NDArray[np.floating],
     ) -> None:
-        """Values (n, c) with weights (n,) at texels ``rows`` (n,)."""
+        """Add values (n, c) with weights (n,) of the texels ``rows`` (n,)."""
         v = len(self.weight)
         second, third = texels.second[rows].astype(np.float64), texels.third[rows]
         for k, share in enumerate((1.0 - second - third, second, third)):
@@ -52,20 +53,21 @@ class VertexScales:
             for c in range(values.shape[1]):
                 self.total[:, c] += np.bincount(corner, own * values[:, c], v)
 
-    def carried(
+    def interpolated(
         self,
         mesh: Mesh,
-        home: float,
-        pull_home: float = HOME,
+        default: float,
+        default_pull: float = DEFAULT_PULL,
         trust: NDArray[np.floating] | None = None,
     ) -> Array:
-        """(v, c) the smoothest values that agree with what was seen, drawn to ``home`` far away,
-        the sooner the larger ``pull_home``. trust: (c,) factors of the weights, channel by channel.
-        """
+        """(v, c) smooth values on all vertices: the minimum of a quadratic energy with a data term,
+        a smoothness term over the edges, and a pull towards the value ``default``. A larger
+        ``default_pull`` shortens the distance at which the default is reached. trust: (c,) factors
+        of the weights of each channel."""
         v = len(self.weight)
         seen = self.weight > 0
         if not seen.any():
-            return np.full(self.total.shape, home)
+            return np.full(self.total.shape, default)
         mean = self.total / np.maximum(self.weight, 1e-30)[:, None]
         edges = np.concatenate(
             [mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]
@@ -77,11 +79,11 @@ class VertexScales:
         out = np.empty_like(self.total)
         for c in range(self.total.shape[1]):
             factor = 1.0 if trust is None else float(trust[c])
-            own = np.minimum(self.weight * factor, ENOUGH) / ENOUGH
-            diagonal = own + pull_home + STIFF * degree
-            matrix = sparse.diags(diagonal) - STIFF * link
+            own = np.minimum(self.weight * factor, MAX_WEIGHT) / MAX_WEIGHT
+            diagonal = own + default_pull + SMOOTHNESS * degree
+            matrix = sparse.diags(diagonal) - SMOOTHNESS * link
             near = sparse.diags(1.0 / diagonal)
-            pull = own * mean[:, c] + pull_home * home
-            start = np.where(seen, mean[:, c], home)
-            out[:, c], _ = cg(matrix, pull, x0=start, rtol=1e-4, maxiter=ROUNDS, M=near)
+            pull = own * mean[:, c] + default_pull * default
+            start = np.where(seen, mean[:, c], default)
+            out[:, c], _ = cg(matrix, pull, x0=start, rtol=1e-4, maxiter=MAX_ITERATIONS, M=near)
         return out

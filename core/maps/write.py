@@ -1,4 +1,4 @@
-"""Maps as pictures and numbers: base colour, roughness, scale, shares, coverage, maps.json."""
+"""Maps as image files (base colour, roughness, scale, shares, coverage) and maps.json."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from .settle import MaterialMaps
 
 Format = Literal["exr", "png"]
 BLEND = "blend"  # NAME of the maps that blend all materials
-PHOTO_STEP = 25  # of coverage.png, a photo
-WORST_ERROR = 0.5  # relative, white in uncertainty.png
-ROUGHEST = 1.0
-FORMAT = 1
+PHOTO_STEP = 25  # grey levels of coverage.png for each photo
+MAX_ERROR = 0.5  # relative error that is white in uncertainty.png
+MAX_ROUGHNESS = 1.0
+FORMAT = 1  # version of maps.json
 
 
 @dataclass(frozen=True)
 class MapFile:
-    """A written map. material: its name, BLEND, or "" for the mesh; kind: base_color, roughness …;
-    colour: True where its numbers are colours (sRGB in a PNG, linear in an EXR)."""
+    """A written map. material: its name, BLEND, or "" for the whole mesh; kind: base_color,
+    roughness …; colour: True if the values are colours (sRGB in a PNG, linear in an EXR)."""
 
     material: str
     kind: str
@@ -38,7 +38,7 @@ class MapFile:
 
 
 def write_maps(folder: Path, result: MapsResult, kind: Format) -> list[MapFile]:
-    """All maps of a result into ``folder``, and maps.json."""
+    """Write all maps of a result and maps.json into ``folder``."""
     files = []
     for map_file, values, fill in _maps(result, kind):
         _write(folder / map_file.file, result, values, fill, map_file.colour)
@@ -48,21 +48,21 @@ def write_maps(folder: Path, result: MapsResult, kind: Format) -> list[MapFile]:
 
 
 def base_color(result: MapsResult, index: int) -> NDArray[np.float32]:
-    """(n, 3) base colour of the fitted Principled with the body's scale: linear, 0 … 1."""
+    """(n, 3) base colour of the fitted Principled BSDF times the scale: linear, 0 … 1."""
     fitted = result.materials[index].principled.base_color
     scale = result.maps.materials[index].scale
     return np.clip(np.asarray(fitted, np.float32) * scale, 0.0, 1.0)
 
 
 def roughness(result: MapsResult, index: int) -> NDArray[np.float32]:
-    """(n,) roughness of the fitted Principled (its square root of α) with the gloss found."""
+    """(n,) roughness (square root of α) of the fitted Principled BSDF with the gloss map."""
     fitted = result.materials[index].principled.roughness
     return _rougher(result.maps.materials[index], float(fitted))
 
 
 def albedo(result: MapsResult, index: int) -> NDArray[np.float32]:
-    """(n, 3) what the body reflects of light from everywhere, π·D·scale; of a material that varies
-    as a whole, its base colour."""
+    """(n, 3) albedo of the diffuse body, π·D·scale; the base colour of a material that is scaled as
+    a whole."""
     split = result.levels[index].split
     if split.whole:
         return base_color(result, index)
@@ -70,13 +70,13 @@ def albedo(result: MapsResult, index: int) -> NDArray[np.float32]:
 
 
 def _rougher(maps: MaterialMaps, fitted: float) -> NDArray[np.float32]:
-    return np.clip(fitted * np.exp(0.5 * maps.gloss), 0.0, ROUGHEST).astype(np.float32)
+    return np.clip(fitted * np.exp(0.5 * maps.gloss), 0.0, MAX_ROUGHNESS).astype(np.float32)
 
 
 def _maps(
     result: MapsResult, kind: Format
 ) -> Iterator[tuple[MapFile, NDArray[np.float32], NDArray[np.floating] | float]]:
-    """(file, values (n,) or (n, 3), what stands where no face is)."""
+    """(file, values (n,) or (n, 3), fill value outside the faces) of each map."""
     several = len(result.materials) > 1
     for index, material in enumerate(result.materials):
         name = material.name
@@ -102,18 +102,19 @@ def _maps(
         yield file, 0.5 + 0.5 * result.normal, flat
     photos = np.clip(result.maps.photos * (PHOTO_STEP / 255), 0, 1).astype(np.float32)
     yield MapFile("", "coverage", "coverage.png", False), photos, 0.0
-    error = np.clip(result.maps.error / WORST_ERROR, 0, 1)
+    error = np.clip(result.maps.error / MAX_ERROR, 0, 1)
     yield MapFile("", "uncertainty", "uncertainty.png", False), error, 1.0
 
 
 def _typical(result: MapsResult, index: int, colours: NDArray[np.float32]) -> NDArray[np.floating]:
-    """(3,) mean over the material's own texels."""
+    """(3,) mean colour over the texels of this material; over all texels if it has none."""
     own = result.maps.material == index
     return colours[own].mean(axis=0) if own.any() else colours.mean(axis=0)
 
 
 def _blended(result: MapsResult) -> dict[str, NDArray[np.float32]]:
-    """Maps of one Principled for the whole mesh: each input of the materials by their shares."""
+    """Maps of a single Principled BSDF for the whole mesh: each input is the mean over the
+    materials, weighted by their shares."""
     share = [maps.share for maps in result.maps.materials]
     found: dict[str, NDArray[np.float32]] = {}
     for what in ("base_color", "roughness", "metallic", "specular"):
@@ -152,7 +153,7 @@ def _write(
 
 
 def _srgb(linear: NDArray[np.float32]) -> NDArray[np.float32]:
-    """IEC 61966-2-1."""
+    """Linear values 0 … 1 by the transfer curve of IEC 61966-2-1."""
     low = 12.92 * linear
     high = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
     return np.where(linear <= 0.0031308, low, high).astype(np.float32)
@@ -216,7 +217,7 @@ def _material(result: MapsResult, index: int) -> dict[str, Any]:
 
 
 def _turned(normal: NDArray[np.float32]) -> dict[str, float]:
-    """Degrees between the map's normals and the mesh's, of texels that a photo sees lit."""
+    """Angle in degrees between the normals of the map (n, 3) and the smooth normals of the mesh."""
     angle = np.degrees(np.arctan2(np.hypot(normal[:, 0], normal[:, 1]), normal[:, 2]))
     return {
         "median": float(np.median(angle)),

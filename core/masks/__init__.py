@@ -1,1 +1,1 @@
-"""Shadow masks from geometry, and materials proposed from the photos."""
+"""Shadow masks computed from the geometry, and materials proposed from the photos."""

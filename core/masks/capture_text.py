@@ -1,4 +1,4 @@
-"""A capture file written anew: the same capture from another folder, with other masks."""
+"""A copy of a capture file for another folder, with new masks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import tomlkit
 
 from ..capture import Capture
-from ..capture.model import LEFT_OUT, SHADOW_MASK
+from ..capture.model import EXCLUDED_MASKS, SHADOW_MASK
 from ..errors import InputError
 
 PATHS: tuple[tuple[str, ...], ...] = (
@@ -49,18 +49,24 @@ def capture_with_masks(
     try:
         document = tomlkit.parse(capture.file.read_text("utf-8-sig"))
     except (OSError, ValueError) as error:
-        raise InputError(f"is gone or no longer a capture file ({error})", file=capture.file) \
-            from error  # fmt: skip
+        raise InputError(
+            f"cannot be read ({error}); expected the capture file that was read before; restore it",
+            file=capture.file,
+        ) from error
     photos = document.get("photo", [])
     if len(photos) != len(capture.photos):
-        raise InputError("has changed meanwhile: start again", file=capture.file)
+        raise InputError(
+            f"found {len(photos)} photos; expected {len(capture.photos)} as before; run again, "
+            "since the file has changed in the meantime",
+            file=capture.file,
+        )
     for place in PATHS:
         _redirect(document, place, capture.file.parent, folder)
     for number, photo in enumerate(photos):
         old = dict(photo.get("masks", {}))
         masks = old
         if materials is not None:
-            masks = {name: file for name, file in masks.items() if name in LEFT_OUT}
+            masks = {name: file for name, file in masks.items() if name in EXCLUDED_MASKS}
             masks.update(painted[number] if number < len(painted) else {})
         if shadows is not None:
             masks = {**masks, SHADOW_MASK: shadows[number]}
@@ -68,9 +74,8 @@ def capture_with_masks(
             continue
         photo.pop("masks", None)
         if masks:
-            table = tomlkit.inline_table()
-            table.update(masks)
-            photo["masks"] = table
+            photo["masks"] = tomlkit.inline_table()
+            photo["masks"].update(masks)
     if materials is not None:
         document.pop("material", None)
         tables = tomlkit.aot()
@@ -84,7 +89,7 @@ def capture_with_masks(
 
 
 def _redirect(data: Any, place: tuple[str, ...], old: Path, new: Path) -> None:
-    """Change the paths at ``place`` from relative to ``old`` into relative to ``new``."""
+    """Make the paths under the keys ``place`` relative to ``new`` instead of ``old``, in place."""
     if isinstance(data, list):
         for entry in data:
             _redirect(entry, place, old, new)
@@ -99,13 +104,13 @@ def _redirect(data: Any, place: tuple[str, ...], old: Path, new: Path) -> None:
         if rest:
             _redirect(value, tuple(rest), old, new)
         elif isinstance(value, str):
-            data[name] = _seen_from(new, old / value)
+            data[name] = _relative_path(new, old / value)
         elif isinstance(value, list):
-            data[name] = [_seen_from(new, old / v) if isinstance(v, str) else v for v in value]
+            data[name] = [_relative_path(new, old / v) if isinstance(v, str) else v for v in value]
 
 
-def _seen_from(folder: Path, file: Path) -> str:
-    """Relative where there is a way from the one to the other; on another drive, absolute."""
+def _relative_path(folder: Path, file: Path) -> str:
+    """The path of a file relative to ``folder``; absolute if it is on another drive."""
     target = Path(os.path.abspath(file))
     try:
         return Path(os.path.relpath(target, folder.resolve())).as_posix()

@@ -1,4 +1,4 @@
-"""What is painted on photos, carried to the mesh's faces by visibility and voting, and back."""
+"""Transfer of painted labels from photos to the faces of the mesh by voting, and back."""
 
 from __future__ import annotations
 
@@ -11,27 +11,29 @@ from ..geometry import RayScene, SurfaceView, view_surface
 from ..scan import Camera
 
 NONE = -1  # not painted
-FACES_AT_ONCE = 1 << 18
+FACES_AT_ONCE = 1 << 18  # to limit memory
 
 
 @dataclass(frozen=True)
-class SeenFaces:
-    """Where a photo shows which faces. shape: (h, w) of the photo; pixel: (n,) flat indices and
-    face: (n,) what is seen there. A face that no pixel's middle meets, as most are where triangles
-    are smaller than pixels, is seen at the pixel of its own middle where nothing hides that."""
+class VisibleFaces:
+    """The visible faces of a photo. shape: (h, w) of the photo; pixel: (n,) flat indices; face:
+    (n,) the visible face there. The first ``centre_count`` entries are faces at the centres of
+    pixels. The others are faces without a pixel centre (triangles smaller than a pixel), at the
+    pixel that contains their centroid, if that is visible."""
 
     shape: tuple[int, int]
     pixel: NDArray[np.int32]
     face: NDArray[np.int32]
-    met: int
+    centre_count: int
 
     @classmethod
-    def of(cls, rays: RayScene, camera: Camera, view: SurfaceView | None = None) -> SeenFaces:
-        """view: of the whole photo, where it is there already."""
+    def of(cls, rays: RayScene, camera: Camera, view: SurfaceView | None = None) -> VisibleFaces:
+        """The visible faces for a camera; view: the surface view of the whole photo, if already
+        computed."""
         view = view_surface(rays, camera) if view is None else view
-        met = np.zeros(len(rays.mesh.faces), bool)
-        met[view.face] = True
-        pixel, face = _middles(rays, camera, np.flatnonzero(~met))
+        has_centre = np.zeros(len(rays.mesh.faces), bool)
+        has_centre[view.face] = True
+        pixel, face = _at_centroids(rays, camera, np.flatnonzero(~has_centre))
         return cls(
             (camera.height, camera.width),
             np.concatenate([view.pixel, pixel]),
@@ -40,36 +42,35 @@ class SeenFaces:
         )
 
     def votes(self, painted: NDArray[np.integer], count: int, faces: int) -> NDArray[np.int64]:
-        """(faces, count + 1) how many of a face's pixels wear each of ``count`` materials; the last
-        column: none. painted: (h, w), 0 … count − 1, NONE where nothing is painted."""
-        worn = painted.ravel().take(self.pixel).astype(np.int64)
-        worn[worn < 0] = count
-        both = self.face.astype(np.int64) * (count + 1) + worn
+        """(faces, count + 1) number of pixels of each face with each of ``count`` materials; the
+        last column counts unpainted pixels. painted: (h, w), 0 … count − 1 or NONE."""
+        label = painted.ravel().take(self.pixel).astype(np.int64)
+        label[label < 0] = count
+        both = self.face.astype(np.int64) * (count + 1) + label
         return np.bincount(both, minlength=faces * (count + 1)).reshape(faces, count + 1)
 
     def image(self, labels: NDArray[np.integer]) -> NDArray[np.int32]:
-        """(h, w) what the faces that a photo shows wear, labels (faces,); NONE where it shows none:
-        the way back."""
+        """(h, w) the labels (faces,) of the faces that the photo shows; NONE without a face."""
         out = np.full(self.shape[0] * self.shape[1], NONE, np.int32)
-        out[self.pixel[: self.met]] = labels[self.face[: self.met]]
+        out[self.pixel[: self.centre_count]] = labels[self.face[: self.centre_count]]
         return out.reshape(self.shape)
 
 
-def carried(labels: NDArray[np.integer], votes: NDArray[np.int64]) -> NDArray[np.int32]:
-    """(faces,) what each face wears after the votes (faces, count + 1) of all painted photos: the
-    material with most pixels, where these are at least as many as those that nobody painted;
-    else what it wore before, labels (faces,)."""
-    said, silent = votes[:, :-1], votes[:, -1]
-    best = np.argmax(said, axis=1)
-    most = said[np.arange(len(said)), best]
-    # a tie between the painted and the rest is settled for the stroke, which somebody meant
-    return np.where((most > 0) & (most >= silent), best, labels).astype(np.int32)
+def updated_labels(labels: NDArray[np.integer], votes: NDArray[np.int64]) -> NDArray[np.int32]:
+    """(faces,) new labels after the votes (faces, count + 1) of all painted photos: the material
+    with most pixels, if these are at least as many as the unpainted ones; otherwise the old label
+    of labels (faces,)."""
+    painted, unpainted = votes[:, :-1], votes[:, -1]
+    best = np.argmax(painted, axis=1)
+    most = painted[np.arange(len(painted)), best]
+    # a tie is decided for the painted material, since the stroke was intended
+    return np.where((most > 0) & (most >= unpainted), best, labels).astype(np.int32)
 
 
-def _middles(
+def _at_centroids(
     rays: RayScene, camera: Camera, faces: NDArray[np.intp]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """(pixels, faces) of those whose middle the camera sees."""
+    """(flat pixels, faces) of those of ``faces`` whose centroid the camera sees."""
     pixels, seen = [np.zeros(0, np.int32)], [np.zeros(0, np.int32)]
     mesh = rays.mesh
     for begin in range(0, len(faces), FACES_AT_ONCE):
@@ -98,7 +99,7 @@ def _middles(
 def _to_camera(
     camera: Camera, points: NDArray[np.float64], place: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """((n, 3) unit, (n,) distance, inf of an orthographic camera's parallel rays)."""
+    """(unit vectors to the camera (n, 3), distances (n,), infinite for an orthographic camera)."""
     if camera.orthographic:
         return -camera.rays(np.nan_to_num(place)), np.full(len(points), np.inf)
     towards = camera.pose.centre - points

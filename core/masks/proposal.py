@@ -1,7 +1,8 @@
-"""Materials proposed from the photos alone: which parts of the surface look alike under all lights.
+"""Materials proposed from the photos: parts of the surface that reflect alike under all lights.
 
-The surface is cut into patches; patches are divided among materials (proposal_model.py), one
-material into two at a time, as long as the two are really two; the faces then follow.
+The surface is divided into patches. The patches are clustered into materials (proposal_model.py),
+by splitting one material into two at a time, as long as the split is significant
+(proposal_split.py). The labels of the faces follow from those of the patches.
 """
 
 from __future__ import annotations
@@ -19,21 +20,22 @@ from ..errors import FitError
 from ..scan import Mesh
 from .proposal_cells import Cells
 from .proposal_model import Mixture, cell_likelihood, fit_mixture
-from .proposal_split import FEWEST_PATCHES, Split, judge, lamps_of
-from .proposal_surface import Surface, fill_unseen, smooth_labels, spread, without_islands
+from .proposal_split import MIN_PATCHES, Split, judge, lamps_of
+from .proposal_surface import Surface, fill_hidden, smooth_labels, spread, without_islands
 
 Array = NDArray[np.float64]
 
 MOST_MATERIALS = 8
-LARGEST_CELLS = 40_000  # patches × photos
-SURE = 6.0  # log likelihood ratio at which a patch speaks for itself
-SMALLEST_ISLAND = 0.002  # of the surface
+MAX_CELLS = 40_000  # patches × photos
+DECISIVE_RATIO = 6.0  # log likelihood ratio: from it on, a patch ignores its neighbours
+MIN_ISLAND = 0.002  # share of the surface area
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """labels: (f,) int32 0…count−1, the largest material first; confidence: (f,) float32 0…1, 0
-    where no photo saw the face lit; count; splits: what was tried, in order."""
+    """Proposed materials of f faces. labels: (f,) int32 0…count−1, the largest material first;
+    confidence: (f,) float32 0…1, 0 where no photo shows the face lit; count: number of materials;
+    splits: all splits that were tried, in order."""
 
     labels: NDArray[np.int32]
     confidence: NDArray[np.float32]
@@ -49,27 +51,30 @@ def propose_materials(
 ) -> Proposal:
     """Divide the faces of a mesh among materials.
 
-    cells: one piece a face (Cells.of with face numbers, of every photo). count: how many there are;
-    None: as many as the photos show to be different, 1 where they show no difference. lamps: the
-    number of each photo's light (default: every photo has its own).
-    Raises FitError where the photos show too little of the surface.
+    cells: one piece for each face (Cells.of with face numbers), of all photos. count: number of
+    materials; None: as many as differ significantly, 1 without a significant difference. lamps:
+    the index of the light of each photo (default: each photo has its own).
+    Raises FitError if the photos show too little of the surface.
     """
     surface = Surface.of(mesh)
     photos = len(np.unique(cells.photo))
     seen = np.zeros(len(mesh.faces), bool)
     seen[cells.piece] = True
     if not seen.any():
-        raise FitError("no face is lit and seen in any photo: no materials to tell apart")
+        raise FitError(
+            "no photo shows a lit face; expected photos that show the mesh; check camera poses and "
+            "lights"
+        )
     if count == 1:
         return Proposal(np.zeros(len(seen), np.int32), seen.astype(np.float32), 1, ())
-    wanted = int(np.clip(LARGEST_CELLS / max(photos, 1), 300, 3000))
+    wanted = int(np.clip(MAX_CELLS / max(photos, 1), 300, 3000))
     patch = surface.patches(min(wanted, max(len(mesh.faces) // 8, 1)))
     broad = cells.merged(patch)
     kept, number = np.unique(broad.piece, return_inverse=True)
-    if len(kept) < FEWEST_PATCHES:
+    if len(kept) < MIN_PATCHES:
         raise FitError(
-            f"the photos show only {len(kept)} patches of the surface lit: too little to tell "
-            "materials apart"
+            f"the photos show only {len(kept)} lit patches of the surface; expected at least "
+            f"{MIN_PATCHES} to separate materials; take photos that show more of it"
         )
     dense = np.full(int(patch.max()) + 1, -1)
     dense[kept] = np.arange(len(kept))
@@ -77,12 +82,13 @@ def propose_materials(
     broad = Cells(number.ravel().astype(np.int32), *_rest(broad))
     mixture, splits = _divide(broad, joined, count, *lamps_of(broad, lamps))
     labels, confidence = _onto_faces(
-        cells, mixture, surface, seen, dense[patch], settled(mixture, joined)
+        cells, mixture, surface, seen, dense[patch], random_walk_probabilities(mixture, joined)
     )
     return _largest_first(labels, confidence, surface, splits)
 
 
 def _rest(cells: Cells) -> tuple:
+    """All fields of Cells except ``piece``, in order."""
     return (
         cells.photo, cells.count, cells.seen, cells.rows, cells.theta_h, cells.tilted,
         cells.shift, cells.slant,
@@ -92,7 +98,7 @@ def _rest(cells: Cells) -> tuple:
 def _divide(
     cells: Cells, joined: csr_array, count: int | None, lamp: NDArray[np.intp], one_light: bool
 ) -> tuple[Mixture, tuple[Split, ...]]:
-    """The mixture of all materials, from one on."""
+    """Split materials, beginning with one; returns the final mixture and all splits tried."""
     pieces = int(cells.piece.max()) + 1
     mixture = fit_mixture(cells, np.ones((pieces, 1)))
     splits: list[Split] = []
@@ -110,13 +116,13 @@ def _divide(
             tried.append((halves[1], material, halves[0]))
         if not tried:
             break
-        # the division that explains most
+        # the split with the largest gain in log likelihood
         _, material, second = max(tried, key=lambda t: t[0])
-        belongs = np.zeros((pieces, len(mixture.share) + 1))
-        belongs[np.arange(pieces), mixture.labels] = 1.0
-        belongs[second, material] = 0.0
-        belongs[second, -1] = 1.0
-        new = fit_mixture(cells, belongs, joined)
+        membership = np.zeros((pieces, len(mixture.share) + 1))
+        membership[np.arange(pieces), mixture.labels] = 1.0
+        membership[second, material] = 0.0
+        membership[second, -1] = 1.0
+        new = fit_mixture(cells, membership, joined)
         split = judge(cells, new, material, len(new.share) - 1, lamp, joined, one_light)
         splits.append(split)
         if count is None and not split.real:
@@ -132,16 +138,17 @@ def _divide(
 def _halves(
     cells: Cells, joined: csr_array, mine: NDArray[np.bool_]
 ) -> tuple[NDArray[np.intp], float] | None:
-    """(the pieces of the second half, gain in log likelihood) of dividing the pieces ``mine``."""
-    numbers = np.flatnonzero(mine)
-    if len(numbers) < FEWEST_PATCHES:
+    """(pieces of the second half, gain in log likelihood) of the best split of the pieces ``mine``
+    (pieces,) in two; None if there is none."""
+    members = np.flatnonzero(mine)
+    if len(members) < MIN_PATCHES:
         return None
     dense = np.full(len(mine), -1)
-    dense[numbers] = np.arange(len(numbers))
+    dense[members] = np.arange(len(members))
     part = cells.select(mine[cells.piece])
     part = Cells(dense[part.piece].astype(np.int32), *_rest(part))
-    near = joined[numbers][:, numbers]
-    one = fit_mixture(part, np.ones((len(numbers), 1)))
+    near = joined[members][:, members]
+    one = fit_mixture(part, np.ones((len(members), 1)))
     best: Mixture | None = None
     for start in _starts(part, one):
         found = fit_mixture(part, np.eye(2)[start], near)
@@ -151,22 +158,22 @@ def _halves(
             best = found
     if best is None:
         return None
-    return numbers[best.labels == 1], best.total - one.total
+    return members[best.labels == 1], best.total - one.total
 
 
 def _starts(cells: Cells, one: Mixture) -> list[NDArray[np.intp]]:
-    """Ways to begin: pieces in two by what one material leaves unexplained of their colour, of
-    their lightness away from highlights and in them, and by all of it."""
+    """Initial splits of the pieces, each (pieces,) 0 or 1: by the residuals of a single material
+    in colour, in lightness outside highlights and in them, and by all of these (k-means)."""
     pieces = int(cells.piece.max()) + 1
-    left = cells.seen - cells.rows @ one.coefficients[0].T
+    residual = cells.seen - cells.rows @ one.coefficients[0].T
     matte, shiny = cells.theta_h > np.radians(35), cells.theta_h < np.radians(22)
-    features = [_mean_of(cells, left[:, 1], None), _mean_of(cells, left[:, 2], None)]
-    features += [_mean_of(cells, left[:, 0], matte), _mean_of(cells, left[:, 0], shiny)]
+    features = [_mean_of(cells, residual[:, 1], None), _mean_of(cells, residual[:, 2], None)]
+    features += [_mean_of(cells, residual[:, 0], matte), _mean_of(cells, residual[:, 0], shiny)]
     features.append(features[3] - features[2])
     table = np.stack(features, axis=1)
     width = 1.483 * np.median(np.abs(table - np.median(table, axis=0)), axis=0)
     table = np.clip(table / np.maximum(width, 1e-6), -6, 6)
-    starts = [_two_heaps(column)[0] for column in table.T]
+    starts = [_two_clusters(column)[0] for column in table.T]
     rng = np.random.default_rng(0)
     for _ in range(2):
         _, labels = kmeans2(table[:, :4], 2, minit="++", seed=rng)
@@ -175,41 +182,41 @@ def _starts(cells: Cells, one: Mixture) -> list[NDArray[np.intp]]:
 
 
 def _mean_of(cells: Cells, values: Array, where: NDArray[np.bool_] | None) -> Array:
-    """(pieces,) mean over the cells of each piece, 0 where there is none."""
+    """(pieces,) mean of values (m,) over the cells ``where`` of each piece, 0 without any."""
     weight = np.ones(len(cells)) if where is None else where.astype(float)
     pieces = int(cells.piece.max()) + 1
     total = np.bincount(cells.piece, weight, pieces)
     return np.bincount(cells.piece, weight * values, pieces) / np.maximum(total, 1e-9)
 
 
-def _two_heaps(values: Array, weight: Array | None = None) -> tuple[NDArray[np.bool_], float]:
-    """(which values lie in the upper heap, share of their variance that two heaps explain): the
-    best cut of a line in two (Otsu 1979)."""
+def _two_clusters(values: Array, weight: Array | None = None) -> tuple[NDArray[np.bool_], float]:
+    """(True for values in the upper cluster, share of the variance that the two clusters explain),
+    by the optimal threshold (Otsu 1979)."""
     w = np.ones(len(values)) if weight is None else weight
     order = np.argsort(values, kind="stable")
     v, w = values[order], w[order]
     below, sums = np.cumsum(w), np.cumsum(w * v)
-    mean, all_of_it = sums[-1] / below[-1], below[-1]
-    spread_of_it = float((w * (v - mean) ** 2).sum())
-    under, over = below[:-1], np.maximum(all_of_it - below[:-1], 1e-12)
+    mean, total = sums[-1] / below[-1], below[-1]
+    variance = float((w * (v - mean) ** 2).sum())
+    under, over = below[:-1], np.maximum(total - below[:-1], 1e-12)
     between = under * (sums[:-1] / under - mean) ** 2
     between += over * ((sums[-1] - sums[:-1]) / over - mean) ** 2
     cut = int(np.argmax(between))
     upper = np.zeros(len(values), bool)
     upper[order[cut + 1 :]] = True
-    return upper, float(between[cut] / max(spread_of_it, 1e-12))
+    return upper, float(between[cut] / max(variance, 1e-12))
 
 
-def settled(mixture: Mixture, joined: csr_array) -> Array:
-    """(pieces, K) how far each piece belongs to each material when pieces that cannot tell follow
-    those around them: a random walk that stops where photos are clear (Grady 2006)."""
+def random_walk_probabilities(mixture: Mixture, joined: csr_array) -> Array:
+    """(pieces, K) probability of each material, where pieces with little evidence follow their
+    neighbours: random-walk segmentation (Grady 2006), which stops at pieces with clear evidence."""
     pieces = len(mixture.likelihood)
     value = mixture.likelihood + np.log(mixture.share)
     value = value - np.logaddexp.reduce(value, axis=1, keepdims=True)
     own = np.exp(value)
     best = np.sort(mixture.likelihood, axis=1)
     margin = best[:, -1] - best[:, -2] if best.shape[1] > 1 else np.ones(pieces)
-    stop = np.clip(margin / SURE, 1e-4, 1.0) ** 2
+    stop = np.clip(margin / DECISIVE_RATIO, 1e-4, 1.0) ** 2
     degree = np.maximum(np.asarray(joined.sum(axis=1)).ravel(), 1e-9)
     shares = diags_array(1.0 / degree) @ joined
     system = diags_array(stop + 0.2) - 0.2 * shares
@@ -225,7 +232,7 @@ def _onto_faces(
     patch: NDArray,
     regional: Array,
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """(f,) labels and confidence of faces, from their own cells and those around."""
+    """(labels (f,), confidence (f,)) of the faces, from their own cells and those around them."""
     faces, count = len(seen), len(mixture.share)
     each = np.empty((len(cells), count))
     step = 1 << 17
@@ -240,11 +247,11 @@ def _onto_faces(
     rounds = int(np.clip(round(np.sqrt(per_patch) / 4), 1, 6))
     around = spread(own, surface.neighbours, rounds)
     likely = 2.0 * around
-    # what the patch and those around it say: it decides where a face's own photos do not
+    # the prior from the patch and its neighbours decides where the face has little evidence
     likely[patch >= 0] += np.log(0.02 + regional[patch[patch >= 0]])
     labels = smooth_labels(likely, surface.neighbours, 4.0)
-    fill_unseen(labels, seen, surface)
-    labels = without_islands(labels, surface, SMALLEST_ISLAND)
+    fill_hidden(labels, seen, surface)
+    labels = without_islands(labels, surface, MIN_ISLAND)
     top = np.exp(likely - np.logaddexp.reduce(likely, axis=1, keepdims=True))
     confidence = top[np.arange(faces), labels]
     confidence = np.clip((confidence * count - 1) / (count - 1), 0, 1) if count > 1 else seen * 1.0
@@ -257,6 +264,7 @@ def _largest_first(
     surface: Surface,
     splits: tuple[Split, ...],
 ) -> Proposal:
+    """The proposal with its materials numbered by decreasing area, without gaps."""
     used, labels = np.unique(labels, return_inverse=True)
     area = np.bincount(labels.ravel(), surface.area, len(used))
     rank = np.empty(len(used), np.int32)

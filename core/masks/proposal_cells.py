@@ -1,4 +1,5 @@
-"""What one photo says of one piece of surface: the observations that tell materials apart."""
+"""The mean reflectance of each piece of the surface in each photo: the data that materials are
+clustered by."""
 
 from __future__ import annotations
 
@@ -12,27 +13,28 @@ from ..basis import Basis, mapping
 from ..samples import SampleTable
 
 Array = NDArray[np.float64]
-COMPONENTS = 6
-KNOTS = 10  # of a free curve over θh beside the components: lobes that no measured material has
+COMPONENTS = 6  # of the BRDF basis
+KNOTS = 10  # of a free curve over θh in addition, for lobes unlike those of the measured materials
 NORMAL_ERROR = np.radians(2.0)  # of a scanned normal, typical; dense stereo has 1° (median) to 3.5°
-# ρ·cosMap: MERL's blackest paints have 0.002. Where a photo is darker the scan has surface that is
-# not there, or shadow that its mesh does not cast
-DARKEST = 1e-3
-ROWS_AT_ONCE = 1 << 18
+# smallest ρ·cosMap of a sample; MERL's blackest paints have 0.002. Darker pixels come from surface
+# that does not exist, or from shadows that the mesh does not cast
+MIN_REFLECTANCE = 1e-3
+ROWS_AT_ONCE = 1 << 18  # samples processed at once, to limit memory
 
-# lightness and two opponent chromaticities of log RGB: an error of normal or exposure moves only
-# the first
+# lightness and two opponent chromaticities of log RGB: errors of normals or exposure change only
+# the lightness
 OPPONENT = np.array([[1, 1, 1], [1, -1, 0], [1, 1, -2]]) / np.sqrt([[3.0], [2.0], [6.0]])
 
 
 @dataclass(frozen=True)
 class Cells:
-    """m means over the pixels of a piece of surface in a photo.
+    """m cells; each is the mean over the pixels of one piece of the surface in one photo.
 
-    piece, photo: (m,) int32; count: (m,) pixels; seen: (m, 3) mapped, centred reflectance
-    (Nielsen's mapping, log units) as lightness and two chromaticities; rows: (m, k) of the basis
-    and the free curve; theta_h: (m,) radians; tilted: (2, m, k) rows with θh larger and smaller by
-    NORMAL_ERROR, and shift: (2, m) how the basis' mean moves with it; slant: (m,) tan θi.
+    piece, photo: (m,) int32; count: (m,) number of pixels; seen: (m, 3) mapped, centred reflectance
+    (mapping of Nielsen et al. 2015, log units) as lightness and two chromaticities; rows: (m, k)
+    rows of the basis and of the free curve; theta_h: (m,) radians; tilted: (2, m, k) rows with θh
+    larger and smaller by NORMAL_ERROR; shift: (2, m) the change of the basis mean there; slant:
+    (m,) tan θi.
     """
 
     piece: NDArray[np.int32]
@@ -50,8 +52,9 @@ class Cells:
 
     @classmethod
     def of(cls, table: SampleTable, piece: NDArray[np.int32], photo: int, basis: Basis) -> Cells:
-        """Means over samples of one photo that show the pieces (n,); black ones are left out."""
-        light = table.rho.mean(axis=1) * mapping.cos_map(table.angles) > DARKEST
+        """Means over the samples of one photo; piece: (n,) the piece of each sample. Samples darker
+        than MIN_REFLECTANCE are excluded."""
+        light = table.rho.mean(axis=1) * mapping.cos_map(table.angles) > MIN_REFLECTANCE
         table, piece = table.select(light), piece[light]
         which, inverse, count = np.unique(piece, return_inverse=True, return_counts=True)
         m, k = len(which), min(COMPONENTS, basis.count) + KNOTS
@@ -93,7 +96,7 @@ class Cells:
 
     @staticmethod
     def join(parts: list[Cells]) -> Cells:
-        """Cells of several photos, one after the other."""
+        """Concatenate the cells of several photos."""
         joined = {}
         for f in fields(Cells):
             axis = 1 if f.name in ("tilted", "shift") else 0
@@ -101,15 +104,15 @@ class Cells:
         return Cells(**joined)
 
     def select(self, which: NDArray) -> Cells:
-        """The rows of a boolean mask or an index array."""
-        chosen = {}
+        """The cells of a boolean mask or an index array."""
+        selected = {}
         for f in fields(Cells):
             values = getattr(self, f.name)
-            chosen[f.name] = values[:, which] if f.name in ("tilted", "shift") else values[which]
-        return Cells(**chosen)
+            selected[f.name] = values[:, which] if f.name in ("tilted", "shift") else values[which]
+        return Cells(**selected)
 
     def merged(self, group: NDArray[np.int32]) -> Cells:
-        """Cells of larger pieces: ``group`` (pieces,) says which one each piece is part of."""
+        """Cells of larger pieces; group: (pieces,) the larger piece that contains each piece."""
         photos = int(self.photo.max()) + 1 if len(self) else 1
         key = group[self.piece].astype(np.int64) * photos + self.photo
         which, inverse = np.unique(key, return_inverse=True)
@@ -138,7 +141,8 @@ class Cells:
 
 
 def _rows(basis: Basis, angles: Angles) -> tuple[Array, Array]:
-    """(centre (n,), rows (n, k)): components, then hats over √θh, where MERL's grid is even too."""
+    """(centre (n,), rows (n, k)): the components, then hat functions at equal steps of √θh, like
+    the MERL grid."""
     centre, q = basis.rows(angles, COMPONENTS)
     at = np.sqrt(np.clip(angles.theta_h / (np.pi / 2), 0.0, 1.0)) * (KNOTS - 1)
     hats = np.maximum(1.0 - np.abs(at[:, None] - np.arange(KNOTS)), 0.0)

@@ -1,4 +1,4 @@
-"""The mesh as a graph: small patches of it, who borders on whom, smooth labels on it."""
+"""The mesh as a graph of faces: patches, adjacency and smooth labels."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ from scipy.spatial import cKDTree
 from ..scan import Mesh
 
 Array = NDArray[np.float64]
-NORMAL_WEIGHT = 0.15  # of the object's size: faces back to back belong to different patches
+# weight of normals against positions, in sizes of the object, so that faces back to back belong to
+# different patches
+NORMAL_WEIGHT = 0.15
 
 
 @dataclass(frozen=True)
 class Surface:
-    """centre, normal: (f, 3) of faces; area: (f,), sums to 1; neighbours: (f, f) sparse, 1 where
-    two faces share an edge; size: of the mesh."""
+    """Geometry and adjacency of f faces. centre, normal: (f, 3); area: (f,), sum 1; neighbours: (f,
+    f) sparse, 1 where two faces share an edge; size: of the mesh, scan units."""
 
     centre: Array
     normal: Array
@@ -42,19 +44,19 @@ class Surface:
         )
 
     def patches(self, count: int, seed: int = 0) -> NDArray[np.int32]:
-        """(f,) the patch of each face: about ``count`` compact ones of like area."""
+        """(f,) the patch of each face: about ``count`` compact patches of similar area."""
         rng = np.random.default_rng(seed)
         place = np.concatenate([self.centre, NORMAL_WEIGHT * self.size * self.normal], axis=1)
         some = rng.choice(
-            len(place), min(8 * count, len(place)), replace=False, p=_chances(self.area)
+            len(place), min(8 * count, len(place)), replace=False, p=_probabilities(self.area)
         )
-        chosen = _far_apart(place[some], count)
-        _, patch = cKDTree(place[some][chosen]).query(place)
+        centres = _far_apart(place[some], count)
+        _, patch = cKDTree(place[some][centres]).query(place)
         _, patch = np.unique(patch, return_inverse=True)
         return patch.ravel().astype(np.int32)
 
     def joined(self, patch: NDArray[np.int32]) -> csr_array:
-        """(p, p) sparse: number of edges at which two different patches meet."""
+        """(p, p) sparse: number of mesh edges between each two different patches."""
         edges = self.neighbours.tocoo()
         a, b = patch[edges.coords[0]], patch[edges.coords[1]]
         apart = a != b
@@ -63,27 +65,30 @@ class Surface:
         return csr_array((ones, (a[apart], b[apart])), shape=(count, count))
 
 
-def _chances(area: Array) -> Array:
+def _probabilities(area: Array) -> Array:
+    """(f,) sampling probabilities: proportional to the area, with a lower bound."""
     kept = np.maximum(area, 1e-3 / len(area))
     return np.asarray(kept / kept.sum())
 
 
 def _far_apart(points: Array, count: int) -> NDArray[np.intp]:
-    """Up to ``count`` of points (n, d), none too near another: as blue noise, in one sweep."""
+    """Indices of points (n, d) with a minimum distance between them (blue noise, by dart throwing);
+    all of them if there are at most ``count``."""
     if len(points) <= count:
         return np.arange(len(points))
     tree = cKDTree(points)
     near = np.median(tree.query(points, k=min(9, len(points)))[0][:, -1])
     taken = np.zeros(len(points), bool)
-    chosen = []
+    selected = []
     for i in range(len(points)):
         if not taken[i]:
-            chosen.append(i)
+            selected.append(i)
             taken[tree.query_ball_point(points[i], 1.3 * near)] = True
-    return np.array(chosen)
+    return np.array(selected)
 
 
 def _face_neighbours(mesh: Mesh) -> csr_array:
+    """(f, f) sparse adjacency of the faces by shared edges."""
     n, v = len(mesh.faces), len(mesh.vertices)
     ends = np.sort(mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64), axis=1)
     key = ends[:, 0] * v + ends[:, 1]
@@ -97,7 +102,7 @@ def _face_neighbours(mesh: Mesh) -> csr_array:
 
 
 def spread(values: Array, neighbours: csr_array, rounds: int) -> Array:
-    """Values (n, k) averaged over neighbourhoods that grow by a ring each round."""
+    """Values (n, k) averaged over neighbourhoods that grow by one ring of faces in each round."""
     degree = 1.0 + np.asarray(neighbours.sum(axis=1)).ravel()
     for _ in range(rounds):
         values = (values + neighbours @ values) / degree[:, None]
@@ -107,10 +112,10 @@ def spread(values: Array, neighbours: csr_array, rounds: int) -> Array:
 def smooth_labels(
     likelihood: Array, neighbours: csr_array, weight: float, rounds: int = 8
 ) -> NDArray[np.int32]:
-    """(n,) labels that agree with the log likelihood (n, k) and with their neighbours.
+    """(n,) smooth labels from log likelihoods (n, k).
 
-    Potts model, iterated conditional modes (Besag 1986): a label is worth its log likelihood plus
-    ``weight`` times the share of neighbours that have it.
+    Potts model, iterated conditional modes (Besag 1986): the score of a label is its log likelihood
+    plus ``weight`` times the share of neighbours with this label.
     """
     n, k = likelihood.shape
     labels = likelihood.argmax(axis=1)
@@ -120,7 +125,7 @@ def smooth_labels(
         one_hot = np.zeros((n, k))
         one_hot[np.arange(n), labels] = 1.0
         better = (likelihood + weight * (shares @ one_hot)).argmax(axis=1)
-        if turn % 2:  # all at once may swing: every other round only half of them move
+        if turn % 2:  # simultaneous updates may oscillate: in every other round only half change
             better = np.where(np.arange(n) % 2, better, labels)
         if (better == labels).all():
             break
@@ -131,8 +136,8 @@ def smooth_labels(
 def without_islands(
     labels: NDArray[np.int32], surface: Surface, smallest: float
 ) -> NDArray[np.int32]:
-    """Labels where every connected piece smaller than ``smallest`` (of the area) has joined the
-    material it borders on most; pieces with no other around them stay."""
+    """Labels in which each connected piece smaller than ``smallest`` (share of the area) has taken
+    the material that it shares most edges with; pieces without neighbours stay."""
     labels = labels.copy()
     edges = surface.neighbours.tocoo()
     a, b = edges.coords
@@ -154,8 +159,8 @@ def without_islands(
     return labels
 
 
-def fill_unseen(labels: NDArray[np.int32], seen: NDArray[np.bool_], surface: Surface) -> None:
-    """Faces nobody saw take the label of the nearest seen one, in place."""
+def fill_hidden(labels: NDArray[np.int32], seen: NDArray[np.bool_], surface: Surface) -> None:
+    """Give the faces that no photo shows the label of the nearest visible face, in place."""
     if seen.any() and not seen.all():
         _, nearest = cKDTree(surface.centre[seen]).query(surface.centre[~seen])
         labels[~seen] = labels[seen][nearest]

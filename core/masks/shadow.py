@@ -1,5 +1,5 @@
-"""How much of its light each surface point sees: shadows with the soft edges that a source's size
-and an uncertain mesh give them."""
+"""Visibility of the light at each surface point: shadows with soft edges, from the size of the
+light and the uncertainty of the mesh."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from ..scan import Camera, Mesh
 
 Array = NDArray[np.float64]
 
-SAMPLES = 64  # rays of a pixel in a soft edge: steps of 1.6 %
-RAYS_AT_ONCE = 1 << 18
-# Of the median edge. Two dense stereo meshes whose truth is known lie 0.08 and 0.04 of an edge off
-# (median), 0.23 and 0.14 at the 95th percentile
+SAMPLES = 64  # rays of a pixel in a soft edge: visibility in steps of 1.6 %
+RAYS_AT_ONCE = 1 << 18  # to limit memory
+# Uncertainty of the mesh in median edge lengths. Two dense stereo meshes with known ground truth
+# have errors of 0.08 and 0.04 (median), and of 0.23 and 0.14 at the 95th percentile
 UNCERTAINTY = 0.25
-LEAST_COSINE = 0.2  # a shifted start goes along the surface, at grazing light not endlessly far
+MIN_COSINE = 0.2  # limits the shift of a ray's start along the surface at grazing light
 GOLDEN_ANGLE = np.pi * (3.0 - 5.0**0.5)
-TOLERANCE = 0.05  # a pixel that misses more of its light than this is out
+TOLERANCE = 0.05  # missing fraction of the light above which a pixel counts as shadow
 
 
 def mesh_uncertainty(mesh: Mesh) -> float:
-    """How far off the mesh's outlines are taken to be, scan units: a quarter of its median edge."""
+    """Assumed error of the outlines of the mesh in scan units: a quarter of its median edge."""
     edges = mesh.vertices[mesh.faces] - mesh.vertices[np.roll(mesh.faces, 1, axis=1)]
     return UNCERTAINTY * float(np.median(np.linalg.norm(edges, axis=2)))
 
@@ -37,17 +37,17 @@ def light_visibility(
     samples: int = SAMPLES,
     uncertainty: float | None = None,
 ) -> NDArray[np.float32]:
-    """(n,) the fraction, 0…1, of the light's disc that every pixel's point of ``view`` sees.
+    """(n,) the visible fraction, 0…1, of the disc of the light at each point of ``view``.
 
-    A distant light is a disc of its angular radius in the sky, a near or mounted one a sphere of
-    its radius; what of it lies below the horizon of the smooth normal is not seen. uncertainty:
-    scan units (None: mesh_uncertainty). Rays start at points of a disc of this radius around the
-    pixel's point, square to the light and laid along it onto the tangent plane: as if the occluder
-    were shifted by as much, so a hard edge becomes a ramp of ± uncertainty whatever its distance.
+    A distant light is a disc of its angular radius, a near or mounted one a sphere of its radius;
+    the part below the horizon of the smooth normal is not visible. uncertainty: scan units (None:
+    mesh_uncertainty). Rays start on a disc of this radius around the point, perpendicular to the
+    light and projected along it onto the tangent plane. This is equivalent to shifting the
+    occluder, so a hard edge becomes a ramp of ± uncertainty, whatever the distance of the occluder.
 
-    Points on the discs are a spiral, turned by a hash of the pixel so that its pattern does not
-    show. Where twelve rays on the discs' rims and within agree, no others are cast. Without any
-    size this is one ray: exactly what cast_shadow says.
+    Samples on the discs form a spiral, rotated by a hash of the pixel to avoid visible patterns. If
+    twelve rays on the rims and inside the discs agree, no other rays are cast. If light and
+    uncertainty have no size, a single ray gives the same result as cast_shadow.
     """
     incidence = light.incidence(view.point, camera)
     blur = mesh_uncertainty(rays.mesh) if uncertainty is None else uncertainty
@@ -75,7 +75,8 @@ def light_visibility(
 
 
 def _angular_radius(light: Light, distance: Array | None, count: int) -> Array:
-    """(n,) radians of the source, as each point sees it."""
+    """(n,) angular radius of the light in radians at each point; distance: (n,), None for a distant
+    light."""
     if distance is None:
         return np.full(count, light.angular_radius if isinstance(light, DistantLight) else 0.0)
     size = float(getattr(light, "radius", 0.0))
@@ -83,10 +84,10 @@ def _angular_radius(light: Light, distance: Array | None, count: int) -> Array:
 
 
 def _spiral(samples: int) -> Array:
-    """(samples, 4): share of the light's disc and angle in it, the same in the disc of starts.
+    """(samples, 4): area fraction and angle on the disc of the light, then on the disc of starts.
 
-    Vogel's spiral fills the first disc; the second one's shares and angles step by other irrational
-    numbers (Roberts 2018, the plastic number), so that the two know nothing of each other.
+    Vogel's spiral fills the first disc. Fractions and angles on the second one advance by other
+    irrational numbers (Roberts 2018, the plastic number), so that the two are uncorrelated.
     """
     number = np.arange(samples)
     return np.stack(
@@ -101,8 +102,8 @@ def _spiral(samples: int) -> Array:
 
 
 def _scouts(rim: int = 8, inner: int = 4) -> Array:
-    """Rays on the rim of both discs, and some within: a straight edge that passes between eight
-    on the rim leaves 1.2 % of the disc."""
+    """(rim + inner, 4) first rays, on the rims of both discs and inside, in the format of _spiral.
+    A straight edge that eight rays on the rim miss cuts off at most 1.2 % of the disc."""
     angle = 2 * np.pi * np.concatenate([np.arange(rim) / rim, (np.arange(inner) + 0.5) / inner])
     share = np.where(np.arange(rim + inner) < rim, 1.0, 0.2)
     return np.stack([share, angle, share, angle], axis=1)
@@ -112,7 +113,7 @@ SCOUTS = _scouts()
 
 
 def _hashed_turn(pixel: NDArray[np.int32]) -> Array:
-    """(n,) radians: a turn of its own for every pixel (Knuth's multiplicative hash)."""
+    """(n,) a pseudorandom rotation in radians for each pixel (Knuth's multiplicative hash)."""
     mixed = (pixel.astype(np.uint64) * np.uint64(2654435761)) & np.uint64(0xFFFFFFFF)
     mixed ^= mixed >> np.uint64(15)
     mixed = (mixed * np.uint64(2246822519)) & np.uint64(0xFFFFFFFF)
@@ -120,7 +121,7 @@ def _hashed_turn(pixel: NDArray[np.int32]) -> Array:
 
 
 class _Points:
-    """Some surface points, how their light stands, and who of it gets through."""
+    """Surface points with the directions and sizes of their light, for visibility tests."""
 
     def __init__(
         self,
@@ -137,11 +138,11 @@ class _Points:
         self.point, self.normal, self.towards = point, normal, towards
         self.distance, self.radius, self.turn = distance, radius, turn
         self.start = point + rays.lift * normal
-        # two axes square to the light
+        # two axes perpendicular to the direction of the light
         self.across, self.along = tangents(towards)
 
     def seen(self, samples: int) -> NDArray[np.float32]:
-        """(n,) fraction of the light, from ``samples`` rays where it takes as many."""
+        """(n,) visible fraction of the light; up to ``samples`` rays for each point."""
         every = np.arange(len(self.point))
         if samples == 1:
             return self._open(every, None)[:, 0].astype(np.float32)
@@ -152,7 +153,9 @@ class _Points:
         return free.astype(np.float32)
 
     def _open(self, which: NDArray, pattern: Array | None) -> NDArray[np.bool_]:
-        """(points, rays) whether rays of these points reach the light; None: one to its middle."""
+        """(points, rays) True where a ray of the points ``which`` reaches the light.
+
+        pattern: (rays, 4) as of _spiral; None: a single ray to the centre of the light."""
         count = 1 if pattern is None else len(pattern)
         rows = np.repeat(which, count)
         towards, start = self.towards[rows], self.start[rows]
@@ -166,14 +169,14 @@ class _Points:
             if self.blur > 0:
                 start = start + self._shift(rows, far, aside + turn)
         free = np.einsum("ij,ij->i", self.normal[rows], towards) > 0
-        asked = np.flatnonzero(free)
-        free[asked] = ~self.rays.occluded(
-            start[asked], towards[asked], None if limits is None else limits[asked]
+        tested = np.flatnonzero(free)
+        free[tested] = ~self.rays.occluded(
+            start[tested], towards[tested], None if limits is None else limits[tested]
         )
         return free.reshape(-1, count)
 
     def _to_disc(self, rows: NDArray, share: Array, angle: Array) -> tuple[Array, Array]:
-        """(directions (m, 3) evenly over the source's solid angle, cosines to its middle (m,))."""
+        """((m, 3) directions uniform over the light's solid angle, (m,) cosines to its axis)."""
         cosine = 1.0 - share * (1.0 - np.cos(self.radius[rows]))
         sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
         sideways = (sine * np.cos(angle))[:, None] * self.across[rows]
@@ -181,22 +184,23 @@ class _Points:
         return cosine[:, None] * self.towards[rows] + sideways, cosine
 
     def _shift(self, rows: NDArray, share: Array, angle: Array) -> Array:
-        """(m, 3) from the point to one of the disc of the mesh's uncertainty, on its plane."""
+        """(m, 3) offsets of the starts: points of the uncertainty disc, projected along the light
+        onto the tangent plane."""
         far = self.blur * np.sqrt(share)
         aside = (far * np.cos(angle))[:, None] * self.across[rows]
         aside += (far * np.sin(angle))[:, None] * self.along[rows]
         rise = np.einsum("ij,ij->i", self.normal[rows], aside)
         lean = np.einsum("ij,ij->i", self.normal[rows], self.towards[rows])
-        back = rise / np.maximum(lean, LEAST_COSINE)
+        back = rise / np.maximum(lean, MIN_COSINE)
         shifted: Array = aside - back[:, None] * self.towards[rows]
         return shifted
 
 
 def to_grey(visible: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Grey of a shadow mask for visibilities 0…1 of any shape: white in shadow, black in the light.
+    """Grey values of a shadow mask for visibilities 0…1 of any shape: white means shadow.
 
-    Whoever reads masks by "above one half" must leave out every pixel that misses more than
-    TOLERANCE of its light: missing 0…5 % is 0…127, missing 5…100 % is 128…255.
+    Masks are thresholded at one half, which must exclude every pixel that misses more than
+    TOLERANCE of its light: missing 0…5 % is mapped to 0…127, missing 5…100 % to 128…255.
     """
     missing = np.clip(1.0 - np.asarray(visible, np.float64), 0.0, 1.0)
     little = 127.0 * missing / TOLERANCE
@@ -207,7 +211,7 @@ def to_grey(visible: NDArray[np.floating]) -> NDArray[np.uint8]:
 
 
 def from_grey(grey: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Visibilities of a shadow mask's grey; the inverse of to_grey within half a step."""
+    """Visibilities 0…1 from the grey values of a shadow mask; inverts to_grey up to rounding."""
     value = np.asarray(grey, np.float32)
     little = TOLERANCE * value / 127.0
     much = TOLERANCE + (1.0 - TOLERANCE) * (value - 128.0) / 127.0

@@ -1,5 +1,5 @@
-"""Shadow masks and proposed materials as pictures beside a new capture file: to look at, repaint
-and fit with."""
+"""Write shadow masks and proposed materials as mask images, with a new capture file that uses
+them."""
 
 from __future__ import annotations
 
@@ -21,16 +21,17 @@ from ..inputs.photos import LitPhotos
 from ..photo import read_mask, write_png
 from .capture_text import capture_with_masks
 from .proposal import Proposal
-from .proposal_job import ProposalJob, standing_lights
+from .proposal_job import ProposalJob, capture_lights
 from .shadow import light_visibility, to_grey
 
 FOLDER = "masks"
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """shadows: shadow masks; materials: proposed ones, count of them (None: as many as there are);
-    uncertainty: of the mesh, scan units (None: shadow.mesh_uncertainty)."""
+class MasksSettings:
+    """The masks to write. shadows: shadow masks; materials: masks of proposed materials; count:
+    their number (None: as many as differ significantly); uncertainty: of the mesh, scan units
+    (None: shadow.mesh_uncertainty)."""
 
     shadows: bool = True
     materials: bool = False
@@ -39,8 +40,10 @@ class Wanted:
 
 
 @dataclass
-class Written:
-    """capture: the new capture file; shadows, materials: mask files by photo; proposal."""
+class WrittenMasks:
+    """The written files. capture: the new capture file; shadows, materials: mask files of each
+    photo, relative to the capture file; names: the proposed materials; proposal: None if no
+    materials were proposed."""
 
     capture: Path
     shadows: list[str] = field(default_factory=list)
@@ -50,19 +53,20 @@ class Written:
 
 
 class MasksJob(Job):
-    """Write masks of a capture into ``folder``, for a capture file that will lie in ``final`` (the
-    same, unless files are moved there later). ``result`` is there when the job is done."""
+    """Write masks of a capture into ``folder``. final: the folder for which the paths in the new
+    capture file are written, if the files are moved later; otherwise the same folder. ``result``
+    holds the files when the job is done."""
 
-    def __init__(self, capture: Capture, wanted: Wanted, folder: Path, final: Path) -> None:
+    def __init__(self, capture: Capture, wanted: MasksSettings, folder: Path, final: Path) -> None:
         super().__init__()
         self.capture, self.wanted = capture, wanted
         self.folder, self.final = folder, final
-        self.result: Written | None = None
+        self.result: WrittenMasks | None = None
 
     def run(self) -> Iterator[Step]:
-        """The division into materials, then every photo's masks."""
+        """Propose the materials, if requested, then write the masks of every photo."""
         capture, wanted = self.capture, self.wanted
-        done = Written(self.folder / new_name(capture))
+        done = WrittenMasks(self.folder / new_name(capture))
         share = 0.0
         if wanted.materials:
             share = 0.6
@@ -80,12 +84,12 @@ class MasksJob(Job):
             capture_data.check_photos(capture, scan)
             rays = RayScene.build(scan.mesh)
             photos = LitPhotos.open(capture)
-            lights = standing_lights(capture, scan, photos, rays, default_basis())
+            lights = capture_lights(capture, scan, photos, rays, default_basis())
         (self.folder / FOLDER).mkdir(parents=True, exist_ok=True)
         stems = _stems(capture)
         for place in range(len(capture.photos)):
             part = place / len(capture.photos)
-            yield Step("painting masks", share + (1.0 - share) * part)
+            yield Step("writing the masks", share + (1.0 - share) * part)
             camera = capture_data.camera_of(capture, scan, place)
             view = view_surface(rays, camera)
             if wanted.shadows:
@@ -108,7 +112,8 @@ class MasksJob(Job):
         done.capture.write_text(text, "utf-8")
         self.result = done
 
-    def _materials(self, done: Written, view: SurfaceView, stem: str) -> dict[str, str]:
+    def _materials(self, done: WrittenMasks, view: SurfaceView, stem: str) -> dict[str, str]:
+        """Write the material masks of one photo; returns {material: file}."""
         assert done.proposal is not None
         label = done.proposal.labels[view.face]
         outline = edges.widen(view.silhouette, max(self.capture.fit.margins.silhouette - 1, 0))
@@ -119,18 +124,19 @@ class MasksJob(Job):
         return files
 
     def _write(self, name: str, grey: NDArray[np.uint8]) -> str:
+        """Write a mask; returns its path relative to the capture file."""
         write_png(self.folder / FOLDER / name, grey)
         return f"{FOLDER}/{name}"
 
 
 def new_name(capture: Capture) -> str:
-    """The capture's own file name: in another folder, nothing is overwritten."""
+    """The file name of the new capture file: that of the capture, which is in another folder."""
     name = capture.file.name
     return name if name.endswith(".capture.toml") else f"{capture.file.stem}.capture.toml"
 
 
 def check_final(capture: Capture, final: Path) -> None:
-    """Refuse a folder in which the new files would take the place of the capture's own."""
+    """Raise InputError for a folder in which files of the capture would be overwritten."""
     mine = final / new_name(capture)
     inputs_of_it = {capture.file, *(p.resolve() for photo in capture.photos for p in photo.files)}
     for photo in capture.photos:
@@ -138,7 +144,8 @@ def check_final(capture: Capture, final: Path) -> None:
     room = (final / FOLDER).resolve()
     if mine.resolve() in inputs_of_it or any(room == file.parent for file in inputs_of_it):
         raise InputError(
-            "holds files of the capture itself, which would be overwritten: choose another folder",
+            "contains files of the capture itself, which would be overwritten; expected a folder "
+            "without them; choose another folder",
             file=final,
             key="--out",
         )
@@ -150,7 +157,7 @@ def material_names(count: int) -> list[str]:
 
 
 def _stems(capture: Capture) -> list[str]:
-    """A name for each photo's masks: its own, with its number where another photo has the same."""
+    """File stem of the masks of each photo: that of the photo, with its number if not unique."""
     stems = [photo.file.stem for photo in capture.photos]
     folded = [stem.casefold() for stem in stems]
     return [
@@ -160,6 +167,6 @@ def _stems(capture: Capture) -> list[str]:
 
 
 def _painted_shadow(capture: Capture, place: int, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """What the artist has marked as shadow before stays marked."""
+    """(h, w) True in the existing shadow mask of the photo, which is kept."""
     file = capture.photos[place].masks.get(SHADOW_MASK)
     return np.zeros(shape, bool) if file is None else read_mask(file)

@@ -1,4 +1,4 @@
-"""Image files → linear radiance, exposure, noise; and masks."""
+"""Read image files as linear radiance, with exposure and noise; read masks and write images."""
 
 from .bracket import Merged, merge_bracket
 from .clipping import black, clipped

@@ -1,9 +1,9 @@
 """Several exposures of one viewpoint → one radiance image with its variance.
 
 Inverse-variance weighting with the photos' own noise model (Granados et al. 2010, "Optimal HDR
-reconstruction with linear digital cameras"). The weight of a pixel is taken from a first estimate
-that all exposures share, not from its own noisy value, which would favour pixels that came out
-dark. Photos are asked for one at a time, twice each: memory does not grow with their number.
+reconstruction with linear digital cameras"). The weight of a pixel comes from a first estimate
+shared by all exposures. Its own noisy value would bias the weights towards dark pixels. Photos are
+read one at a time, twice each, so memory does not grow with their number.
 """
 
 from __future__ import annotations
@@ -22,19 +22,26 @@ from .photo import Photo
 Source = Photo | Callable[[], Photo]
 
 ROWS = 256
-SAMPLES = 500_000  # pixels that exposures are compared on
-DOMINATED = 2.0  # signal below so many standard deviations is noise
-RATIO_SIGNAL, RATIO_FEWEST, RATIO_OFF = 5.0, 200, 0.05
-MOVED_SIGMA, MOVED_PART, MOVED_OFF = 6.0, 0.1, 0.02
-RELATIVE_FLOOR = 1e-4  # standard deviation that no model is trusted below, as a part of the signal
+COMPARED_PIXELS = 500_000  # for the ratio of two exposures
+MIN_SNR = 2.0  # standard deviations: a weaker signal counts as noise
+# ratio of exposures: signal over noise of a used pixel, pixels needed, relative error to report
+RATIO_MIN_SNR, RATIO_MIN_PIXELS, RATIO_MAX_ERROR = 5.0, 200, 0.05
+# a pixel disagrees beyond so many standard deviations plus this share of the signal; share of
+# disagreeing pixels to report
+MOVED_SIGMA, MOVED_RELATIVE, MOVED_MAX_SHARE = 6.0, 0.1, 0.02
+MIN_RELATIVE_STD = 1e-4  # of the signal: smallest standard deviation that is assumed
 
 
 @dataclass(frozen=True)
 class Merged:
-    """radiance (h, w, 3) per unit exposure, variance (h, w, 3) of it, valid (h, w): some exposure
-    was not clipped there (radiance 0 and variance inf elsewhere); in the order of the photos:
-    factors: measured exposure over stated one, against the longest (nan: could not be compared);
-    moved: part of the pixels that disagree with the others beyond noise; warnings: sentences."""
+    """A merged bracket.
+
+    radiance: (h, w, 3) per unit exposure; variance: (h, w, 3) of it; valid: (h, w) at least one
+    exposure is not clipped (elsewhere radiance is 0 and variance inf). In the order of the photos:
+    factors: measured over stated exposure, relative to the longest exposure (nan: too few pixels
+    to compare); moved: share of pixels that disagree with the other exposures beyond noise.
+    warnings: sentences.
+    """
 
     radiance: NDArray[np.float32]
     variance: NDArray[np.float32]
@@ -52,32 +59,36 @@ def merge_bracket(
 ) -> Merged:
     """Merge photos (or functions that read them) taken with relative ``exposures`` > 0.
 
-    A channel counts where it is not clipped and stands out of the noise; the longest exposure that
-    is not clipped always counts. ``noise`` is estimated from each photo where it is not given.
-    Raises InputError for exposures that cannot be, or photos of different sizes.
+    A channel is used where it is not clipped and above the noise; the longest exposure that is not
+    clipped is always used. noise: one model per photo, estimated from each photo where None. names:
+    of the photos, for warnings. Raises InputError for impossible exposures or photos of different
+    sizes.
     """
     if not photos or len(photos) != len(exposures):
-        raise InputError(f"{len(photos)} photos, but {len(exposures)} exposures")
+        raise InputError(
+            f"found {len(photos)} photos and {len(exposures)} exposures; expected one exposure per "
+            "photo"
+        )
     if not all(math.isfinite(e) and e > 0 for e in exposures):
-        raise InputError(f"exposures must be positive numbers; found {list(exposures)}")
+        raise InputError(f"found exposures {list(exposures)}; expected positive numbers")
     order = sorted(range(len(photos)), key=lambda i: -exposures[i])
     first = _first_estimate(photos, exposures, noise, order)
-    numbers = _weighted(photos, exposures, first, order)
-    called = names or [f"photo {i + 1}" for i in range(len(photos))]
+    merged = _weighted(photos, exposures, first, order)
+    photo_names = names or [f"photo {i + 1}" for i in range(len(photos))]
     return Merged(
-        numbers.radiance,
-        numbers.variance,
+        merged.radiance,
+        merged.variance,
         first.longest < len(photos),
         first.factors,
-        numbers.moved,
-        _warnings(called, exposures, first.factors, numbers.moved),
+        merged.moved,
+        _warnings(photo_names, exposures, first.factors, merged.moved),
     )
 
 
 @dataclass(frozen=True)
 class _First:
-    """estimate (h, w, 3) radiance; longest (h, w): place in the order of the longest exposure that
-    is not clipped, or the number of photos."""
+    """First estimate. estimate: (h, w, 3) radiance; longest: (h, w) index, by descending exposure,
+    of the longest exposure that is not clipped, or the number of photos."""
 
     estimate: NDArray[np.float32]
     longest: NDArray[np.uint16]
@@ -98,7 +109,8 @@ def _first_estimate(
     noise: Sequence[Noise] | None,
     order: list[int],
 ) -> _First:
-    """Sum of unclipped pixels over sum of exposures: unbiased, and best for shot noise alone."""
+    """Sum of unclipped pixels over sum of their exposures: unbiased, and optimal where there is
+    only shot noise. Also compares each exposure with the next longer one."""
     total = weight = longest = None
     noises: dict[int, Noise] = {}
     steps: dict[int, float] = {}
@@ -111,8 +123,8 @@ def _first_estimate(
             longest = np.full(photo.clipped.shape, len(order), np.uint16)
         if photo.radiance.shape != total.shape:
             raise InputError(
-                f"bracketed photos differ in size: {photo.clipped.shape[::-1]} and "
-                f"{weight.shape[::-1]} pixels"
+                f"bracketed photos have {photo.clipped.shape[::-1]} and {weight.shape[::-1]} "
+                "pixels; expected one size"
             )
         noises[i] = estimate_noise(photo) if noise is None else noise[i]
         usable = ~photo.clipped
@@ -122,10 +134,10 @@ def _first_estimate(
             rows = slice(top, top + ROWS)
             total[rows] += photo.radiance[rows] * usable[rows, :, None]
         weight += usable * np.float32(exposures[i])
-        step = max(1, math.isqrt(usable.size // SAMPLES))
+        step = max(1, math.isqrt(usable.size // COMPARED_PIXELS))
         sample = photo.radiance[::step, ::step], photo.clipped[::step, ::step]
         if before is not None:
-            steps[i] = _factor(before, (i, *sample), exposures, noises)
+            steps[i] = _exposure_ratio(before, (i, *sample), exposures, noises)
         before = i, sample[0].copy(), sample[1].copy()
     assert total is not None and weight is not None and longest is not None
     total /= np.maximum(weight, np.float32(min(exposures)))[:, :, None]
@@ -137,23 +149,24 @@ def _first_estimate(
     return _First(total, longest, tuple(noises[i] for i in count), tuple(factors[i] for i in count))
 
 
-def _factor(
+def _exposure_ratio(
     longer: tuple[int, NDArray, NDArray],
     shorter: tuple[int, NDArray, NDArray],
     exposures: Sequence[float],
     noises: dict[int, Noise],
 ) -> float:
-    """Median of (shorter / its exposure) / (longer / its exposure). Pixels are chosen by the longer
-    one: chosen by the shorter one's own value, its noise would bias the median."""
+    """Median of (shorter / its exposure) / (longer / its exposure). Pixels are selected by the
+    value in the longer exposure; selecting by the shorter one's noisy value would bias the
+    median."""
     i, bright, bright_clipped = longer
     j, dark, dark_clipped = shorter
     expected = bright * np.float32(exposures[j] / exposures[i])
-    sure = expected > RATIO_SIGNAL * np.sqrt(noises[j].variance(expected))
-    sure &= (bright > RATIO_SIGNAL * np.sqrt(noises[i].variance(bright))) & (expected > 0)
-    sure &= ~(bright_clipped | dark_clipped)[:, :, None]
-    if sure.sum() < RATIO_FEWEST:
+    used = expected > RATIO_MIN_SNR * np.sqrt(noises[j].variance(expected))
+    used &= (bright > RATIO_MIN_SNR * np.sqrt(noises[i].variance(bright))) & (expected > 0)
+    used &= ~(bright_clipped | dark_clipped)[:, :, None]
+    if used.sum() < RATIO_MIN_PIXELS:
         return math.nan
-    return float(np.median(dark[sure] / expected[sure]))
+    return float(np.median(dark[used] / expected[used]))
 
 
 def _weighted(
@@ -169,15 +182,15 @@ def _weighted(
             rows = slice(top, top + ROWS)
             expected = np.maximum(first.estimate[rows] * exposure, 0)
             variance = first.noise[i].variance(expected)
-            variance += (np.float32(RELATIVE_FLOOR) * expected) ** 2 + np.float32(1e-20)
-            usable = (expected > DOMINATED * np.sqrt(variance)) & ~photo.black[rows, :, None]
+            variance += (np.float32(MIN_RELATIVE_STD) * expected) ** 2 + np.float32(1e-20)
+            usable = (expected > MIN_SNR * np.sqrt(variance)) & ~photo.black[rows, :, None]
             usable |= (first.longest[rows] == place)[:, :, None]
             usable &= ~photo.clipped[rows, :, None]
             pixel_weight = np.where(usable, exposure**2 / variance, np.float32(0))
             total[rows] += pixel_weight * (photo.radiance[rows] / exposure)
             weight[rows] += pixel_weight
             away = np.abs(photo.radiance[rows] - expected)
-            odd = away > MOVED_SIGMA * np.sqrt(variance) + MOVED_PART * expected
+            odd = away > MOVED_SIGMA * np.sqrt(variance) + MOVED_RELATIVE * expected
             off += int((odd & usable).any(axis=2).sum())
             seen += int(usable.any(axis=2).sum())
         moved[i] = off / seen if seen else 0.0
@@ -202,17 +215,18 @@ def _warnings(
     for name, exposure, factor, part in zip(names, exposures, factors, moved, strict=True):
         if math.isnan(factor):
             found.append(
-                f"{name}: too few pixels in common with the next longer exposure; its exposure "
-                "could not be checked"
+                f"{name} shares too few usable pixels with the next longer exposure, so its "
+                "exposure could not be checked."
             )
-        elif abs(factor - 1) > RATIO_OFF:
+        elif abs(factor - 1) > RATIO_MAX_ERROR:
             found.append(
-                f"{name}: its pixels say exposure {exposure * factor:.4g}, not {exposure:.4g} "
-                f"({100 * (factor - 1):+.0f} %); give the measured one"
+                f"{name} has the exposure {exposure * factor:.4g} by its pixels, but "
+                f"{exposure:.4g} is given ({100 * (factor - 1):+.0f} %). Give the measured "
+                "exposure."
             )
-        if part > MOVED_OFF:
+        if part > MOVED_MAX_SHARE:
             found.append(
-                f"{name}: {100 * part:.0f} % of its pixels disagree with the other exposures; "
-                "was the camera or the object moved?"
+                f"{name} disagrees with the other exposures in {100 * part:.0f} % of its pixels. "
+                "Check whether the camera or the object moved."
             )
     return tuple(found)

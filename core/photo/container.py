@@ -1,4 +1,4 @@
-"""What a file is, by its first bytes, and whether it may be opened at all."""
+"""Identify an image file by its first bytes and check that it is safe to open."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ KIND_OF = {
     ".hdr": "hdr",
 }
 RAW = frozenset((".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw"))
-READ = ", ".join((*KIND_OF, *sorted(RAW)))
-LARGEST_SIDE, MOST_PIXELS = 1 << 17, 300_000_000
+READABLE_SUFFIXES = ", ".join((*KIND_OF, *sorted(RAW)))
+MAX_SIDE, MAX_PIXELS = 1 << 17, 300_000_000  # pixels
 HEADS = {
     "openexr": rb"\x76\x2f\x31\x01",
     "png": re.escape(SIGNATURE),
@@ -43,8 +43,8 @@ HEADS = {
 
 @dataclass(frozen=True)
 class Container:
-    """kind: 'openexr', 'tiff' … or '' where it is unknown; chunks: a PNG's declarations; scale:
-    what the pixels of a .hdr are to be divided by."""
+    """Format of an image file. kind: 'openexr', 'tiff' …, or '' where unknown; chunks: a PNG's
+    declarations of its encoding; scale: the pixels of a .hdr must be divided by it (R, G, B)."""
 
     kind: str
     chunks: Mapping[str, bytes] = field(default_factory=dict)
@@ -53,22 +53,26 @@ class Container:
 
 @once_per_file
 def check_container(path: Path) -> Container:
-    """Check a whole file before its pixels are read. Raises InputError for one that is missing,
-    named as another kind than it is, truncated or damaged as far as that can be seen, or CMYK.
+    """Check a whole file before its pixels are read.
 
-    A file that stays the same is read once, however often this is called."""
+    The result is cached until the file changes. Raises InputError for a file that is missing, has
+    the wrong suffix, is truncated or damaged (as far as that can be detected), or CMYK.
+    """
     return _check(path, whole=True)
 
 
 def check_header(path: Path) -> Container:
-    """Check a file's header, before its size is asked for: the same as check_container but for
-    what lies after the header of a PNG or JPEG. Raises InputError."""
+    """Check only the header of a file: like check_container, without the part after the header of
+    a PNG or JPEG. Raises InputError."""
     return _check(path, whole=False)
 
 
 def _check(path: Path, whole: bool) -> Container:
     if not path.is_file():
-        raise InputError("is not a file" if path.exists() else "no such file", file=path)
+        raise InputError(
+            "is not a file; expected an image" if path.exists() else "no such file; check the path",
+            file=path,
+        )
     try:
         with path.open("rb") as file:
             head = file.read(32)
@@ -78,9 +82,13 @@ def _check(path: Path, whole: bool) -> Container:
             suffix = path.suffix.lower()
             if kind:
                 raise InputError(
-                    f"is named {suffix}, but holds a {kind} image; rename it", file=path
+                    f"has the suffix {suffix} but its format is {kind}; rename it", file=path
                 )
-            raise InputError(f"is named {suffix}, but is no {expected.upper()} image", file=path)
+            raise InputError(
+                f"has the suffix {suffix} but its content is not {expected.upper()}; export it "
+                "again",
+                file=path,
+            )
         if kind == "png":
             return Container(kind, check_png(path) if whole else check_png_header(path))
         if kind == "jpeg":
@@ -95,12 +103,13 @@ def _check(path: Path, whole: bool) -> Container:
 
 
 def check_size(path: Path, width: int, height: int) -> None:
-    """Raise InputError for an image that is empty or larger than any photo, before it is read."""
-    if not (0 < width <= LARGEST_SIDE and 0 < height <= LARGEST_SIDE) or (
-        width * height > MOST_PIXELS
-    ):
+    """Raise InputError for an image that is empty or larger than any photo, before it is read.
+
+    width, height: pixels, as the header states them.
+    """
+    if not (0 < width <= MAX_SIDE and 0 < height <= MAX_SIDE) or (width * height > MAX_PIXELS):
         raise InputError(
-            f"says it has {width} × {height} pixels; at most {LARGEST_SIDE} a side and "
-            f"{MOST_PIXELS // 10**6} million in all are read",
+            f"has {width} × {height} pixels according to its header; expected at most {MAX_SIDE} "
+            f"per side and {MAX_PIXELS // 10**6} million in total",
             file=path,
         )

@@ -1,4 +1,4 @@
-"""What a file says about its own numbers: the curve to linear light, the primaries, and why."""
+"""The encoding that a file declares: transfer curve to linear light, primaries, and the reason."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ CICP_PRIMARIES = {
     12: (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290),
 }
 ASSUMED = (
-    "16-bit without a statement of its curve: taken as sRGB; if the numbers are linear, say "
-    'transfer = "linear"'
+    "16-bit file that does not declare its curve, read as sRGB. If its values are linear, set "
+    'transfer = "linear".'
 )
 EDITS = (
     "Exposure2012", "Contrast2012", "Highlights2012", "Shadows2012", "Whites2012", "Blacks2012",
@@ -36,8 +36,8 @@ EDITS = (
 
 @dataclass(frozen=True)
 class Declared:
-    """transfer: the curve; matrix: (3, 3) linear file RGB → linear Rec.709, None for none;
-    reason: one sentence; notes: what the user should know."""
+    """The encoding of a file. transfer: the curve; matrix: (3, 3) linear file RGB → linear Rec.709,
+    None for none; reason: why, one sentence; notes: sentences for the user."""
 
     transfer: Transfer
     matrix: Matrix | None
@@ -46,7 +46,8 @@ class Declared:
 
 
 def declared(image: OpenImage, part: int) -> Declared:
-    """The file's own statement, or the usual assumption where it makes none."""
+    """The encoding that a part of the file declares, or the usual assumption where it declares
+    none."""
     spec = image.file.spec(part)
     found = _by_kind(image, spec)
     return Declared(found.transfer, found.matrix, found.reason, found.notes + _edits(spec))
@@ -58,7 +59,7 @@ def _by_kind(image: OpenImage, spec: oiio.ImageSpec) -> Declared:
     if kind == "openexr":
         return _exr(spec)
     if kind == "hdr":
-        return Declared(LINEAR, None, "Radiance .hdr files hold linear light")
+        return Declared(LINEAR, None, "Radiance .hdr files store linear light")
     notes: tuple[str, ...] = ()
     if kind == "png" and (stated := _cicp(image.container)):
         return stated
@@ -67,38 +68,38 @@ def _by_kind(image: OpenImage, spec: oiio.ImageSpec) -> Declared:
         profile = read_profile(bytes(np.asarray(icc, np.uint8)))
         if profile is not None:
             return _profiled(profile)
-        notes = ("the embedded colour profile has no plain curves (or is damaged); it is not used",)
+        notes = ("embedded colour profile ignored, because it has no simple curves or is damaged.",)
     if floating:
-        reason = "floating-point files without a colour profile hold linear light"
+        reason = "floating-point files without a colour profile store linear light"
         return Declared(LINEAR, None, reason, notes)
     stated = _png(image.container) if kind == "png" else _exif(image)
     if stated is not None:
         return Declared(stated.transfer, stated.matrix, stated.reason, notes + stated.notes)
     if spec.format.basetype == oiio.UINT16:
         notes += (ASSUMED,)
-    return Declared(SRGB, None, "the file does not say; the sRGB curve is assumed", notes)
+    return Declared(SRGB, None, "the file declares no curve; sRGB is assumed", notes)
 
 
 def _exr(spec: oiio.ImageSpec) -> Declared:
-    reason = "EXR files hold linear light"
-    numbers = _attribute(spec, "chromaticities")
-    if numbers is None or len(numbers) != 8:
+    reason = "EXR files store linear light"
+    chromaticities = _attribute(spec, "chromaticities")
+    if chromaticities is None or len(chromaticities) != 8:
         return Declared(LINEAR, None, reason)
     try:
-        matrix = from_chromaticities(tuple(float(n) for n in numbers))
+        matrix = from_chromaticities(tuple(float(n) for n in chromaticities))
     except ValueError:
-        return Declared(LINEAR, None, reason, ("its chromaticities are impossible; not used",))
-    more = "" if matrix is None else ", here of other primaries, converted to Rec.709"
+        return Declared(LINEAR, None, reason, ("chromaticities ignored, they are impossible.",))
+    more = "" if matrix is None else "; its primaries are converted to Rec.709"
     return Declared(LINEAR, matrix, reason + more)
 
 
 def _profiled(profile: Profile) -> Declared:
     transfer = Transfer("icc", profile.curves)
-    for known in (SRGB, LINEAR):  # profiles round: their tables hold 8 to 16 bits
+    for known in (SRGB, LINEAR):  # tables of profiles are rounded to 8 to 16 bits
         if all(same_curve(curve, known.curves[0]) for curve in profile.curves):
             transfer = known
     primaries = "" if profile.matrix is None else "; its primaries are converted to Rec.709"
-    reason = f"the embedded colour profile {profile.name or '(unnamed)'} says so{primaries}"
+    reason = f"from the embedded colour profile {profile.name or '(unnamed)'}{primaries}"
     return Declared(transfer, profile.matrix, reason)
 
 
@@ -108,24 +109,24 @@ def _cicp(container: Container) -> Declared | None:
         return None
     primaries = CICP_PRIMARIES[code[0]]
     matrix = None if primaries is None else from_chromaticities(primaries)
-    return Declared(Transfer.named(CICP_CURVES[code[1]]), matrix, "the PNG's cICP chunk says so")
+    return Declared(Transfer.named(CICP_CURVES[code[1]]), matrix, "from the PNG's cICP chunk")
 
 
 def _png(container: Container) -> Declared | None:
     if "sRGB" in container.chunks:
-        return Declared(SRGB, None, "the PNG's sRGB chunk says so")
+        return Declared(SRGB, None, "from the PNG's sRGB chunk")
     gamma = container.chunks.get("gAMA", b"")
     if len(gamma) != 4:
         return None
     number = int.from_bytes(gamma, "big")
     if number == 45455:
-        return Declared(SRGB, None, "the PNG's gAMA chunk says 1/2.2, which stands for sRGB")
+        return Declared(SRGB, None, "the PNG's gAMA chunk is 1/2.2, which stands for sRGB")
     if number == 100000:
-        return Declared(LINEAR, None, "the PNG's gAMA chunk says linear")
+        return Declared(LINEAR, None, "from the PNG's gAMA chunk")
     if not 10000 <= number <= 1000000:
         return None
     name = f"gamma:{100000 / number:.6g}"
-    return Declared(Transfer.named(name), None, "the PNG's gAMA chunk says so")
+    return Declared(Transfer.named(name), None, "from the PNG's gAMA chunk")
 
 
 def _exif(image: OpenImage) -> Declared | None:
@@ -134,12 +135,12 @@ def _exif(image: OpenImage) -> Declared | None:
     space = value[0] if isinstance(value, tuple) else None
     if space == 2 or (space == 0xFFFF and tags.interoperability.get(1) == "R03"):
         matrix = from_chromaticities(ADOBE_RGB)
-        return Declared(ADOBE, matrix, "its Exif says Adobe RGB; converted to Rec.709 primaries")
+        return Declared(ADOBE, matrix, "its EXIF states Adobe RGB; converted to Rec.709 primaries")
     if space == 1:
-        return Declared(SRGB, None, "its Exif says sRGB")
+        return Declared(SRGB, None, "its EXIF states sRGB")
     if space == 0xFFFF:
-        note = "its Exif says 'uncalibrated' and it embeds no profile; sRGB is assumed"
-        return Declared(SRGB, None, "the file does not say; the sRGB curve is assumed", (note,))
+        note = "its EXIF states 'uncalibrated' and it has no colour profile; sRGB is assumed."
+        return Declared(SRGB, None, "the file declares no curve; sRGB is assumed", (note,))
     return None
 
 
@@ -151,7 +152,7 @@ def _attribute(spec: oiio.ImageSpec, name: str) -> Any:
 
 
 def _edits(spec: oiio.ImageSpec) -> tuple[str, ...]:
-    """What Camera Raw or Lightroom did to the tones, from the XMP block they leave."""
+    """Tone edits by Camera Raw or Lightroom, from the XMP block that they write."""
     if str(_attribute(spec, "crs:AlreadyApplied")).lower() not in ("true", "1"):
         return ()
     done = []
@@ -162,5 +163,7 @@ def _edits(spec: oiio.ImageSpec) -> tuple[str, ...]:
                 done.append(f"{name.removesuffix('2012')} {float(value):+g}")
         except (TypeError, ValueError):
             continue
-    what = f"changed its tones ({', '.join(done)})" if done else "made it, with its own base curve"
-    return (f"raw processing {what}: calibrate with a colour chart, or develop linear",)
+    what = f"tones changed ({', '.join(done)})" if done else "a base curve was applied"
+    return (
+        f"developed from RAW: {what}. Calibrate with a colour chart, or develop the RAW linearly.",
+    )

@@ -1,4 +1,4 @@
-"""From linear light back to the numbers of a photo's file."""
+"""Convert linear light back to the encoded pixel values of a photo's file."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from .declared import LINEAR, declared
 from .image import open_image
 from .transfer import Transfer
 
-KNOTS = (1 << 14) + 1  # of the inverse curve: a quarter of a code of 16 bits
+KNOTS = (1 << 14) + 1  # sample points of the inverse curve: an error of a quarter 16-bit code
 
 
 @dataclass(frozen=True)
 class Encoding:
-    """The encoding of one photo. transfer: from its values to linear light; bounded: whether its
-    values end at 0 and 1 (integer formats), as those of floating-point files do not."""
+    """The encoding of one photo. transfer: from encoded values to linear light; bounded: True for
+    integer formats, whose values are limited to 0..1."""
 
     transfer: Transfer
     bounded: bool
 
     @classmethod
     def of_file(cls, file: Path, curve: Transfer) -> Encoding:
-        """Of a photo that is read with ``curve``; "auto" is what the file itself states. Reads the
-        header only. Raises InputError."""
+        """The encoding of a photo that is read with ``curve``; "auto" is the curve that the file
+        declares. Reads only the header. Raises InputError."""
         if file.suffix.lower() in RAW:
             return cls(curve if curve.curves else LINEAR, False)
         with open_image(file) as image:
@@ -40,7 +40,7 @@ class Encoding:
     def encode(self, linear: NDArray[np.floating]) -> NDArray[np.float32]:
         """(…, 3) encoded values of linear light (…, 3), Rec.709 primaries; NaN stays NaN.
 
-        Values of bounded encodings and of curves other than the straight line are clipped to 0..1.
+        Values are clipped to 0..1 for bounded encodings and for all curves except linear.
         """
         out = np.empty(linear.shape, np.float32)
         if self.transfer.is_linear:

@@ -1,4 +1,4 @@
-"""What the camera wrote about a photo: exposure, lens, time and place."""
+"""Read a photo's EXIF: exposure, lens, time and place."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ Tags = dict[int, Value]
 
 @dataclass(frozen=True)
 class Exif:
-    """Exif 2.32 / 3.0 fields of one photo; each None where the file does not say.
+    """Exif 2.32 / 3.0 fields of one photo; None where the file does not have a field.
 
-    exposure_time s; f_number; iso; focal_length and focal_length_35mm mm; datetime_original the
-    camera's own clock WITHOUT zone (DateTimeOriginal, never ModifyDate), offset_original its
-    distance from UTC; latitude, longitude degrees (north and east positive), altitude m above sea
-    level; gps_utc the receiver's UTC time; orientation 1..8: how a viewer would turn the picture,
-    which Patina never does.
+    exposure_time: s; f_number; iso; focal_length, focal_length_35mm: mm; datetime_original: the
+    camera's clock WITHOUT time zone (DateTimeOriginal, never ModifyDate); offset_original: its
+    offset from UTC; latitude, longitude: degrees (north and east positive); altitude: m above sea
+    level; gps_utc: UTC time of the GPS receiver; orientation: 1..8, how a viewer would rotate the
+    picture. Patina never applies it.
     """
 
     exposure_time: float | None = None
@@ -48,9 +48,9 @@ class Exif:
     def relative_exposure(self) -> float | None:
         """t · ISO / (100 · N²): radiance = pixel / relative_exposure, up to one factor per camera.
 
-        Proportional to the light that one unit of radiance lays on the sensor, times its gain
-        (the exposure equation, ISO 2720). None unless time, f-number and ISO are all known.
-        Cameras round: 1/60 s is really 1/64, f/5.6 is 5.66, f/13 is 12.7.
+        Proportional to the sensor's exposure per unit of radiance, times its gain (the exposure
+        equation, ISO 2720). None unless time, f-number and ISO are all known. Cameras write
+        rounded values: 1/60 s is really 1/64, f/5.6 is 5.66, f/13 is 12.7.
         """
         if self.missing:
             return None
@@ -59,7 +59,7 @@ class Exif:
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """What relative_exposure would need and the file does not say."""
+        """Names of the fields that relative_exposure needs and the file does not have."""
         needed = {
             "exposure time": self.exposure_time,
             "f-number": self.f_number,
@@ -69,7 +69,7 @@ class Exif:
 
     @property
     def utc(self) -> datetime | None:
-        """When the photo was taken, with zone UTC: the camera's clock with its offset, else GPS."""
+        """Time of the photo in UTC: the camera's clock with its offset, otherwise GPS."""
         if self.datetime_original and self.offset_original is not None:
             zone = timezone(self.offset_original)
             return self.datetime_original.replace(tzinfo=zone).astimezone(UTC)
@@ -78,13 +78,16 @@ class Exif:
 
 @once_per_file
 def read_exif(path: Path) -> Exif:
-    """Exif of a JPEG, TIFF, PNG, EXR or camera RAW file; all None where it has none.
+    """EXIF of a JPEG, TIFF, PNG, EXR or camera RAW file; all fields None where it has none.
 
-    Read once of a file that stays the same.
-    Raises InputError only where there is no such file: a damaged field is a missing one.
+    The result is cached until the file changes. A damaged field counts as missing. Raises
+    InputError only where the file does not exist or cannot be read.
     """
     if not path.is_file():
-        raise InputError("is not a file" if path.exists() else "no such file", file=path)
+        raise InputError(
+            "is not a file; expected an image" if path.exists() else "no such file; check the path",
+            file=path,
+        )
     try:
         if path.suffix.lower() == ".exr":
             return _from_exr(attributes(path))
@@ -112,9 +115,9 @@ def read_exif(path: Path) -> Exif:
 
 
 def _from_exr(found: dict[str, object]) -> Exif:
-    """The standard attributes of OpenEXR, and Exif names that converters pass on.
+    """EXIF from the standard attributes of OpenEXR and from EXIF names that converters copy.
 
-    capDate is not taken: many programs write the time of writing there.
+    capDate is not used, because many programs store the time of writing there.
     """
 
     def number(*names: str) -> float | None:
@@ -166,20 +169,20 @@ def _numbers(tags: Tags, tag: int) -> list[float | None]:
 
 
 def _positive(tags: Tags, tag: int) -> float | None:
-    numbers = _numbers(tags, tag)
-    return numbers[0] if numbers and numbers[0] and numbers[0] > 0 else None
+    values = _numbers(tags, tag)
+    return values[0] if values and values[0] and values[0] > 0 else None
 
 
 def _apex(tags: Tags, tag: int, power: float) -> float | None:
     """2^(power · value): time from ShutterSpeedValue (−1), f-number from ApertureValue (1/2)."""
-    numbers = _numbers(tags, tag)
-    if not numbers or numbers[0] is None or abs(numbers[0]) > 60:
+    values = _numbers(tags, tag)
+    if not values or values[0] is None or abs(values[0]) > 60:
         return None
-    return 2.0 ** (power * numbers[0])
+    return 2.0 ** (power * values[0])
 
 
 def _iso(tags: Tags) -> float | None:
-    """PhotographicSensitivity; it stops at 65535, and the 32-bit fields say the rest."""
+    """PhotographicSensitivity; it is limited to 65535, larger values are in the 32-bit fields."""
     iso = _positive(tags, 0x8827)
     if iso is None or iso >= 65535:
         for tag in (0x8833, 0x8832, 0x8831):  # ISOSpeed, RecommendedExposureIndex, SOS
@@ -197,7 +200,7 @@ def _text(tags: Tags, tag: int) -> str | None:
 
 
 def _time(text: str | None, subseconds: str | None = None) -> datetime | None:
-    """Exif's 'YYYY:MM:DD HH:MM:SS'; blanks, zeros and impossible dates are None."""
+    """EXIF's 'YYYY:MM:DD HH:MM:SS'; None for blanks, zeros and impossible dates."""
     if text is None:
         return None
     try:
@@ -224,14 +227,14 @@ def parse_offset(text: str | None) -> timedelta | None:
     return timedelta(hours=hours, minutes=minutes) * (-1 if text[0] == "-" else 1)
 
 
-def _degrees(gps: Tags, tag: int, reference: int, letters: str, most: float) -> float | None:
-    """Degrees, minutes, seconds and a letter → signed degrees."""
+def _degrees(gps: Tags, tag: int, reference: int, letters: str, limit: float) -> float | None:
+    """Signed degrees from degrees, minutes, seconds and a letter; letters: positive, negative."""
     parts, letter = _numbers(gps, tag), (_text(gps, reference) or "").upper()[:1]
     if not parts or parts[0] is None or letter not in letters or not letter:
         return None
-    # cameras that write decimal degrees leave minutes and seconds 0/0
+    # cameras that write decimal degrees write minutes and seconds as 0/0
     degrees = sum((p or 0.0) / scale for p, scale in zip(parts, (1.0, 60.0, 3600.0), strict=False))
-    if not 0.0 <= degrees <= most:
+    if not 0.0 <= degrees <= limit:
         return None
     return -degrees if letter == letters[1] else degrees
 
@@ -262,6 +265,6 @@ def _gps_time(gps: Tags) -> datetime | None:
 
 
 def _orientation(main: Tags) -> int | None:
-    numbers = _numbers(main, 0x0112)
-    turned = numbers[0] if numbers else None
+    values = _numbers(main, 0x0112)
+    turned = values[0] if values else None
     return int(turned) if turned is not None and turned in range(1, 9) else None

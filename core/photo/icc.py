@@ -1,4 +1,4 @@
-"""The curve and the primaries of an embedded ICC profile, where it is of the matrix/TRC kind.
+"""Read the curves and primaries of an embedded ICC profile of the matrix/TRC type.
 
 ICC.1:2022, section 8.3.3 (three-component matrix-based) and 8.4.3 (monochrome); tags curv (10.6)
 and para (10.18).
@@ -12,17 +12,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from .primaries import D50_XYZ, Matrix, to_rec709
-from .transfer import Curve, Parametric, Sampled, rises
+from .transfer import Curve, Parametric, Sampled, is_increasing
 
-HEADER, MOST_TAGS, MOST_POINTS = 128, 200, 1 << 16
+HEADER_BYTES, MAX_TAGS, MAX_POINTS = 128, 200, 1 << 16
 # parameters g a b c d e f that each function type of 'para' has
 PARAMETERS = {0: "g", 1: "gab", 2: "gabc", 3: "gabcd", 4: "gabcdef"}
 
 
 @dataclass(frozen=True)
 class Profile:
-    """curves: encoded → linear for R, G, B; matrix: (3, 3) linear file RGB → linear Rec.709, or
-    None where it is the identity or the profile is grey; name: its description."""
+    """An ICC profile. curves: encoded → linear for R, G, B; matrix: (3, 3) linear file RGB →
+    linear Rec.709, None where it is the identity or the profile is grey; name: its description."""
 
     curves: tuple[Curve, Curve, Curve]
     matrix: Matrix | None
@@ -30,7 +30,7 @@ class Profile:
 
 
 def read_profile(data: bytes) -> Profile | None:
-    """The profile, or None for one without plain curves (look-up tables), or a damaged one."""
+    """The profile, or None where it uses look-up tables or is damaged."""
     try:
         tags = _tags(data)
         name = _description(tags.get(b"desc", b""))
@@ -49,10 +49,10 @@ def read_profile(data: bytes) -> Profile | None:
 def _tags(data: bytes) -> dict[bytes, bytes]:
     if data[36:40] != b"acsp":
         raise ValueError("no ICC profile")
-    (count,) = struct.unpack_from(">I", data, HEADER)
+    (count,) = struct.unpack_from(">I", data, HEADER_BYTES)
     found = {}
-    for place in range(min(count, MOST_TAGS)):
-        key, start, size = struct.unpack_from(">4sII", data, HEADER + 4 + 12 * place)
+    for place in range(min(count, MAX_TAGS)):
+        key, start, size = struct.unpack_from(">4sII", data, HEADER_BYTES + 4 + 12 * place)
         found[key] = data[start : start + size]
     return found
 
@@ -69,20 +69,20 @@ def _curve(tag: bytes) -> Curve:
         return Parametric(c=1.0)
     if count == 1:
         return _checked(Parametric(struct.unpack_from(">H", tag, 12)[0] / 256))
-    if count > MOST_POINTS:
-        raise ValueError("absurd count")
+    if count > MAX_POINTS:
+        raise ValueError("too many points")
     points = np.frombuffer(tag, ">u2", count, 12) / 65535.0
     return _checked(Sampled(tuple(np.linspace(0, 1, count).tolist()), tuple(points.tolist())))
 
 
 def _parametric(tag: bytes, function: int) -> Curve:
-    """Function types 0 … 4, written as type 4."""
+    """Function types 0 … 4, converted to type 4."""
     if function not in PARAMETERS:
         raise ValueError("unknown function type")
     names = PARAMETERS[function]
-    numbers = struct.unpack_from(f">{len(names)}i", tag, 12)
+    values = struct.unpack_from(f">{len(names)}i", tag, 12)
     p = dict.fromkeys("gabcdef", 0.0) | {"a": 1.0}
-    p |= {name: number / 65536 for name, number in zip(names, numbers, strict=True)}
+    p |= {name: value / 65536 for name, value in zip(names, values, strict=True)}
     if function in (1, 2):  # zero (or the constant c) below −b/a
         if p["a"] == 0:
             raise ValueError("no curve")
@@ -94,7 +94,7 @@ def _parametric(tag: bytes, function: int) -> Curve:
 
 
 def _checked(curve: Curve) -> Curve:
-    if not rises(curve):
+    if not is_increasing(curve):
         raise ValueError("the curve does not rise")
     return curve
 

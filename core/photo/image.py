@@ -1,7 +1,7 @@
 """Read and write images with OpenImageIO.
 
-Not with the OpenEXR wheel: inside Blender its symbols are replaced by Blender's own OpenEXR
-library, and writing crashes.
+The OpenEXR wheel is not used: inside Blender its symbols are replaced by those of Blender's own
+OpenEXR library, and writing crashes.
 """
 
 from __future__ import annotations
@@ -22,28 +22,31 @@ from . import raw
 from .container import RAW, Container, check_container, check_header, check_size
 from .per_file import once_per_file
 
-FIXED_DATE = "2000:01:01 00:00:00"  # else the clock is written: same pixels, other bytes
+# fixed, so that the same pixels give the same bytes (by default the present time is written)
+FIXED_DATE = "2000:01:01 00:00:00"
 ROWS = 256  # read at a time: whole chunks of every EXR compression
-MOST_CHANNELS = 256
+MAX_CHANNELS = 256
 
-# its other EXR reader prints what it finds wrong with a file on standard error
+# OpenImageIO's other EXR reader prints errors of a file on standard error
 oiio.attribute("openexr:core", 1)
 
 
 @dataclass(frozen=True)
 class OpenImage:
-    """An image whose header has been read and found sane."""
+    """An open image whose header has been read and checked."""
 
     path: Path
     container: Container
     file: oiio.ImageInput
 
     def colour(self) -> tuple[int, list[int]]:
-        """(part, channels) that hold R, G, B, or a grey image three times. Raises InputError."""
+        """(part, channel indices of R, G, B); a grey channel is repeated. Raises InputError."""
         try:
             return self._colour()
         except UnicodeDecodeError as error:
-            raise InputError("names its channels in no known encoding", file=self.path) from error
+            raise InputError(
+                "has channel names that are not text; the file is damaged", file=self.path
+            ) from error
 
     def _colour(self) -> tuple[int, list[int]]:
         listed: list[str] = []
@@ -57,7 +60,7 @@ class OpenImage:
             listed += spec.channelnames
             part += 1
         raise InputError(
-            f"has no channels R, G and B (nor a grey Y); it has {', '.join(listed[:20])}",
+            f"has the channels {', '.join(listed[:20])}; expected R, G and B, or a grey Y",
             file=self.path,
         )
 
@@ -69,8 +72,11 @@ class OpenImage:
         spec = self.file.spec(part)
         check_size(self.path, spec.width, spec.height)
         tile = spec.tile_height if spec.tile_width else 1
-        if spec.nchannels > MOST_CHANNELS or spec.tile_width * spec.tile_height > 1 << 26:
-            raise InputError("has absurd tiles or too many channels", file=self.path)
+        if spec.nchannels > MAX_CHANNELS or spec.tile_width * spec.tile_height > 1 << 26:
+            raise InputError(
+                "has too many channels or too large tiles; expected an RGB or grey photo",
+                file=self.path,
+            )
         first, last = min(channels), max(channels) + 1
         wanted = [0] if last - first == 1 else [c - first for c in channels]
         step = -(-ROWS // tile) * tile
@@ -84,40 +90,44 @@ class OpenImage:
             else:
                 block = self.file.read_scanlines(part, 0, y0, y1, 0, *span)
             if block is None:
-                raise InputError(f"not a whole image ({_reason(self.file)})", file=self.path)
+                raise InputError(f"is truncated or damaged ({_reason(self.file)})", file=self.path)
             block = block.reshape(end - top, spec.width, last - first)
             yield top, block if wanted == list(range(last - first)) else block[:, :, wanted]
 
 
 @contextmanager
 def open_image(path: Path, pixels: bool = True) -> Iterator[OpenImage]:
-    """Open an image that OpenImageIO reads. pixels: False where only its header is wanted; then
-    the rest of the file is not checked. Raises InputError."""
+    """Open an image with OpenImageIO. pixels: False to read only the header; the rest of the file
+    is then not checked. Raises InputError."""
     container = check_container(path) if pixels else check_header(path)
     hints = oiio.ImageSpec()
-    hints.attribute("oiio:UnassociatedAlpha", 1)  # else colours come multiplied by their alpha
+    hints.attribute("oiio:UnassociatedAlpha", 1)  # by default colours are multiplied by alpha
     file = oiio.ImageInput.open(str(path), hints)
     if file is None:
-        raise InputError(f"not a readable image ({_reason(oiio)})", file=path)
+        raise InputError(f"is not a readable image ({_reason(oiio)})", file=path)
     try:
         spec = file.spec()
         whole = (spec.x, spec.y, spec.width, spec.height)
         if whole != (spec.full_x, spec.full_y, spec.full_width, spec.full_height):
-            raise InputError("holds a cropped image (data and display window differ)", file=path)
+            raise InputError(
+                "is a cropped image (its data window differs from its display window); expected a "
+                "full image: export it without cropping",
+                file=path,
+            )
         check_size(path, spec.width, spec.height)
         if spec.depth > 1 or spec.deep:
-            raise InputError("holds a volume or deep pixels; expected a flat image", file=path)
+            raise InputError("contains a volume or deep pixels; expected a flat image", file=path)
         yield OpenImage(path, container, file)
     finally:
-        _reason(file)  # what is left unread would be printed at the program's end
+        _reason(file)  # clears errors, which would otherwise be printed when the program ends
         file.close()
 
 
 def read_encoded(path: Path) -> NDArray[np.float32]:
     """(h, w, 3) pixels as the file encodes them (0..1 for integer formats). Raises InputError.
 
-    The channels R, G, B are read by their names, in whichever part of the file holds them; a grey
-    image (Y) is repeated into three channels; others (alpha, depth …) are left out.
+    The channels R, G, B are read by name, from the part of the file that has them. A grey image
+    (Y) is repeated into three channels. Other channels (alpha, depth …) are ignored.
     """
     with open_image(path) as image:
         part, channels = image.colour()
@@ -136,12 +146,14 @@ def read_mask(path: Path) -> NDArray[np.bool_]:
     """(h, w) where the mask is white (above one half) and not transparent. Raises InputError."""
     with open_image(path) as image:
         spec = image.file.spec()
-        if spec.nchannels > MOST_CHANNELS:
-            raise InputError("has too many channels for a mask", file=path)
+        if spec.nchannels > MAX_CHANNELS:
+            raise InputError(
+                f"has too many channels for a mask; expected at most {MAX_CHANNELS}", file=path
+            )
         alpha = spec.alpha_channel
         pixels = image.file.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
         if pixels is None:
-            raise InputError(f"not a whole image ({_reason(image.file)})", file=path)
+            raise InputError(f"is truncated or damaged ({_reason(image.file)})", file=path)
         pixels = np.atleast_3d(np.asarray(pixels, np.float32))
     colours = [c for c in range(pixels.shape[2]) if c != alpha][:3]
     white = pixels[:, :, colours].max(axis=2) if colours else np.ones(pixels.shape[:2])
@@ -150,10 +162,11 @@ def read_mask(path: Path) -> NDArray[np.bool_]:
 
 @once_per_file
 def image_size(path: Path) -> tuple[int, int]:
-    """(width, height) of an image, camera RAW included, as stored. Raises InputError.
+    """(width, height) of an image as stored, including camera RAW. Raises InputError.
 
-    Reads the header only, and that once of a file that stays the same: a file that ends in its
-    pixels has a size, it is refused where they are read."""
+    Reads only the header, and caches the result until the file changes. A file with truncated
+    pixels still has a size; the error is raised where its pixels are read.
+    """
     if path.suffix.lower() in RAW:
         return raw.raw_size(path)
     with open_image(path, pixels=False) as image:
@@ -162,7 +175,7 @@ def image_size(path: Path) -> tuple[int, int]:
 
 
 def attributes(path: Path) -> dict[str, object]:
-    """{name: value} of an image's header. Raises InputError."""
+    """{name: value} of the attributes in an image's header. Raises InputError."""
     with open_image(path, pixels=False) as image:
         found: dict[str, object] = {}
         for entry in image.file.spec().extra_attribs:
@@ -178,20 +191,20 @@ def write_exr(
     channels: Sequence[str] = (),
     description: str = "",
 ) -> None:
-    """Write (h, w, c), row 0 on top: linear RGB, or the named channels; the file appears whole or
-    not at all. Raises PatinaError."""
+    """Write (h, w, c) pixels, row 0 on top: linear RGB or the named channels. The file is written
+    atomically. half: 16-bit instead of 32-bit floats. Raises PatinaError."""
     kind = "half" if half else "float"
     with atomic_path(path, ".part.exr") as partial:
         _write(partial, np.asarray(pixels, np.float32), kind, channels, description)
 
 
 def write_png(path: Path, pixels: NDArray[np.uint8]) -> None:
-    """Write (h, w), (h, w, 3) or (h, w, 4) 8-bit display pixels."""
+    """Write (h, w), (h, w, 3) or (h, w, 4) 8-bit display-encoded pixels. Raises PatinaError."""
     _write(path, pixels, "uint8")
 
 
 def _reason(source: Any) -> str:
-    """Why OpenImageIO or one of its files failed, in one line."""
+    """The error message of OpenImageIO or one of its files, in one line; clears it."""
     try:
         found = " ".join(str(source.geterror()).split())
     except UnicodeDecodeError:  # the message quotes the damaged bytes
@@ -206,9 +219,9 @@ def _write(
     channels: Sequence[str] = (),
     description: str = "",
 ) -> None:
-    if path.is_symlink():  # may lie beside a downloaded .blend, and lead anywhere
+    if path.is_symlink():  # a downloaded folder may contain one that points anywhere
         raise PatinaError(
-            f"{path}: is a symbolic link, and images are not written through links; remove it"
+            f"{path}: is a symbolic link; images are not written through links: remove it"
         )
     data = np.ascontiguousarray(np.atleast_3d(pixels))
     height, width, count = data.shape

@@ -1,4 +1,4 @@
-"""Is a JPEG whole? Its decoder fills what is missing with grey and says nothing."""
+"""Check that a JPEG is complete; the decoder fills missing parts with grey without an error."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ SOI, EOI, SOS, APP1 = 0xD8, 0xD9, 0xDA, 0xE1
 FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # SOF0..SOF15 without DHT, JPG, DAC
 MARKER = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")  # in a scan: not stuffing, restart or fill
 MAX_BYTES = 1 << 30
-MAX_HEADER = 1 << 22  # profiles and previews of cameras stay below
+MAX_HEADER = 1 << 22  # bytes; profiles and previews of cameras are smaller
 EXIF = b"Exif\0\0"
 
 
 def check_jpeg(path: Path) -> None:
-    """Walk the markers (ITU-T T.81, annex B). Raise InputError for a file that is no JPEG, is
-    truncated, or is CMYK."""
+    """Follow the markers (ITU-T T.81, annex B). Raises InputError for a file that is not a JPEG,
+    is truncated, or is CMYK."""
     if path.stat().st_size > MAX_BYTES:
-        raise InputError("is larger than a JPEG can sensibly be (1 GiB)", file=path)
+        raise InputError("is too large for a JPEG; expected at most 1 GiB", file=path)
     data = path.read_bytes()
     components, scans = 0, 0
     for marker, body in segments(data):
@@ -36,27 +36,27 @@ def check_jpeg(path: Path) -> None:
 
 
 def check_jpeg_header(path: Path) -> None:
-    """The same for the segments before the first scan; not more than MAX_HEADER bytes are read.
+    """The same check for the segments before the first scan; reads at most MAX_HEADER bytes.
     Raises InputError."""
     with path.open("rb") as file:
         for marker, body in header_segments(file):
             if marker in FRAMES and len(body) >= 6:
                 _check_components(path, body[5])
                 return
-    raise InputError("is truncated or damaged (the head of the JPEG is incomplete)", file=path)
+    raise InputError("is truncated or damaged (the JPEG's header is incomplete)", file=path)
 
 
 def _check_components(path: Path, components: int) -> None:
     if components == 4:
         raise InputError(
-            "is a CMYK JPEG, made for printing; expected RGB or grey; export it again as RGB",
+            "is a CMYK JPEG for printing; expected RGB or grey: export it again as RGB",
             file=path,
         )
 
 
 def header_segments(file: BinaryIO, start: int = 0) -> Iterator[tuple[int, bytes]]:
     """(marker, body) of the segments before the first scan of the JPEG that begins at byte
-    ``start``; one segment is read at a time, MAX_HEADER bytes in all."""
+    ``start``. Reads one segment at a time, at most MAX_HEADER bytes in total."""
     file.seek(start + 2)
     left = MAX_HEADER
     while left > 0 and file.read(1) == b"\xff":
@@ -78,7 +78,7 @@ def header_segments(file: BinaryIO, start: int = 0) -> Iterator[tuple[int, bytes
 
 
 def segments(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """(marker, body) of each segment, until the end of the image or of what can be followed."""
+    """(marker, body) of each segment, until the end of the image or the first damaged segment."""
     place = 2
     while place + 2 <= len(data):
         if data[place] != 0xFF:

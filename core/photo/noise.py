@@ -1,15 +1,15 @@
-"""The noise of a photo, estimated from the photo itself.
+"""Estimate the noise model of a photo from the photo itself.
 
 Model (EMVA 1288; Foi et al. 2008, "Practical Poissonian-Gaussian noise modeling and fitting for
 single-image raw-data"): var = read² + shot · L. Small blocks are high-pass filtered with the mask
-of Immerkær 1996 ("Fast noise variance estimation"), which plane shading passes through; what
-texture is left makes blocks look noisier, never less noisy, so the line is fitted to the quiet
-edge of the blocks: those that agree with chi-squared noise about it.
+of Immerkær 1996 ("Fast noise variance estimation"), which is zero for linear shading. Texture can
+only increase the residual of a block, so the line is fitted to the lower edge of the blocks: those
+whose residuals agree with chi-squared noise about it.
 
-Demosaicing, sharpening and lossy compression tie the noise of neighbours together, and a filter of
-neighbours then sees too little of it. The mask is therefore also taken with steps of 2 and 4
-pixels: the smallest step is used from which the estimate stops growing. Where texture grows with
-the step too, the estimate errs upwards.
+Demosaicing, sharpening and lossy compression correlate the noise of neighbouring pixels, and a
+filter of direct neighbours then underestimates it. The mask is therefore also applied with steps
+of 2 and 4 pixels, and the smallest step is used from which the estimate stops growing. Where
+texture grows with the step too, the estimate is too high.
 """
 
 from __future__ import annotations
@@ -24,22 +24,23 @@ from scipy.stats import chi2
 
 from .photo import Photo
 
-BLOCKS = (16, 8)  # pixels; the smaller where too few of the larger hold no black or clipped pixel
-STEPS = (1, 2, 4)
-CORRELATED = 4.2  # residuals per degree of freedom: sum of the mask's squared autocorrelation
-QUIET = 0.2  # quantile of a brightness bin that starts the fit
-KEEP = 0.95  # of chi-squared
-GROWS = 1.3  # variance at twice the step that counts as correlation
-ENOUGH, SURE, FEWEST, MOST_BLOCKS = 300, 100, 30, 20_000
-BINS, LEAST, AGREE = 24, (6, 12), 0.3  # brightness bins; blocks in each; how well bins agree (log)
+BLOCK_SIZES = (16, 8)  # pixels; the smaller where too few larger blocks are without clipped pixels
+STEPS = (1, 2, 4)  # pixels between the samples of the mask
+PIXELS_PER_DOF = 4.2  # residuals per degree of freedom: sum of the mask's squared autocorrelation
+START_QUANTILE = 0.2  # of the blocks of a brightness bin; the fit starts from it
+KEEP_QUANTILE = 0.95  # of the chi-squared distribution; blocks above it are rejected
+CORRELATED_GROWTH = 1.3  # ratio of variances at successive steps that counts as correlation
+# block counts: for the larger block size; to trust a larger step; for a fit; used at most
+LARGE_BLOCKS, STEP_BLOCKS, MIN_BLOCKS, MAX_BLOCKS = 300, 100, 30, 20_000
+BINS, MIN_BIN_BLOCKS, BIN_TOLERANCE = 24, (6, 12), 0.3  # brightness bins; blocks per bin; in ln
 
 
 @dataclass(frozen=True)
 class Noise:
-    """var(L) = read² + shot · L, per channel, in the photo's linear units (not divided by its
-    exposure). shot (3,), read (3,); step: distance in pixels from which noise is independent;
-    blocks: how many quiet blocks support it (0: nothing could be estimated, the numbers are those
-    of the encoding's own steps)."""
+    """Noise model var(L) = read² + shot · L per channel, in the photo's linear units (not divided
+    by the exposure). shot: (3,); read: (3,); step: distance in pixels from which noise is
+    independent; blocks: number of blocks that the fit used (0: no estimate was possible, the values
+    are those of quantisation alone)."""
 
     shot: NDArray[np.float64]
     read: NDArray[np.float64]
@@ -54,6 +55,8 @@ class Noise:
 
 @dataclass(frozen=True)
 class _Line:
+    """Variance of one channel, read2 + shot · light, and the number of blocks of the fit."""
+
     shot: float
     read2: float
     blocks: int
@@ -63,14 +66,17 @@ class _Line:
 
 
 def estimate_noise(photo: Photo) -> Noise:
-    """Noise of one photo, from its own quiet blocks. Clipped and black pixels are left out.
+    """The noise model of one photo, from its blocks with the least texture.
 
-    Never below what the encoding's steps alone make (step²/12).
+    Clipped and black pixels are excluded. The variance is never below that of quantisation
+    (step²/12).
     """
-    floor = _floor(photo)
-    size = next((b for b in BLOCKS if len(_blocks(photo, 1, b)[0]) >= ENOUGH), BLOCKS[-1])
+    floor = _quantisation(photo)
+    size = next(
+        (b for b in BLOCK_SIZES if len(_blocks(photo, 1, b)[0]) >= LARGE_BLOCKS), BLOCK_SIZES[-1]
+    )
     found = [_blocks(photo, step, size) for step in STEPS]
-    freedom = size**2 / CORRELATED
+    freedom = size**2 / PIXELS_PER_DOF
     shot, read2 = np.zeros(3), np.zeros(3)
     used, support = 1, np.zeros(3, int)
     for channel in range(3):
@@ -79,7 +85,7 @@ def estimate_noise(photo: Photo) -> Noise:
         read2[channel] = max(line.read2, floor.read2)
         used, support[channel] = max(used, step), line.blocks
     known = support > 0
-    if known.any():  # a channel that could not be measured is like the worst of the others
+    if known.any():  # a channel without an estimate gets the largest of the others
         shot[~known], read2[~known] = shot[known].max(), read2[known].max()
     return Noise(shot, np.sqrt(read2), used, int(support[known].min()) if known.any() else 0)
 
@@ -92,24 +98,27 @@ def _channel(
     best, step = lines[0], STEPS[0]
     for line, after in zip(lines[1:], STEPS[1:], strict=True):
         light = found[0][0][:, channel]
-        if not best.blocks or line.blocks < SURE:
+        if not best.blocks or line.blocks < STEP_BLOCKS:
             break
-        middle = np.median(line.at(light)) / max(np.median(best.at(light)), 1e-30)
-        if middle < GROWS:
+        growth = np.median(line.at(light)) / max(np.median(best.at(light)), 1e-30)
+        if growth < CORRELATED_GROWTH:
             break
         best, step = line, after
     return best, step
 
 
 def _blocks(photo: Photo, step: int, size: int) -> tuple[NDArray, NDArray]:
-    """((n, 3) mean light, (n, 3) variance of the high-pass residual) of the usable blocks."""
+    """((n, 3) mean light, (n, 3) variance of the high-pass residual) of the usable blocks.
+
+    step: of the mask, pixels; size: of the blocks, pixels.
+    """
     height, width = photo.clipped.shape
     reach = size + 2 * step
     columns = (width - 2 * step) // size
     tops = np.arange(0, height - reach + 1, size)
     if columns < 1 or len(tops) < 1:
         return np.zeros((0, 3)), np.zeros((0, 3))
-    every = max(1, columns * len(tops) // MOST_BLOCKS)
+    every = max(1, columns * len(tops) // MAX_BLOCKS)
     light, spread = [], []
     for top in tops[::every]:
         rows = slice(top, top + reach)
@@ -127,75 +136,79 @@ def _blocks(photo: Photo, step: int, size: int) -> tuple[NDArray, NDArray]:
 
 
 def _blocked(strip: NDArray, size: int, how: Callable[..., NDArray]) -> NDArray:
-    """One value of each block of a strip of blocks."""
+    """One value for each block of a strip of blocks, by the reduction ``how``."""
     parts = strip[:size].reshape(size, -1, size, *strip.shape[2:])
     return np.asarray(how(parts, axis=(0, 2)))
 
 
 def _fit(light: NDArray, spread: NDArray, freedom: float) -> _Line:
-    """The line through the quiet blocks: started from low quantiles of brightness bins, then kept
-    blocks and line in turn until they agree."""
+    """The line through the blocks without texture. It starts from low quantiles of brightness bins;
+    then the selection of blocks and the line are updated in turn until convergence."""
     usable = (spread > 0) & (light > 0)
     light, spread = light[usable], spread[usable]
-    if len(light) < FEWEST:
+    if len(light) < MIN_BLOCKS:
         return _Line(0.0, 0.0, 0)
-    limit = chi2.ppf(KEEP, freedom) / freedom
-    kept_mean = chi2.cdf(limit * freedom, freedom + 2) / KEEP  # of chi-squared below its limit
+    limit = chi2.ppf(KEEP_QUANTILE, freedom) / freedom
+    # mean of the chi-squared distribution truncated at the limit
+    kept_mean = chi2.cdf(limit * freedom, freedom + 2) / KEEP_QUANTILE
     line = _start(light, spread, freedom)
     for _ in range(50):
         keep = spread < limit * line.at(light)
-        if keep.sum() < FEWEST:
+        if keep.sum() < MIN_BLOCKS:
             break
         after = _weighted(light[keep], spread[keep] / kept_mean, line.at(light[keep]))
         done = np.allclose(after.at(light), line.at(light), rtol=1e-4)
         line = _Line(after.shot, after.read2, int(keep.sum()))
         if done:
             break
-    return line if line.blocks >= FEWEST else _Line(0.0, 0.0, 0)
+    return line if line.blocks >= MIN_BLOCKS else _Line(0.0, 0.0, 0)
 
 
 def _start(light: NDArray, spread: NDArray, freedom: float) -> _Line:
-    """The line that the quiet blocks of most brightnesses agree on.
+    """The line that the low quantiles of most brightness bins agree on.
 
-    Bins of texture only lie above it; none can lie below. Each brightness has one vote: a large
-    dark background must not outvote the object.
+    Bins with texture everywhere lie above it; none can lie below. Each brightness bin has one vote,
+    so that a large dark background does not outvote the object.
     """
-    # brightnesses that noise makes one of another are one
-    shifted = np.log(light + 10 * np.sqrt(np.quantile(spread, QUIET) / (CORRELATED * freedom)))
+    # the shift merges brightnesses that differ only by noise
+    shifted = np.log(
+        light + 10 * np.sqrt(np.quantile(spread, START_QUANTILE) / (PIXELS_PER_DOF * freedom))
+    )
     low, high = np.quantile(shifted, (0.01, 0.99))
     place = np.digitize(shifted, np.linspace(low, max(high, low + 1e-3), BINS))
-    least = int(np.clip(len(light) // 30, *LEAST))
+    least = int(np.clip(len(light) // 30, *MIN_BIN_BLOCKS))
     bins = [part for k in range(BINS + 1) if len(part := np.flatnonzero(place == k)) >= least]
     if not bins:
         bins = [np.arange(len(light))]
     middle = np.array([light[part].mean() for part in bins])
-    quiet = np.array([np.quantile(spread[part], QUIET) for part in bins])
-    quiet /= chi2.ppf(QUIET, freedom) / freedom
+    quiet = np.array([np.quantile(spread[part], START_QUANTILE) for part in bins])
+    quiet /= chi2.ppf(START_QUANTILE, freedom) / freedom
     first, second = np.triu_indices(len(bins))
     rise = middle[second] - middle[first]
     shot = np.where(rise > 0, (quiet[second] - quiet[first]) / np.where(rise > 0, rise, 1.0), 0.0)
-    shot = np.concatenate([shot, quiet / middle])  # and those of no read noise
+    shot = np.concatenate([shot, quiet / middle])  # and lines without read noise
     read2 = np.concatenate([quiet[first] - shot[: len(first)] * middle[first], 0 * quiet])
     possible = (shot >= 0) & (read2 >= 0)
     shot, read2 = shot[possible], read2[possible]
     ratio = quiet / np.maximum(read2[:, None] + shot[:, None] * middle, 1e-30)
-    votes = (np.abs(np.log(ratio)) < AGREE).sum(axis=1)
-    votes -= (ratio < 1 / (1 + 2 * AGREE)).sum(axis=1)
+    votes = (np.abs(np.log(ratio)) < BIN_TOLERANCE).sum(axis=1)
+    votes -= (ratio < 1 / (1 + 2 * BIN_TOLERANCE)).sum(axis=1)
     line = _Line(*max(zip(votes, -read2 - shot * middle.mean(), shot, read2, strict=True))[2:], 0)
-    agrees = np.abs(np.log(quiet / np.maximum(line.at(middle), 1e-30))) < AGREE
+    agrees = np.abs(np.log(quiet / np.maximum(line.at(middle), 1e-30))) < BIN_TOLERANCE
     return _weighted(middle[agrees], quiet[agrees], quiet[agrees]) if agrees.sum() > 2 else line
 
 
 def _weighted(light: NDArray, spread: NDArray, expected: NDArray) -> _Line:
-    """Least squares of (spread − read² − shot · light) / expected, neither below zero."""
+    """Non-negative least squares of (spread − read² − shot · light) / expected."""
     matrix = np.stack([np.ones_like(light), light], axis=1) / expected[:, None]
     scale = np.abs(matrix).max(axis=0)
     (read2, shot), _ = nnls(matrix / scale, spread / expected)
     return _Line(float(shot / scale[1]), float(read2 / scale[0]), len(light))
 
 
-def _floor(photo: Photo) -> _Line:
-    """Variance of rounding to the encoding's codes: step²/12, as a line through dark and bright."""
+def _quantisation(photo: Photo) -> _Line:
+    """Variance of rounding to the codes of the encoding, step²/12, as a line through a dark and a
+    bright value."""
     levels = photo.info.levels
     if levels is None or not photo.info.transfer.curves:
         return _Line(0.0, 0.0, 0)

@@ -1,4 +1,4 @@
-"""Keep what was read from a file for as long as the file stays the same."""
+"""Cache what was read from a file until the file changes."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from typing import TypeVar
 
 T = TypeVar("T")
 
-MIN_AGE_NS = 3_000_000_000  # FAT rounds times of change to 2 s: a younger file may change unseen
-MAX_FILES = 4096  # whose results are kept: more photos than a capture has
+# FAT rounds modification times to 2 s: a later change of a younger file could go unnoticed
+MIN_AGE_NS = 3_000_000_000
+MAX_FILES = 4096  # cached results; more than a capture has photos
 
 
 def once_per_file(read: Callable[[Path], T]) -> Callable[[Path], T]:
-    """Call ``read(path)`` again only where the file's inode, size or time of change is another.
+    """Call ``read(path)`` again only if the file's inode, size or modification time has changed.
 
-    The result is shared by all callers: it must not be changed. A file that was changed a moment
-    ago is always read, and an error is never kept. Raises what ``read`` raises.
+    All callers share the result and must not modify it. A file that was changed less than
+    MIN_AGE_NS ago is always read, and errors are never cached. Raises what ``read`` raises.
     """
 
     @lru_cache(MAX_FILES)
@@ -29,7 +30,7 @@ def once_per_file(read: Callable[[Path], T]) -> Callable[[Path], T]:
     def reader(path: Path) -> T:
         try:
             found = path.stat()
-        except (OSError, ValueError):  # read says what is wrong with it
+        except (OSError, ValueError):  # read raises the error for the user
             return read(path)
         if time.time_ns() - found.st_mtime_ns < MIN_AGE_NS:
             return read(path)

@@ -1,4 +1,4 @@
-"""A photo as linear light, with what is known about its limits."""
+"""Read a photo as linear light, with masks of clipped and black pixels."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .clipping import black, clipped
-from .container import KIND_OF, RAW, READ
+from .container import KIND_OF, RAW, READABLE_SUFFIXES
 from .declared import ASSUMED, Declared, declared
 from .image import OpenImage, open_image
 from .raw import DEMOSAIC, develop
@@ -23,10 +23,13 @@ ROWS = 256
 
 @dataclass(frozen=True)
 class PhotoInfo:
-    """kind: 'jpeg', 'tiff', 'png', 'openexr', 'hdr' or 'raw'; transfer: the curve used; reason:
-    why, in a sentence; levels: codes of an integer format (256, 65536), None for floats;
-    saturation: linear pixel value at which the file stops, None where unknown; white_balance:
-    multipliers applied to a RAW's R, G, B; notes: sentences for the user."""
+    """How a photo was read.
+
+    kind: 'jpeg', 'tiff', 'png', 'openexr', 'hdr' or 'raw'; transfer: the curve used; reason: why,
+    in a sentence; levels: number of codes of an integer format (256, 65536), None for floats;
+    saturation: largest linear pixel value of the file, None where unknown; white_balance:
+    multipliers applied to a RAW's R, G, B; notes: sentences for the user.
+    """
 
     kind: str
     transfer: Transfer
@@ -39,14 +42,17 @@ class PhotoInfo:
     @property
     def sentence(self) -> str:
         """One line for a report: the curve and why."""
-        return f"{self.kind}, curve {self.transfer.name}: {self.reason}"
+        return f"{self.kind}, curve {self.transfer.name}: {self.reason}."
 
 
 @dataclass(frozen=True)
 class Photo:
-    """radiance (h, w, 3) float32 linear, Rec.709 primaries where the file says its own, not
-    divided by any exposure; clipped (h, w): at or near saturation in some channel; black (h, w):
-    some channel at the bottom. Rows from the top, columns from the left, as the sensor lay."""
+    """A photo as linear light.
+
+    radiance: (h, w, 3) float32 linear, not divided by an exposure; Rec.709 primaries where the file
+    declares its own. clipped: (h, w) at or near saturation in a channel; black: (h, w) at or below
+    0 in a channel. Rows from the top, columns from the left, in the sensor's orientation.
+    """
 
     radiance: NDArray[np.float32]
     clipped: NDArray[np.bool_]
@@ -64,10 +70,10 @@ def read_photo(
 ) -> Photo:
     """Read EXR, TIFF, PNG, JPEG, Radiance .hdr or camera RAW as linear light.
 
-    ``transfer`` replaces the file's curve (not its primaries). ``saturation``: the linear pixel
-    value at which a floating-point photo clips, if it is known. Orientation is never applied.
-    A grey image (Y) is repeated into three channels; alpha, depth and more parts are left out.
-    Raises InputError for another format, a damaged file, or pixels that are not numbers.
+    transfer: replaces the file's curve (not its primaries). saturation: the linear pixel value at
+    which a floating-point photo clips, if known. The EXIF orientation is never applied. A grey
+    image (Y) is repeated into three channels; alpha, depth and other parts are ignored. Raises
+    InputError for another format, a damaged file, or pixels that are NaN or infinite.
     """
     if isinstance(transfer, str):
         transfer = Transfer.named(transfer)
@@ -75,7 +81,9 @@ def read_photo(
     if suffix in RAW:
         return _raw(path, transfer)
     if suffix not in KIND_OF:
-        raise InputError(f"photo format {suffix!r} is not read; expected {READ}", file=path)
+        raise InputError(
+            f"has the unknown suffix {suffix!r}; expected {READABLE_SUFFIXES}", file=path
+        )
     with open_image(path) as image:
         return _decode(image, transfer, saturation)
 
@@ -86,7 +94,7 @@ def _decode(image: OpenImage, transfer: Transfer, saturation: float | None) -> P
     says = declared(image, part)
     if transfer.curves:
         notes = tuple(note for note in says.notes if note != ASSUMED)
-        says = Declared(transfer, says.matrix, "it was asked for", notes)
+        says = Declared(transfer, says.matrix, "set by the user", notes)
     table, top = _table(image, spec, says.transfer)
     shape = spec.height, spec.width
     light = np.empty((*shape, 3), np.float32)
@@ -112,7 +120,8 @@ def _decode(image: OpenImage, transfer: Transfer, saturation: float | None) -> P
             light[rows] = light[rows] @ says.matrix.T.astype(np.float32)
     if broken:
         raise InputError(
-            f"has {broken} pixels that are not numbers (NaN or infinite)", file=image.path
+            f"has {broken} pixels that are NaN or infinite; expected finite numbers",
+            file=image.path,
         )
     info = PhotoInfo(
         image.container.kind,
@@ -134,7 +143,7 @@ def _table(
     top = {oiio.UINT8: 255, oiio.UINT16: 65535}.get(spec.format.basetype)
     if top is None:
         raise InputError(
-            f"holds {spec.format} numbers; expected 8 or 16 bits, or floating point",
+            f"has pixels of type {spec.format}; expected 8 or 16 bits, or floating point",
             file=image.path,
         )
     return transfer.table(top + 1), top
@@ -152,7 +161,7 @@ def _looked_up(block: NDArray, table: NDArray[np.float32]) -> NDArray[np.float32
 def _more_pages(image: OpenImage, part: int) -> tuple[str, ...]:
     if image.container.kind != "tiff" or image.file.spec(part + 1).nchannels <= 0:
         return ()
-    return ("it has several pages; the first is read",)
+    return ("the file has several pages; only the first is read.",)
 
 
 def _raw(path: Path, transfer: Transfer) -> Photo:
@@ -167,17 +176,17 @@ def _raw(path: Path, transfer: Transfer) -> Photo:
         if found.matrix is not None:
             linear = linear @ found.matrix.T.astype(np.float32)
         light[rows] = transfer.decode(linear) if transfer.curves else linear
-    reason = f"camera RAW is linear; white balance of the camera, demosaiced by {DEMOSAIC}"
+    reason = f"camera RAW is linear; the camera's white balance, demosaiced by {DEMOSAIC}"
     info = PhotoInfo(
         "raw",
         transfer if transfer.curves else Transfer.named("linear"),
-        "it was asked for" if transfer.curves else reason,
+        "set by the user" if transfer.curves else reason,
         levels=65536,
         saturation=1.0,
         white_balance=found.white_balance,
         notes=(
             *found.notes,
-            f"the sensor saturates at {found.saturation:g} above black, which is 1.0 here",
+            f"the sensor saturates at {found.saturation:g} above black; this is scaled to 1.0.",
         ),
     )
     return Photo(light, found.clipped, dark, info)

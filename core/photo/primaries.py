@@ -1,4 +1,4 @@
-"""Linear RGB of one set of primaries → linear RGB of Rec.709 (sRGB), white D65."""
+"""Convert linear RGB of other primaries to linear Rec.709 (the primaries of sRGB), white D65."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ D50_XYZ = np.array([0.9642, 1.0, 0.8249])  # the ICC profile connection space
 BRADFORD = np.array(
     [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
 )
-SAME = 4e-3  # profiles of sRGB differ from each other by as much
+IDENTITY_TOLERANCE = 4e-3  # per element of the matrix: sRGB profiles differ by as much
 
 
 def xyz_from_rgb(chromaticities: tuple[float, ...]) -> Matrix:
-    """(3, 3) XYZ of linear RGB whose red, green, blue and white have these 8 numbers x, y.
+    """(3, 3) matrix from linear RGB to XYZ.
 
-    White (1, 1, 1) has Y = 1. Raises ValueError where no such matrix exists.
+    chromaticities: 8 numbers, x and y of red, green, blue and white. White (1, 1, 1) has Y = 1.
+    Raises ValueError where no such matrix exists.
     """
     xy = np.asarray(chromaticities, float).reshape(4, 2)
     if not np.isfinite(xy).all() or (np.abs(xy) > 10).any() or (np.abs(xy[:, 1]) < 1e-6).any():
@@ -34,26 +35,28 @@ def xyz_from_rgb(chromaticities: tuple[float, ...]) -> Matrix:
 
 
 def adapt(source_white: Matrix, target_white: Matrix) -> Matrix:
-    """(3, 3) XYZ under one white → XYZ under another, by the linear Bradford transform."""
+    """(3, 3) matrix from XYZ under one white to XYZ under another: linear Bradford transform."""
     gain = (BRADFORD @ target_white) / (BRADFORD @ source_white)
     return np.asarray(np.linalg.inv(BRADFORD) @ np.diag(gain) @ BRADFORD)
 
 
 def to_rec709(xyz_of_rgb: Matrix, white: Matrix) -> Matrix | None:
-    """(3, 3) linear Rec.709 of linear RGB with matrix ``xyz_of_rgb`` under ``white`` (XYZ).
+    """(3, 3) matrix to linear Rec.709 from linear RGB with the matrix ``xyz_of_rgb`` to XYZ and the
+    white point ``white`` (XYZ).
 
-    None where that is the identity but for rounding. Raises ValueError for a singular matrix.
+    None where it is the identity up to IDENTITY_TOLERANCE. Raises ValueError for a singular matrix.
     """
     if not np.isfinite(xyz_of_rgb).all() or abs(np.linalg.det(xyz_of_rgb)) < 1e-6:
         raise ValueError("singular matrix of primaries")
     rec709 = xyz_from_rgb(REC709)
     matrix = np.linalg.inv(rec709) @ adapt(white, rec709.sum(axis=1)) @ xyz_of_rgb
-    if np.abs(matrix - np.eye(3)).max() < SAME:
+    if np.abs(matrix - np.eye(3)).max() < IDENTITY_TOLERANCE:
         return None
     return np.asarray(matrix / matrix.sum(axis=1, keepdims=True))  # grey stays exactly grey
 
 
 def from_chromaticities(chromaticities: tuple[float, ...]) -> Matrix | None:
-    """to_rec709 of primaries given by chromaticities. Raises ValueError for impossible ones."""
+    """to_rec709 for primaries given by chromaticities (see xyz_from_rgb). Raises ValueError for
+    impossible ones."""
     matrix = xyz_from_rgb(chromaticities)
     return to_rec709(matrix, matrix.sum(axis=1))

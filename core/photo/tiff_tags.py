@@ -1,7 +1,7 @@
-"""The tags of a TIFF structure: of a TIFF, most camera RAW files, and any Exif block.
+"""Read the tags of a TIFF structure: a TIFF, most camera RAW files, or an EXIF block.
 
 TIFF 6.0 (Adobe, 1992), BigTIFF, and the variants of the first four bytes that Olympus and
-Panasonic use. Nothing here trusts a count, an offset or a denominator.
+Panasonic use. Every count, offset and denominator is checked, because files may be damaged.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ HEADS = {
     b"II*\0": "<", b"MM\0*": ">", b"II+\0": "<", b"MM\0+": ">",
     b"IIRO": "<", b"IIRS": "<", b"MMOR": ">", b"IIU\0": "<",
 }  # fmt: skip
-MOST_TAGS, MOST_BYTES, LARGEST_FILE = 2000, 1 << 16, 1 << 40
+MAX_TAGS, MAX_VALUE_BYTES, MAX_FILE_BYTES = 2000, 1 << 16, 1 << 40
 
 Value = str | bytes | tuple[int | float | Fraction | None, ...]
 
@@ -41,7 +41,7 @@ class TiffTags:
 def read_tiff_tags(file: BinaryIO, start: int = 0) -> TiffTags | None:
     """The first directory and those it points to; None where no TIFF structure starts there.
 
-    ``start``: byte where the structure (its byte order mark) begins. Damaged entries are left out.
+    start: byte where the structure (its byte order mark) begins. Damaged entries are ignored.
     """
     file.seek(start)
     head = file.read(16)
@@ -64,27 +64,27 @@ def read_tiff_tags(file: BinaryIO, start: int = 0) -> TiffTags | None:
 
 
 def _read(file: BinaryIO, place: int, size: int) -> bytes:
-    if not 0 <= place < LARGEST_FILE:
+    if not 0 <= place < MAX_FILE_BYTES:
         return b""
     file.seek(place)
     return file.read(size)
 
 
 def _directory(file: BinaryIO, start: int, offset: int, order: str, big: bool) -> dict[int, Value]:
-    """{tag: value} of one directory; entries that point outside the file are left out."""
+    """{tag: value} of one directory; entries that point outside the file are ignored."""
     count_code, entry_code, inline = ("Q", "HHQ8s", 8) if big else ("H", "HHI4s", 4)
     width = struct.calcsize(order + count_code)
     head = _read(file, start + offset, width)
     if len(head) < width:
         return {}
-    count = min(struct.unpack(order + count_code, head)[0], MOST_TAGS)
+    count = min(struct.unpack(order + count_code, head)[0], MAX_TAGS)
     size = struct.calcsize(order + entry_code)
     entries = _read(file, start + offset + width, count * size)
     found: dict[int, Value] = {}
     for place in range(0, len(entries) - size + 1, size):
         tag, kind, number, field = struct.unpack_from(order + entry_code, entries, place)
         length = SIZES.get(kind, 0) * number
-        if not 0 < length <= MOST_BYTES or tag in found:
+        if not 0 < length <= MAX_VALUE_BYTES or tag in found:
             continue
         if length > inline:
             at = struct.unpack(order + ("Q" if big else "I"), field)[0]

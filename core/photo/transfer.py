@@ -1,4 +1,4 @@
-"""Transfer curves: what a file's numbers mean in linear light."""
+"""Transfer curves: from the encoded pixel values of a file to linear light."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 
 EXPECTED = 'expected "auto", "srgb", "linear", "bt709", or "gamma:2.2"'
-MOST_POINTS = 1 << 16
+MAX_POINTS = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Parametric:
 
 @dataclass(frozen=True)
 class Sampled:
-    """Linear Y of encoded X through points, straight between them and on beyond the ends."""
+    """Linear Y of encoded X, interpolated linearly between points and extrapolated beyond them."""
 
     encoded: tuple[float, ...]
     linear: tuple[float, ...]
@@ -59,7 +59,7 @@ LINEAR = Parametric(c=1.0)
 class Transfer:
     """A curve for each of R, G, B from the file's encoding (0..1 for integers) to linear light.
 
-    ``curves`` is empty only for "auto": what the file itself says.
+    curves: empty only for "auto", the curve that the file itself declares.
     """
 
     name: str
@@ -79,29 +79,35 @@ class Transfer:
         except ValueError:
             gamma = float("nan")
         if kind != "gamma":
-            raise InputError(f"no transfer curve is called {name!r}; {EXPECTED}")
+            raise InputError(f"there is no transfer curve {name!r}; {EXPECTED}")
         if not 0.1 <= gamma <= 10.0:
-            raise InputError(f"{name!r} needs a number from 0.1 to 10; {EXPECTED}")
+            raise InputError(f"{name!r} has no gamma from 0.1 to 10; {EXPECTED}")
         return cls(f"gamma:{gamma:g}", (Parametric(gamma),) * 3)
 
     @classmethod
     def sampled(cls, encoded: ArrayLike, linear: ArrayLike, name: str = "sampled") -> Transfer:
-        """From calibration: points (n,) for all channels or (3, n) for R, G, B.
+        """A measured curve. encoded, linear: (n,) points for all channels or (3, n) for R, G, B.
 
-        ``encoded`` (0..1 for integer formats) must rise, ``linear`` must not fall; raises
-        InputError otherwise. Straight lines join the points: give enough of them.
+        encoded (0..1 for integer formats) must increase strictly, linear must not decrease; raises
+        InputError otherwise. The curve is linear between the points, so give enough of them.
         """
         x, y = (np.asarray(values, np.float64) for values in (encoded, linear))
         if x.shape != y.shape or x.ndim not in (1, 2) or (x.ndim == 2 and len(x) != 3):
             raise InputError(
-                "a sampled transfer curve needs as many encoded as linear numbers, "
-                f"(n,) or (3, n); found {x.shape} and {y.shape}"
+                f"the sampled transfer curve has encoded values of shape {x.shape} and linear "
+                f"values of shape {y.shape}; expected the same shape, (n,) or (3, n)"
             )
         x, y = np.broadcast_to(x, (3, x.shape[-1])), np.broadcast_to(y, (3, y.shape[-1]))
-        if not 2 <= x.shape[1] <= MOST_POINTS or not np.isfinite([x, y]).all():
-            raise InputError("a sampled transfer curve needs 2 to 65536 points, all finite")
+        if not 2 <= x.shape[1] <= MAX_POINTS or not np.isfinite([x, y]).all():
+            raise InputError(
+                "the sampled transfer curve has too few or too many points, or points that are not "
+                "finite; expected 2 to 65536 finite points"
+            )
         if (np.diff(x) <= 0).any() or (np.diff(y) < 0).any() or (y[:, -1] <= y[:, 0]).any():
-            raise InputError("a sampled transfer curve must rise from its first to its last point")
+            raise InputError(
+                "the sampled transfer curve does not increase from its first to its last point; "
+                "expected encoded values that increase and linear values that never decrease"
+            )
         red, green, blue = (
             Sampled(tuple(a.tolist()), tuple(b.tolist())) for a, b in zip(x, y, strict=True)
         )
@@ -109,11 +115,11 @@ class Transfer:
 
     @property
     def is_linear(self) -> bool:
-        """Whether nothing needs to be done."""
+        """True where encoded values are linear light already."""
         return bool(self.curves) and all(curve == LINEAR for curve in self.curves)
 
     def decode(self, encoded: NDArray) -> NDArray[np.float32]:
-        """(…, 3) encoded → (…, 3) linear."""
+        """(…, 3) encoded values → (…, 3) linear light. Raises ValueError for "auto"."""
         pixels = np.asarray(encoded)
         out = np.empty(pixels.shape, np.float32)
         for channel, curve in enumerate(self._known()):
@@ -121,7 +127,8 @@ class Transfer:
         return out
 
     def table(self, levels: int) -> NDArray[np.float32]:
-        """(levels, 3) linear light of each code 0 … levels − 1 of an integer format."""
+        """(levels, 3) linear light of each code 0 … levels − 1 of an integer format. Raises
+        ValueError for "auto"."""
         codes = np.arange(levels) / (levels - 1)
         return np.stack([curve(codes) for curve in self._known()], axis=1).astype(np.float32)
 
@@ -137,8 +144,8 @@ def same_curve(one: Curve, other: Curve, tolerance: float = 2e-3) -> bool:
     return bool(np.abs(one(x) - other(x)).max() < tolerance)
 
 
-def rises(curve: Curve) -> bool:
-    """Whether a curve of a profile can be one of a photo: finite, never falling over 0..1."""
+def is_increasing(curve: Curve) -> bool:
+    """Whether a curve of a profile is usable for a photo: finite and never decreasing over 0..1."""
     with np.errstate(all="ignore"):
         y = curve(np.linspace(0, 1, 1025))
     return bool(np.isfinite(y).all() and y[-1] > y[0] and (np.diff(y) > -1e-6).all())

@@ -1,4 +1,4 @@
-"""The forward model: what a photo should look like."""
+"""The forward model: the photo expected from geometry, light and BRDF."""
 
 from .photo import predict_radiance, similarity_sums
 

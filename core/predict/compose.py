@@ -1,4 +1,4 @@
-"""A photo as the model sees it: every material in its place, direct light, shadows."""
+"""Predict a whole photo: all materials, direct light, shadows."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ def predict_photo(
 ) -> NDArray[np.float32]:
     """(n, 3) radiance of a view's pixels: 0 in shadow, NaN where no material was fitted.
 
-    parts: ((n,) pixels of the view, BRDF, its scale) of every material; the scale is what the
-    BRDF is too large by where the irradiance is unknown."""
+    parts: ((n,) pixels of the view, BRDF, scale) of every material; where the irradiance is unknown
+    the BRDF is too large by the factor scale.
+    """
     values = np.full((len(view.pixel), 3), np.nan, np.float32)
     for pixels, brdf, scale in parts:
         values[pixels] = 0.0

@@ -1,4 +1,4 @@
-"""How far a predicted photo is from the measured one, in the photo's own encoding."""
+"""Errors of a predicted photo, in the photo's own encoding."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-DARKEST_LEVEL = 1 / 255  # encoded; a smaller value would make its relative error that of noise
+MIN_LEVEL = 1 / 255  # encoded; noise dominates the relative error of smaller values
 
 
 @dataclass(frozen=True)
@@ -15,8 +15,8 @@ class PhotoErrors:
     """Errors of a prediction p of a photo y; both are encoded values, 0..1 for integer formats.
 
     typical: median of |p − y| / max(y, 1/255). relative_rms: √mean(p − y)² / √mean y².
-    encoded_rmse: √mean(p − y)². All channels count alike. pixels: how many were compared; with
-    none of them the errors are NaN.
+    encoded_rmse: √mean(p − y)². All channels have the same weight. pixels: how many were compared;
+    with none of them the errors are NaN.
     """
 
     typical: float
@@ -35,7 +35,7 @@ class PhotoErrors:
         rmse = float(np.sqrt(np.mean(np.square(difference))))
         size = float(np.sqrt(np.mean(np.square(y))))
         return cls(
-            typical=float(np.median(np.abs(difference) / np.maximum(y, DARKEST_LEVEL))),
+            typical=float(np.median(np.abs(difference) / np.maximum(y, MIN_LEVEL))),
             relative_rms=rmse / size if size > 0 else nan,
             encoded_rmse=rmse,
             pixels=len(y),
@@ -43,7 +43,7 @@ class PhotoErrors:
 
     @classmethod
     def mean(cls, photos: list[PhotoErrors]) -> PhotoErrors:
-        """Mean of each error over the photos that have one; ``pixels`` is their sum."""
+        """Mean of each error over the photos with pixels; ``pixels`` is their sum."""
         some = [p for p in photos if p.pixels]
         nan = float("nan")
         if not some:

@@ -1,4 +1,4 @@
-"""Direct light on the scanned surface: L = ρ · E · max(n·l, 0), nothing where shadowed."""
+"""Direct light on the scanned surface: L = ρ · E · max(n·l, 0), zero where shadowed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..angles import Angles
 from ..basis import Basis, PrincipalBRDF
 from ..samples import SampleTable
 
-CHUNK = 1 << 16
+CHUNK = 1 << 16  # samples
 
 
 def predict_radiance(brdf: PrincipalBRDF, table: SampleTable) -> NDArray[np.float32]:
@@ -20,9 +20,9 @@ def predict_radiance(brdf: PrincipalBRDF, table: SampleTable) -> NDArray[np.floa
 def similarity_sums(
     basis: Basis, candidates: NDArray[np.floating], table: SampleTable
 ) -> NDArray[np.float64]:
-    """(t,) cosine similarity between the photos and t candidate BRDFs (t, 3, k), all samples
-    and channels as one vector (the paper, section 3.4). Streams: memory does not grow with n.
-    Rows that stand for several samples count as so many."""
+    """(t,) cosine similarity between the photos and t candidate BRDFs (t, 3, k), over all samples
+    and channels as one vector (Ono et al. 2019, section 3.4). Rows are weighted by the samples they
+    represent. Works in chunks, so memory does not grow with n."""
     t = len(candidates)
     flat = candidates.reshape(3 * t, -1)
     dot, norm, seen = np.zeros(t), np.zeros(t), 0.0

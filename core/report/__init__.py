@@ -1,4 +1,4 @@
-"""What a person looks at: pictures, slices and one page that holds them."""
+"""The report of a fit: one HTML page with pictures and charts, and result.json for programs."""
 
 from . import result_json
 from .page import write_report

@@ -1,4 +1,4 @@
-"""diagnosis.json: what a capture's model gets wrong, the causes, and what is gained."""
+"""diagnosis.json: the causes found for a capture, with evidence and errors before and after."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ FORMAT = 2
 
 
 def describe(found: Diagnosis, before: CaptureResult, after: CaptureResult) -> dict[str, Any]:
-    """The content of diagnosis.json; before, after: the fits without and with what was named.
-    Gains are nats; angles are radians; held_out of materials is RMS, typical the median pixel."""
+    """The content of diagnosis.json. before, after: the fits without and with a correction for the
+    named causes. Gains are in nats, angles in radians. Errors of materials are relative errors of
+    held-out photos: held_out the RMS, typical the median over pixels."""
     tried = {t.effect.cause for trials in found.rounds for t in trials}
     return {
         "format": FORMAT,
@@ -51,12 +52,12 @@ def describe(found: Diagnosis, before: CaptureResult, after: CaptureResult) -> d
 
 
 def write(path: Path, found: Diagnosis, before: CaptureResult, after: CaptureResult) -> None:
-    """Write the file; it appears whole or not at all."""
+    """Write the file atomically."""
     write_json(path, describe(found, before, after))
 
 
 def _errors(error: HeldOutErrors) -> dict[str, float | None]:
-    """RMS errors relative to the photos' light."""
+    """Errors of held-out regions and photos (HeldOutErrors)."""
     return {
         "held_out": error.parts,
         "held_out_photos": error.photos,
@@ -66,9 +67,9 @@ def _errors(error: HeldOutErrors) -> dict[str, float | None]:
 
 
 def _cause(trial: Trial, found: Diagnosis) -> dict[str, Any]:
-    numbers = trial.effect.parameters
+    declared = trial.effect.parameters
     accepted = trial in found.accepted
-    drawn = trial in found.named and len(numbers) > 0
+    has_evidence = trial in found.named and len(declared) > 0
     return {
         "cause": trial.effect.cause,
         "accepted": accepted,
@@ -79,8 +80,8 @@ def _cause(trial: Trial, found: Diagnosis) -> dict[str, Any]:
         "standard_error": trial.error,
         "p_value": trial.p_value,
         "rms_change": trial.change,
-        "evidence": f"report/{evidence_file(trial.effect.cause)}" if drawn else None,
+        "evidence": f"report/{evidence_file(trial.effect.cause)}" if has_evidence else None,
         "parameters": parameters(
-            numbers.names, numbers.units, trial.identified, trial.standard_errors
+            declared.names, declared.units, trial.identified, trial.standard_errors
         ),
     }

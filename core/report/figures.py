@@ -1,4 +1,4 @@
-"""What the report says of a material in figures, each with what it means."""
+"""The table of the report: the figures of one material, each as a sentence."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..fit import PaperFit
-from ..fit.held_out import HeldOut
-from ..fit.measured_result import NINETY, MeasuredResult
+from ..fit.held_out import HeldOutErrors
+from ..fit.measured_result import NINETY_PERCENT, MeasuredResult
 from ..fit.spread import Spread
 from ..jobs import MaterialResult
 
-GAIN_WORTH_TELLING = 0.02
-PERCENT = 0.5  # half widths beyond are told as factors
+MIN_REPORTED_GAIN = 0.02  # relative: smaller exposure differences of a photo are not reported
+MAX_PERCENT = 0.5  # relative half width of an interval: a wider one is given as a factor
 
 
 def figures(material: MaterialResult, photos: Sequence[str]) -> list[tuple[str, str]]:
-    """(name, sentence) of every figure; photos: their names."""
+    """(heading, sentence) of each row of a material's table; photos: the photos' names."""
     if isinstance(material.fit, MeasuredResult):
         own = _measured(material.fit, material, photos)
     else:
@@ -25,81 +25,84 @@ def figures(material: MaterialResult, photos: Sequence[str]) -> list[tuple[str, 
     p = material.principled.principled
     colour = ", ".join(f"{c:.3f}" for c in p.base_color)
     return [
-        ("held-out photos", _unseen(material.held_out)),
+        ("Held-out photos", _held_out(material.held_out)),
         *own,
         (
             "Principled",
-            f"base colour {colour} · metallic {p.metallic:.2f} · roughness {p.roughness:.2f} · "
+            f"Base colour {colour} · metallic {p.metallic:.2f} · roughness {p.roughness:.2f} · "
             f"specular {p.specular_ior_level:.2f} · coat {p.coat_weight:.2f} "
-            f"(cube-root error {100 * material.principled.error:.1f} %)",
+            f"(cube-root error {100 * material.principled.error:.1f} %).",
         ),
     ]
 
 
-def told_gains(fit: MeasuredResult) -> dict[int, float]:
-    """Photo → gain, of those that differ enough to be told."""
-    return fit.odd_gains(GAIN_WORTH_TELLING)
+def notable_gains(fit: MeasuredResult) -> dict[int, float]:
+    """Photo → gain, for the photos whose gain differs from 1 by more than MIN_REPORTED_GAIN."""
+    return fit.gains_beyond(MIN_REPORTED_GAIN)
 
 
 def half_width(deviation: float) -> float:
-    """What a 90 % interval reaches to either side, as a fraction."""
-    return float(np.expm1(NINETY * deviation))
+    """Upper half width of the 90 % interval as a fraction of ρ; deviation: the standard deviation
+    of the logarithm of ρ."""
+    return float(np.expm1(NINETY_PERCENT * deviation))
 
 
-def _unseen(held: HeldOut | None) -> str:
+def _held_out(held: HeldOutErrors | None) -> str:
     if held is None:
-        return "nothing could be held out: too few photos see it, or it was switched off"
+        return "Not tested: too few photos show the material, or the test was switched off."
     return (
-        f"predicts the typical pixel of an unseen photo to {100 * held.typical:.0f} %; "
-        f"{100 * held.error:.0f} % relative RMS, which highlights dominate"
+        f"Each photo is predicted from the others: median relative error {100 * held.typical:.0f} "
+        f"%, relative RMS error {100 * held.error:.0f} % (dominated by highlights)."
     )
 
 
 def _measured(
     fit: MeasuredResult, material: MaterialResult, photos: Sequence[str]
 ) -> list[tuple[str, str]]:
-    gains = told_gains(fit)
+    gains = notable_gains(fit)
     odd = " · ".join(f"{photos[p]} {100 * (g - 1):+.0f} %" for p, g in sorted(gains.items()))
     return [
-        ("samples", _samples(material)),
+        ("Samples", _samples(material)),
         (
-            "scan's normals",
-            f"off by about {fit.normal_deviation:.1f}° (along each tangent), as the photos say",
+            "Normals of the scan",
+            f"Estimated standard deviation: {fit.normal_deviation:.1f}° along each tangent.",
         ),
         (
-            "photos against each other",
-            f"brighter or darker than the fit says: {odd}"
+            "Brightness of the photos",
+            f"Brighter or darker than the fit predicts: {odd}."
             if odd
-            else f"agree to {100 * GAIN_WORTH_TELLING:.0f} %",
+            else f"All photos agree with the fit to {100 * MIN_REPORTED_GAIN:.0f} %.",
         ),
-        ("unseen directions", fit.anchoring),
+        ("Directions without samples", fit.extrapolation),
         (
             "90 % interval",
-            f"{reach(material.spread)}: nine times in ten the truth is not farther off",
+            f"{reach(material.spread)}. The true BRDF is within it in nine of ten cases.",
         ),
     ]
 
 
 def reach(spread: Spread) -> str:
-    """A measured fit's uncertainty in a phrase."""
+    """The 90 % interval of a measured fit as a phrase: median, 90th percentile, highlight."""
     median, wide, peak = (
         either_side(d) for d in (spread.median, spread.percentile_90, spread.at_highlight)
     )
-    return f"{median} in half of all directions, {wide} in most, {peak} at the highlight"
+    return f"{median} in half of all directions, {wide} in 90 % of them, {peak} at the highlight"
 
 
 def either_side(deviation: float) -> str:
-    """A 90 % interval in words; a wide one reaches as far down by division as up."""
+    """A 90 % interval in words: a percentage, or a factor (up or down) if it is wide."""
     wide = half_width(deviation)
-    return f"± {100 * wide:.0f} %" if wide < PERCENT else f"a factor of {1 + wide:.1f} either way"
+    return (
+        f"± {100 * wide:.0f} %" if wide < MAX_PERCENT else f"a factor of {1 + wide:.1f} either way"
+    )
 
 
 def _samples(material: MaterialResult) -> str:
     if material.used >= material.samples:
-        return f"{material.samples:,} lit pixels, every one of them used"
+        return f"{material.samples:,} lit pixels, all of them used."
     return (
-        f"{material.samples:,} lit pixels: {material.used:,} of them, which stand for the others "
-        "of their photo"
+        f"{material.samples:,} lit pixels; {material.used:,} of them are used, as a representative "
+        "selection from each photo."
     )
 
 
@@ -107,18 +110,18 @@ def _paper(fit: PaperFit, material: MaterialResult) -> list[tuple[str, str]]:
     spread = material.spread
     return [
         (
-            "samples",
-            f"{material.samples:,} lit pixels, {fit.reliable:,} on calm surface, "
-            f"{len(fit.chosen)} chosen (condition number {fit.condition:.1f})",
+            "Samples",
+            f"{material.samples:,} lit pixels, {fit.reliable:,} of low curvature, "
+            f"{len(fit.chosen)} selected (condition number {fit.condition:.1f}).",
         ),
         (
-            "cosine similarity",
+            "Cosine similarity",
             f"{fit.similarity.max():.4f}, the best of {len(fit.similarity)} trials "
-            f"(worst {fit.similarity.min():.4f})",
+            f"(worst {fit.similarity.min():.4f}).",
         ),
         (
-            "spread of trials",
+            "Standard deviation between trials",
             f"± {100 * spread.median:.0f} % median, "
-            f"± {100 * spread.at_highlight:.0f} % at the highlight",
+            f"± {100 * spread.at_highlight:.0f} % at the highlight.",
         ),
     ]

@@ -1,4 +1,4 @@
-"""What a report shows of one material."""
+"""The section of the report about one material: lit spheres, table and charts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from ..fit.measured_result import MeasuredResult
 from ..jobs import MaterialResult
 from ..photo import write_png
-from ..views.charts import View, chart, most_measured
+from ..views.charts import View, best_sampled_theta_d, chart
 from ..views.polar import NEAR_PLANE, polar
 from ..views.raster import raster
 from ..views.sphere import Reflector, write_sphere
@@ -22,7 +22,7 @@ from .figures import figures
 
 
 def material_section(folder: Path, material: MaterialResult, photos: Sequence[str]) -> str:
-    """HTML of a material's pictures, figures and charts; the pictures go into ``folder``."""
+    """HTML of a material's pictures, table and charts; writes the pictures into ``folder``."""
     fit, brdf = material.fit, material.fit.brdf
     interval = fit.interval if isinstance(fit, MeasuredResult) else None
     spheres = _spheres(folder, material)
@@ -38,17 +38,17 @@ def material_section(folder: Path, material: MaterialResult, photos: Sequence[st
     shaded = "" if interval is None else "; shaded: the 90 % interval"
     return (
         f"<h2>{escape(material.name)}</h2>{warnings}<div class='triple'>{spheres}</div>"
-        f"<p class='sub'>Lit spheres, key light π at the upper left. Error: of the cube root of "
-        f"ρ cos θ over all directions.</p><table>{rows}</table>"
+        f"<p class='sub'>Lit spheres; key light at the upper left, irradiance π. Error: relative "
+        f"error of the cube root of ρ cos θi over all directions.</p><table>{rows}</table>"
         f"<div class='charts'>{charts}</div><p class='sub'>Reflectance in the plane of incidence, "
-        f"light from the left; a curve for each of red, green and blue{shaded}; dots: "
-        f"samples within {np.degrees(NEAR_PLANE):.0f}° of it.</p>{_slices(folder, subject)}"
+        f"light from the left; one curve each for red, green and blue{shaded}; dots: "
+        f"samples within {np.degrees(NEAR_PLANE):.0f}° of this plane.</p>{_slices(folder, subject)}"
     )
 
 
 def _slices(folder: Path, subject: Subject) -> str:
-    """The highlight, and the BRDF and its certainty over half and difference angle."""
-    view = View(theta_d=most_measured(subject) or View.theta_d)
+    """HTML of the highlight curve and of the θh × θd slices of the BRDF and of its interval."""
+    view = View(theta_d=best_sampled_theta_d(subject) or View.theta_d)
     cells = [f"<figure>{svg(chart('highlight', subject, None, view))}</figure>"]
     kinds = ("slice",) if subject.interval is None else ("slice", "interval")
     for kind in kinds:
@@ -56,21 +56,22 @@ def _slices(folder: Path, subject: Subject) -> str:
         write_png(folder / name, raster(chart(kind, subject, None, view)))
         cells.append(f"<figure><img src='{escape(quote(name))}' alt='{kind}'></figure>")
     return (
-        f"<div class='charts'>{''.join(cells)}</div><p class='sub'>The highlight where most "
-        "samples are; the BRDF over the half vector's angles to normal (θh) and light (θd), "
-        "with some of the samples; and how far off it may be: dark is what no photo looked at.</p>"
+        f"<div class='charts'>{''.join(cells)}</div><p class='sub'>Left: the highlight at the θd "
+        "with most samples. Middle: the BRDF over the angles from the half vector to the normal "
+        "(θh) and to the light (θd), with a part of the samples. Right, for the measured method: "
+        "the 90 % interval; dark directions are uncertain, because no photo shows them.</p>"
     )
 
 
 def _spheres(folder: Path, material: MaterialResult) -> str:
-    """Figures of the measured BRDF, its lobe stack and its Principled, side by side."""
+    """HTML of lit spheres of the measured BRDF, its lobe stack and its Principled BSDF."""
     lobes, principled = material.lobes, material.principled
     shown: list[tuple[str, str, Reflector]] = [
-        ("", "measured: Cycles with OSL", material.fit.brdf.evaluate),
-        ("_lobes", f"lobe stack: EEVEE, error {100 * lobes.error:.1f} %", lobes.stack),
+        ("", "Measured BRDF (Cycles with OSL)", material.fit.brdf.evaluate),
+        ("_lobes", f"Lobe stack (EEVEE), error {100 * lobes.error:.1f} %", lobes.stack),
         (
             "_principled",
-            f"Principled: exports, error {100 * principled.error:.1f} %",
+            f"Principled BSDF (exports), error {100 * principled.error:.1f} %",
             principled.principled,
         ),
     ]

@@ -1,4 +1,4 @@
-"""Pictures under other light, as a page of their own and as a section of the report."""
+"""Renderings under other light, as a separate page and as a section of the report."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from urllib.parse import quote
 from ..files import write_text_atomic
 
 STYLE = Path(__file__).parents[2] / "assets" / "report" / "style.css"
-SHOWN = 8  # pictures of a turn
+MAX_TURNTABLE_PICTURES = 8  # shown of each turntable
 END = "</html>"
 
 
 @dataclass(frozen=True)
 class Picture:
-    """file: relative to the page's folder; subject: a material's name (a sphere), or "object";
-    turn: which step of the turntable, None of a sphere."""
+    """One rendering. file: relative to the folder of the page; world: the name of the lighting;
+    subject: the name of a material (a sphere), or "object"; turn: the step of the turntable, None
+    for a sphere."""
 
     file: Path
     world: str
@@ -27,7 +28,7 @@ class Picture:
 
 
 def write_page(folder: Path, pictures: Sequence[Picture]) -> Path:
-    """index.html beside the pictures."""
+    """Write index.html into the folder of the pictures; returns its path."""
     page = folder / "index.html"
     page.write_text(
         "<!doctype html><html lang='en'><meta charset='utf-8'><title>Patina: other light</title>"
@@ -39,7 +40,8 @@ def write_page(folder: Path, pictures: Sequence[Picture]) -> Path:
 
 
 def add_to_report(page: Path, pictures: Sequence[Picture], folder: str) -> None:
-    """Put the pictures, which lie in ``folder`` beside the page, at the end of a report."""
+    """Append the pictures to a report. folder: the folder of the pictures, relative to the page.
+    A page that does not end with ``</html>`` stays unchanged."""
     text = page.read_text("utf-8")
     if not text.endswith(END) or not pictures:
         return
@@ -48,12 +50,12 @@ def add_to_report(page: Path, pictures: Sequence[Picture], folder: str) -> None:
 
 
 def section(pictures: Sequence[Picture], folder: str = "") -> str:
-    """HTML: a row of spheres and one of the object's turn for every world."""
+    """HTML: for each world, a row of spheres and a row of turntable pictures."""
     rows = []
     for world in dict.fromkeys(p.world for p in pictures):
         spheres = [p for p in pictures if p.world == world and p.turn is None]
         turn = [p for p in pictures if p.world == world and p.turn is not None]
-        step = max(1, -(-len(turn) // SHOWN))
+        step = max(1, -(-len(turn) // MAX_TURNTABLE_PICTURES))
         rows.append(f"<p class='sub'>{escape(world)}</p>")
         for shown in (spheres, turn[::step]):
             if shown:
@@ -61,8 +63,8 @@ def section(pictures: Sequence[Picture], folder: str = "") -> str:
                     f"<div class='relit'>{''.join(_figure(p, folder) for p in shown)}</div>"
                 )
     return (
-        "<p class='sub'>Rendered by Cycles with the measured material, lit by pictures of the "
-        f"world alone.</p>{''.join(rows)}"
+        "<p class='sub'>Rendered by Cycles with the measured material; environment images are the "
+        f"only light.</p>{''.join(rows)}"
     )
 
 

@@ -1,4 +1,4 @@
-"""What every photo shows more or less than the prediction, as a picture."""
+"""Pictures of the residual of a photo."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from scipy.spatial import cKDTree
 from ..diagnose.forward.pixels import Pixels
 from ..views import display
 
-LONGEST = 260
-WITHIN = 3.0  # typical distances between the pixels that were looked at
-FULL = 3.0  # deviations, for full colour
+LONGEST = 260  # pixels, of the longer side
+MAX_DISTANCE = 3.0  # of a shown place to the nearest selected pixel, in their typical spacing
+FULL = 3.0  # standard deviations, for full colour
 
 
 def photo_most_changed(pixels: Pixels, changed: NDArray[np.floating]) -> int | None:
-    """By a change (n, 3) in deviations, a pixel of it; None where nothing changes."""
+    """Index of the photo with the largest mean square change per pixel; None where nothing changes.
+    changed: (n, 3) in standard deviations."""
     strength = np.bincount(pixels.photo, np.sum(changed**2, axis=1))
     if not strength.any():
         return None
@@ -25,8 +26,9 @@ def photo_most_changed(pixels: Pixels, changed: NDArray[np.floating]) -> int | N
 def residual_picture(
     pixels: Pixels, residual: NDArray[np.floating], photo: int
 ) -> NDArray[np.uint8]:
-    """(h, w, 3) of the part of a photo that shows the object: prediction too dark blue, too bright
-    red, full colour at FULL deviations. residual: (n, 3) photo − prediction in deviations."""
+    """(h, w, 3) picture of the part of a photo that shows the object: blue where the prediction is
+    too dark, red where it is too bright, full colour at FULL. residual: (n, 3) photo − prediction
+    in standard deviations."""
     rows = np.flatnonzero((pixels.photo == photo) & np.isfinite(residual).all(axis=1))
     at = np.stack([pixels.x[rows], pixels.y[rows]], axis=1).astype(np.float64)
     if not len(at):
@@ -38,7 +40,7 @@ def residual_picture(
     lines = low[1] + (np.arange(height) + 0.5) * size / LONGEST
     grid = np.stack(np.meshgrid(columns, lines), axis=-1).reshape(-1, 2)
     typical = np.sqrt(np.prod(np.maximum(high - low, 1e-9)) / len(at))
-    far, which = cKDTree(at).query(grid, distance_upper_bound=WITHIN * typical)
+    far, which = cKDTree(at).query(grid, distance_upper_bound=MAX_DISTANCE * typical)
     known = np.isfinite(far)
     shown = np.full((len(grid), 1), np.nan)
     shown[known, 0] = residual[rows[which[known]]].mean(axis=1)

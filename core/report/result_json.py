@@ -1,4 +1,4 @@
-"""result.json: what a fit found, for programs and researchers."""
+"""result.json: the results of a fit in a machine-readable file."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ from ..inputs import capture_data
 from ..jobs import CaptureResult, MaterialResult, Stage
 from ..jobs.applied_effects import AppliedEffect
 from ..light import Light
-from .figures import half_width, told_gains
+from .figures import half_width, notable_gains
 
 MANIFEST = Path(__file__).parents[2] / "blender_manifest.toml"
 FORMAT = 2
 PAPER_UNCERTAINTY = "std of ln(rho cosMap + 0.001) between trials; not calibrated"
 MEASURED_UNCERTAINTY = (
-    "std of ln(rho cosMap + 0.001) that the photos leave; interval_90: nine times in ten the truth "
-    "is off by less than this fraction"
+    "posterior std of ln(rho cosMap + 0.001); interval_90: in nine of ten cases the true value "
+    "differs by less than this fraction"
 )
 
 
 def program_version() -> str:
-    """The extension's version, as its manifest says."""
+    """The version of the extension, from its manifest."""
     return str(tomllib.loads(MANIFEST.read_text("utf-8"))["version"])
 
 
 def write(path: Path, result: CaptureResult, stages: Sequence[Stage], notes: Sequence[str]) -> None:
-    """Write the file; it appears whole or not at all."""
+    """Write result.json of a fit atomically: a failed write leaves no partial file."""
     write_json(path, describe(result, stages, notes))
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write a file of this content; it appears whole or not at all."""
+    """Write a JSON file atomically. Raises ValueError for NaN and infinite numbers."""
     write_text_atomic(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
@@ -77,8 +77,8 @@ def describe(
 
 
 def _light(result: CaptureResult, light: Light) -> dict[str, Any]:
-    """Kind, place and strength of a light; of a refined one what moved, with its standard error."""
-    numbers = {
+    """Kind, geometry and strength of a light; the refined parameters with standard errors."""
+    parameters_by_name = {
         key: None if value is None else np.asarray(value, float).tolist()
         for key, value in vars(light).items()
         if key != "name"
@@ -87,7 +87,7 @@ def _light(result: CaptureResult, light: Light) -> dict[str, Any]:
     return {
         "name": light.name,
         "kind": type(light).__name__.removesuffix("Light").lower(),
-        **numbers,
+        **parameters_by_name,
         "refined": {
             key: {"value": value, "standard_error": error if np.isfinite(error) else None}
             for key, (value, error) in moved.items()
@@ -96,7 +96,7 @@ def _light(result: CaptureResult, light: Light) -> dict[str, Any]:
 
 
 def _effect(effect: AppliedEffect) -> dict[str, Any]:
-    """What a diagnosis named and the materials take into account."""
+    """A cause found by the diagnosis and included in the fit of the materials."""
     return {
         "cause": effect.cause,
         "sentence": effect.sentence,
@@ -107,11 +107,11 @@ def _effect(effect: AppliedEffect) -> dict[str, Any]:
 def parameters(
     names: Sequence[str], units: Sequence[str], values: Iterable[float], errors: Iterable[float]
 ) -> dict[str, Any]:
-    """An effect's numbers by their names."""
-    told = zip(names, units, values, errors, strict=True)
+    """The parameters of an effect by name, each with its standard error and unit."""
+    rows = zip(names, units, values, errors, strict=True)
     return {
         name: {"value": float(value), "standard_error": float(error), "unit": unit}
-        for name, unit, value, error in told
+        for name, unit, value, error in rows
     }
 
 
@@ -165,12 +165,12 @@ def _material(result: CaptureResult, material: MaterialResult) -> dict[str, Any]
 def _lobe_stack(stack: LobeStack, error: float) -> dict[str, Any]:
     return {
         "diffuse": stack.diffuse.tolist(),
-        **_turned("diffuse", stack.diffuse_mid, stack.diffuse_edge),
+        **_grazing_colors("diffuse", stack.diffuse_mid, stack.diffuse_edge),
         "diffuse_roughness": stack.diffuse_roughness,
         "lobes": [
             {
                 "f0": lobe.f0.tolist(),
-                **_turned("f0", lobe.f0_mid, lobe.f0_edge),
+                **_grazing_colors("f0", lobe.f0_mid, lobe.f0_edge),
                 "f90": lobe.f90.tolist(),
                 "exponent": lobe.exponent,
                 "roughness": lobe.roughness,
@@ -181,16 +181,17 @@ def _lobe_stack(stack: LobeStack, error: float) -> dict[str, Any]:
     }
 
 
-def _turned(name: str, mid: np.ndarray | None, edge: np.ndarray | None) -> dict[str, Any]:
-    told = {f"{name}_mid": mid, f"{name}_edge": edge}
-    return {key: color.tolist() for key, color in told.items() if color is not None}
+def _grazing_colors(name: str, mid: np.ndarray | None, edge: np.ndarray | None) -> dict[str, Any]:
+    """The colours of a lobe midway and at grazing view, where the lobe has them."""
+    colors = {f"{name}_mid": mid, f"{name}_edge": edge}
+    return {key: color.tolist() for key, color in colors.items() if color is not None}
 
 
 def _measured(fit: MeasuredResult, names: Sequence[str]) -> dict[str, Any]:
     return {
         "normal_deviation": fit.normal_deviation,
-        "gains": {names[photo]: gain for photo, gain in sorted(told_gains(fit).items())},
-        "unseen_directions": fit.anchoring,
+        "gains": {names[photo]: gain for photo, gain in sorted(notable_gains(fit).items())},
+        "unseen_directions": fit.extrapolation,
     }
 
 
@@ -199,25 +200,25 @@ def _interval(spread: Spread) -> dict[str, Any]:
 
 
 def _paper(result: CaptureResult, fit: PaperFit, names: Sequence[str]) -> dict[str, Any]:
-    chosen = fit.chosen
+    selected = fit.chosen
     width = {
         photo: capture_data.camera_of(result.capture, result.scan, photo).width
-        for photo in np.unique(chosen.photo).tolist()
+        for photo in np.unique(selected.photo).tolist()
     }
     return {
         "chosen": [
             {
-                "photo": names[int(chosen.photo[i])],
+                "photo": names[int(selected.photo[i])],
                 "pixel": [
-                    int(chosen.pixel[i] % width[int(chosen.photo[i])]),
-                    int(chosen.pixel[i] // width[int(chosen.photo[i])]),
+                    int(selected.pixel[i] % width[int(selected.photo[i])]),
+                    int(selected.pixel[i] // width[int(selected.photo[i])]),
                 ],
-                "theta_h": _degrees(chosen.theta_h[i]),
-                "theta_d": _degrees(chosen.theta_d[i]),
-                "phi_d": _degrees(chosen.phi_d[i]),
-                "rho": [float(x) for x in chosen.rho[i]],
+                "theta_h": _degrees(selected.theta_h[i]),
+                "theta_d": _degrees(selected.theta_d[i]),
+                "phi_d": _degrees(selected.phi_d[i]),
+                "rho": [float(x) for x in selected.rho[i]],
             }
-            for i in range(len(chosen))
+            for i in range(len(selected))
         ],
         "condition_number": fit.condition,
         "cosine_similarity": fit.similarity.tolist(),

@@ -1,4 +1,4 @@
-"""What the photos show more than the prediction, along one coordinate, as SVG."""
+"""Chart of the residual along one coordinate, as SVG."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ COLOURS = ("#b4443c", "#2f6fb0")  # before, after
 
 
 def trend_chart(name: str, unit: str, before: Trend, after: Trend | None, most: float) -> str:
-    """Bars are two standard errors; most: of the vertical axis, relative."""
+    """An SVG element, empty where there is no bin. name, unit: of the coordinate. after: None where
+    nothing was corrected. most: limit of the vertical axis, relative to the prediction. Bars are
+    two standard errors."""
     drawn = [before] if after is None else [before, after]
     at = np.concatenate([t.at for t in drawn] or [np.zeros(1)])
     if not len(at):

@@ -1,4 +1,4 @@
-"""Results of a fit, read back: what result.json says, as core types."""
+"""Read the result of a fit (result.json) back into core types."""
 
 from .fitted import FittedMaterial, FittedResult
 from .reader import read_result

@@ -1,4 +1,4 @@
-"""The basis that a result's coefficients are in, found by its version."""
+"""Find the basis of a result's coefficients by its version."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from ..basis.merl_folder import user_cache
 from ..errors import InputError
 from ..scan.parsing.json_record import shown
 
-LARGEST = 256 << 20  # bytes; the embedded basis has 6 MB
-MOST_CACHED = 32
+MAX_BASIS_BYTES = 256 << 20  # the embedded basis has 6 MB
+MAX_CACHED_BASES = 32  # files looked at in the cache
 
 
 def basis_of_version(version: str, file: Path, cache: Path | None = None) -> Basis:
-    """The embedded basis, or one from the user's own MERL files, whose version is ``version``.
+    """The basis with this version: the embedded one, or one built from the user's own MERL files.
 
-    file: the result that asks, for the message. Raises InputError where this computer has no such
-    basis, with what to do about it.
+    file: the result that needs it, for the error message. cache: folder of the user's bases
+    (default: the user's cache). Raises InputError where this computer has no such basis.
     """
     default = default_basis()
     if default.version == version:
@@ -27,13 +27,13 @@ def basis_of_version(version: str, file: Path, cache: Path | None = None) -> Bas
         try:
             basis = storage.load(stored)
         except InputError:
-            continue  # a damaged cache is none
+            continue  # ignore a damaged cache file
         if basis.version == version:
             return basis
     raise InputError(
-        f"is {shown(version)}; this Patina carries the basis {default.version} and finds no "
-        "other here: run `basis --merl FOLDER` if the fit used MERL files of your own, else fit "
-        "again",
+        f"is {shown(version)}; expected {default.version}, the basis of this version of Patina, "
+        "or a basis in the cache; run `basis --merl FOLDER` if the fit used your own MERL files, "
+        "otherwise fit again",
         file=file,
         key="basis.version",
     )
@@ -41,7 +41,7 @@ def basis_of_version(version: str, file: Path, cache: Path | None = None) -> Bas
 
 def _cached(folder: Path) -> list[Path]:
     try:
-        found = sorted(folder.glob("merl_basis_*.npz"))[:MOST_CACHED]
-        return [path for path in found if path.is_file() and path.stat().st_size <= LARGEST]
+        found = sorted(folder.glob("merl_basis_*.npz"))[:MAX_CACHED_BASES]
+        return [path for path in found if path.is_file() and path.stat().st_size <= MAX_BASIS_BYTES]
     except OSError:
         return []

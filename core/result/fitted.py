@@ -1,4 +1,4 @@
-"""What a fit left behind, in the types that it was made of."""
+"""The saved result of a fit as core types."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from ..basis import Basis, PrincipalBRDF
 
 @dataclass(frozen=True)
 class HeldOutError:
-    """How well each photo was predicted from the others: error ‖L̂ − L‖/‖L‖ of all of them,
-    typical: median relative error of pixels that are not dark."""
+    """Errors of the held-out photos, each predicted from the others. error: ‖L̂ − L‖/‖L‖ over all
+    of them; typical: median relative error of pixels that are not dark."""
 
     error: float
     typical: float
@@ -22,11 +22,12 @@ class HeldOutError:
 class FittedMaterial:
     """One material of a result.
 
-    brdf: coefficients (3, k) in the basis they were fitted in, ρ in 1/sr. principled: the
-    Principled that was fitted, with its relative cube-root error (and the best Lambertian's).
-    scale_known: False where no irradiance was known; then ρ was multiplied by ``scale``, and is
-    known up to one factor. held_out: None where there was one photo only. normal_deviation: degrees
-    along each tangent that the scan's normals are off by, 0 where the fit does not say.
+    brdf: coefficients (3, k) in the basis of the fit, ρ in 1/sr. principled: the fitted Principled
+    BSDF; principled_error, lambertian_error: its relative cube-root error and that of the best
+    Lambertian BRDF. scale_known: False where the irradiance was unknown; ρ was then multiplied by
+    ``scale`` and is known up to one factor. held_out: None where no photo was held out.
+    normal_deviation: standard deviation of the scan's normals along each tangent, degrees; 0 where
+    the fit does not estimate it.
     """
 
     name: str
@@ -44,8 +45,9 @@ class FittedMaterial:
 
 @dataclass(frozen=True)
 class FittedResult:
-    """A result folder. file: its result.json; program: the version that wrote it; capture: the
-    capture file as it was told then; scene: the folder's scene.blend where there is one."""
+    """A result folder. file: its result.json; program: version of Patina that wrote it; capture:
+    path of the capture file at the time of the fit; scene: the folder's scene.blend, None where
+    there is none."""
 
     file: Path
     program: str

@@ -1,4 +1,4 @@
-"""result.json, opened without believing it."""
+"""Read result.json; every value is checked, because the file may come from anywhere."""
 
 from __future__ import annotations
 
@@ -17,42 +17,42 @@ from .fitted import FittedMaterial, FittedResult, HeldOutError
 
 NAME, SCENE = "result.json", "scene.blend"
 FORMATS = (1, 2)
-LARGEST = 64 << 20  # bytes: a hundred materials of a hundred components take one
-MOST_MATERIALS = 1000
-BEYOND = 1e3  # a coefficient of a training material is about 0.06
-BRIGHTEST = 20.0  # ln(ρ·cosMap): a polished mirror's highlight has 10
-NAME_LENGTH = 200
-STEEPEST = 45.0  # degrees that normals may be off by
-RANGES = {"ior": (1.0, 10.0), "coat_ior": (1.0, 10.0)}  # of the Principled's inputs beyond 0 … 1
+MAX_BYTES = 64 << 20  # a hundred materials of a hundred components take 1 MB
+MAX_MATERIALS = 1000
+MAX_COEFFICIENT = 1e3  # a coefficient of a training material is about 0.06
+MAX_LOG_RHO = 20.0  # ln(ρ·cosMap): a polished mirror's highlight has 10
+MAX_NAME_LENGTH = 200  # characters
+MAX_NORMAL_DEVIATION = 45.0  # degrees
+RANGES = {"ior": (1.0, 10.0), "coat_ior": (1.0, 10.0)}  # Principled inputs with other than 0 … 1
 FORBIDDEN = set('/\\:*?"<>|\0')
 
 
 def read_result(path: Path, cache: Path | None = None) -> FittedResult:
-    """The result in a folder, or in its result.json.
+    """Read a result from its folder or from its result.json.
 
-    cache: where bases of the user's own lie (default: the user's cache). Raises InputError, one
-    line, for whatever is not a result that this version can read.
+    cache: folder of the user's own bases (default: the user's cache). Raises InputError, one line,
+    for anything that is not a result that this version can read.
     """
     file = path / NAME if path.is_dir() else path
-    record = root_record(read_json(_checked(file), LARGEST, "a result.json"), file)
+    record = root_record(read_json(_checked(file), MAX_BYTES, "a result.json"), file)
     version = record.whole("format")
     if version not in FORMATS:
         raise record.error(
-            f"is {version}; expected one of {', '.join(map(str, FORMATS))}: this result is of "
-            "another version of Patina",
+            f"is {version}; expected one of {', '.join(map(str, FORMATS))}; another version of "
+            "Patina wrote this result: open it with that version, or fit again",
             "format",
         )
     basis = basis_of_version(record.record("basis").text("version"), file, cache)
     listed = record.records("materials")
-    if not 0 < len(listed) <= MOST_MATERIALS:
-        raise record.error(
-            f"has {len(listed)} entries; expected 1 to {MOST_MATERIALS}", "materials"
-        )
+    if not 0 < len(listed) <= MAX_MATERIALS:
+        raise record.error(f"has {len(listed)} entries; expected 1 to {MAX_MATERIALS}", "materials")
     materials = tuple(_material(entry, basis) for entry in listed)
     names = [material.name.casefold() for material in materials]
     for index, name in enumerate(names):
         if name in names[:index]:
-            raise listed[index].error(f"{materials[index].name!r} is there twice", "name")
+            raise listed[index].error(
+                f"{materials[index].name!r} appears twice; expected unique names", "name"
+            )
     scene = file.parent / SCENE
     program = record.record("program").text("version", "") if "program" in record else ""
     return FittedResult(
@@ -66,11 +66,12 @@ def read_result(path: Path, cache: Path | None = None) -> FittedResult:
 
 
 def _checked(file: Path) -> Path:
-    """The file, where there is one."""
+    """``file`` itself. Raises InputError where it does not exist or is not a file."""
     try:
         if not file.exists():
             raise InputError(
-                "is not there; expected a result: the folder that `fit` left, or its result.json",
+                "does not exist; expected a result: the folder that `fit` wrote, or its "
+                "result.json",
                 file=file,
             )
         if not file.is_file():
@@ -93,17 +94,19 @@ def _material(entry: Record, basis: Basis) -> FittedMaterial:
         scale_known=entry.flag("scale_known"),
         scale=_within(entry, "scale", 0.0, 1e12) if "scale" in entry else 1.0,
         held_out=_held_out(entry),
-        normal_deviation=float(np.clip(entry.number("normal_deviation", 0.0), 0.0, STEEPEST)),
+        normal_deviation=float(
+            np.clip(entry.number("normal_deviation", 0.0), 0.0, MAX_NORMAL_DEVIATION)
+        ),
         warnings=_sentences(entry),
     )
 
 
 def _name(entry: Record) -> str:
-    """A name becomes a file's: what no file may be called is refused."""
+    """The material's name. It becomes a file name, so names that no file can have are rejected."""
     name = entry.text("name")
     if (
         not name.strip(" .")
-        or len(name) > NAME_LENGTH
+        or len(name) > MAX_NAME_LENGTH
         or FORBIDDEN & set(name)
         or not name.isprintable()
     ):
@@ -120,29 +123,33 @@ def _brdf(entry: Record, basis: Basis) -> PrincipalBRDF:
             f"is {shown(value)}; expected three rows of 1 to {basis.count} numbers", "coefficients"
         )
     if any(not isinstance(row, list) or len(row) != width for row in rows):
-        raise entry.error("has rows of different lengths", "coefficients")
+        raise entry.error("has rows of different lengths; expected equal lengths", "coefficients")
     found = entry.numbers("coefficients", 3 * width).reshape(3, width)
-    if np.abs(found).max() > BEYOND:
-        raise entry.error(f"holds numbers beyond {BEYOND:g}", "coefficients")
+    if np.abs(found).max() > MAX_COEFFICIENT:
+        raise entry.error(
+            f"holds numbers beyond ±{MAX_COEFFICIENT:g}; the file is damaged", "coefficients"
+        )
     brdf = PrincipalBRDF(basis, found)
-    if brdf.log_table.values.max() > BRIGHTEST:
-        raise entry.error("make a reflectance beyond all measure", "coefficients")
+    if brdf.log_table.values.max() > MAX_LOG_RHO:
+        raise entry.error(
+            "give a reflectance that no material has; the file is damaged", "coefficients"
+        )
     return brdf
 
 
 def _principled(entry: Record) -> Principled:
-    """The inputs that the file names, the others as the node has them."""
-    told: dict[str, Any] = {}
+    """The Principled BSDF: inputs from the file, defaults of the node for missing ones."""
+    inputs: dict[str, Any] = {}
     for name, default in vars(Principled()).items():
         if name not in entry:
             continue
         if np.ndim(default):
-            told[name] = entry.numbers(name, np.size(default))
-            if told[name].min() < 0 or told[name].max() > BEYOND:
-                raise entry.error("is no colour; expected numbers from 0", name)
+            inputs[name] = entry.numbers(name, np.size(default))
+            if inputs[name].min() < 0 or inputs[name].max() > MAX_COEFFICIENT:
+                raise entry.error("is not a colour; expected numbers from 0", name)
         else:
-            told[name] = _within(entry, name, *RANGES.get(name, (0.0, 1.0)))
-    return Principled(**told)
+            inputs[name] = _within(entry, name, *RANGES.get(name, (0.0, 1.0)))
+    return Principled(**inputs)
 
 
 def _held_out(entry: Record) -> HeldOutError | None:

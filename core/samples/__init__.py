@@ -1,4 +1,5 @@
-"""One table of reflectance samples: who saw what, under which angles, how reliable."""
+"""The table of reflectance samples that all estimators read, how samples are taken and how many are
+kept."""
 
 from .criterion import Criterion
 from .measured_points import MeasuredPoints

@@ -1,4 +1,4 @@
-"""What decides whether a pixel of a lit photo becomes a sample."""
+"""The criteria that decide whether a pixel of a lit photo becomes a sample."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 
 
 class Criterion(IntEnum):
-    """Of several that speak against a pixel the lowest decides; the highest are those that nothing
-    speaks against.
+    """The reason why a pixel is rejected. Where several apply, the lowest value decides; RELIABLE,
+    the highest, means that none applies.
 
-    NO_SURFACE: no mesh behind the pixel; NO_MATERIAL: no mask and no face says what it is;
-    SHADOW_MASK, HIGHLIGHT_MASK, IGNORE_MASK: painted as left out; TURNED_AWAY: the surface faces
-    away from its light; CAST_SHADOW: something of the mesh stands between; SHADOW_EDGE, OUTLINE,
-    GRAZING, MASK_BORDER: within the Margins; UNUSABLE: clipped, or in none of a bracket's
-    exposures; MISSED: the light all but misses it (beside a narrow beam); CURVED: more curved than
-    the paper's method believes; RELIABLE: a sample.
+    NO_SURFACE: no mesh behind the pixel; NO_MATERIAL: neither a mask nor a face assigns a material;
+    SHADOW_MASK, HIGHLIGHT_MASK, IGNORE_MASK: excluded by a painted mask; TURNED_AWAY: the surface
+    faces away from its light; CAST_SHADOW: the mesh occludes the light; SHADOW_EDGE, OUTLINE,
+    GRAZING, MASK_BORDER: within the Margins; UNUSABLE: clipped, or in none of the exposures of a
+    bracket; OUTSIDE_BEAM: almost no light arrives, as outside a narrow beam; CURVED: above the
+    curvature limit of the paper's method; RELIABLE: a sample.
     """
 
     NO_SURFACE = 0
@@ -32,14 +32,14 @@ class Criterion(IntEnum):
     GRAZING = 9
     MASK_BORDER = 10
     UNUSABLE = 11
-    MISSED = 12
+    OUTSIDE_BEAM = 12
     CURVED = 13
     RELIABLE = 14
 
 
-def against(criterion: Criterion, pixels: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """The criterion at ``pixels``, RELIABLE elsewhere: the least of several such decides. (A
-    product, since choosing between two numbers takes ten times as long.)"""
+def criterion_where(criterion: Criterion, pixels: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """(n,) the criterion at ``pixels``, RELIABLE elsewhere: the minimum of several such arrays
+    decides. (A product, since np.where takes ten times as long.)"""
     return np.uint8(Criterion.RELIABLE) - pixels.view(np.uint8) * np.uint8(
         Criterion.RELIABLE - criterion
     )

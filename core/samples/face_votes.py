@@ -1,4 +1,4 @@
-"""Which material each face is of, by the masks of all photos that see it."""
+"""Assign a material to each face by the masks of all photos that show it."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from ..scan import Mesh
 
 @dataclass
 class FaceVotes:
-    """counts: (materials, faces): pixels that saw the face and were masked as the material."""
+    """counts: (materials, faces) number of pixels that show the face inside the material's mask."""
 
     counts: NDArray[np.int64]
 
     @classmethod
     def empty(cls, faces: int, materials: int) -> FaceVotes:
+        """No votes yet."""
         return cls(np.zeros((materials, faces), np.int64))
 
     def add(self, material: int, faces: NDArray[np.int32]) -> None:
@@ -26,7 +27,8 @@ class FaceVotes:
         self.counts[material] += np.bincount(faces, minlength=self.counts.shape[1])
 
     def winners(self, mesh: Mesh) -> NDArray[np.int32]:
-        """(f,) the material with most votes; a face nobody saw follows its nearest neighbour."""
+        """(f,) the material with most votes; a face without votes takes that of its nearest
+        neighbour with votes."""
         winners = self.counts.argmax(axis=0).astype(np.int32)
         voted = self.counts.sum(axis=0) > 0
         if voted.any() and not voted.all() and len(self.counts) > 1:

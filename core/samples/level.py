@@ -1,4 +1,4 @@
-"""Reflectance of unknown scale, brought to the level of measured materials."""
+"""Scale reflectance of unknown scale to the level of the measured materials."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from .weighted import median
 def at_typical_level(table: SampleTable, basis: Basis) -> tuple[SampleTable, float]:
     """(the table with ρ multiplied, the factor).
 
-    Nielsen's mapping has a fixed ε and a mean: it is not blind to scale. Where the irradiance is
+    Nielsen's mapping has a fixed ε and a mean, so it depends on scale. Where the irradiance is
     unknown the samples are first scaled so that their median ρ·cosMap is that of the basis' mean
-    material at the same angles; then the fit does not depend on the photos' unit.
+    material at the same angles. The fit then does not depend on the unit of the photos.
     """
     some = table.select(np.arange(0, len(table), max(1, len(table) // 20_000)))
     centre, _ = basis.rows(some.angles, 0)

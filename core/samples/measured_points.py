@@ -1,4 +1,5 @@
-"""The samples that a chart shows over its curves: few enough to keep, spread over what was seen."""
+"""The samples that a chart shows with its curves: few enough to store, spread over the sampled
+directions."""
 
 from __future__ import annotations
 
@@ -11,14 +12,17 @@ from ..angles import Angles
 from .reservoir import sample_hash, water_level
 from .table import SampleTable
 
-MOST = 6000
-CELLS = (30, 15)  # of √θh and θd: each keeps its share, so that highlights are not crowded out
+MAX_POINTS = 6000
+CELLS = (
+    30,
+    15,
+)  # in √θh and θd: the points are shared out between cells, so that highlights keep some
 
 
 @dataclass(frozen=True)
 class MeasuredPoints:
-    """n samples of one material. angles: (n,) each, of the scanned normal; rho: (n, 3) 1/sr;
-    photo: (n,) number of the photo."""
+    """n samples of one material. angles: (n,) each, radians, of the scanned normal; rho: (n, 3) in
+    1/sr; photo: (n,) index of the photo."""
 
     angles: Angles
     rho: NDArray[np.float32]
@@ -34,8 +38,9 @@ class MeasuredPoints:
         )
 
     @staticmethod
-    def of(table: SampleTable, most: int = MOST) -> MeasuredPoints:
-        """At most so many of a table's that photos say all of, the same whatever its order."""
+    def of(table: SampleTable, most: int = MAX_POINTS) -> MeasuredPoints:
+        """At most ``most`` complete samples of a table (SampleTable.read); the choice does not
+        depend on their order."""
         if not (read := table.read).all():
             table = table.select(read)
         across, along = CELLS
@@ -57,7 +62,7 @@ class MeasuredPoints:
 
     @staticmethod
     def from_rows(rows: NDArray[np.floating]) -> MeasuredPoints:
-        """What ``rows`` made."""
+        """The inverse of ``rows``."""
         angles = Angles(*(rows[:, k].astype(np.float32) for k in range(3)))
         return MeasuredPoints(angles, rows[:, 3:6].astype(np.float32), rows[:, 6].astype(np.int16))
 

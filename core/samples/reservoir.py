@@ -1,10 +1,11 @@
-"""A uniform part of more samples than an estimator needs, the same whoever brings them when.
+"""A uniform subset of the samples where there are more than an estimator needs, independent of the
+order in which they arrive.
 
 Bottom-k sampling (Cohen & Kaplan 2007, "Summarizing data using bottom-k sketches"): every sample
-has a number that looks random, a hash of photo and pixel, and those with the smallest are kept. So
-the choice depends on neither order, pieces nor threads. Photos get equal room, and what one does
-not need goes to the others. Within a photo all angles are thinned alike: what is rare by the scan's
-normals is partly what wrong normals make so; keeping more of it did not help.
+has a pseudo-random number, a hash of photo and pixel, and those with the smallest numbers are kept.
+The choice therefore depends on neither order, batches nor threads. Photos get equal room; what one
+does not need goes to the others. Within a photo all angles are thinned alike: angles that are rare
+by the scan's normals are partly the result of wrong normals, and keeping more of them did not help.
 """
 
 from __future__ import annotations
@@ -16,13 +17,13 @@ from numpy.typing import NDArray
 
 from .table import SampleTable
 
-SIZE = 500_000
+SIZE = 500_000  # samples of one material
 ALL = np.uint64(2**64 - 1)
 
 
 def sample_hash(photo: NDArray[np.integer], pixel: NDArray[np.integer]) -> NDArray[np.uint64]:
-    """(n,) a number for every pixel (n,) of photos (n,): no two are equal (the finaliser of
-    SplitMix64 is a bijection: Steele, Lea & Flood 2014, "Fast splittable pseudorandom number
+    """(n,) a unique pseudo-random number for each pixel (n,) of photos (n,): the finaliser of
+    SplitMix64, a bijection (Steele, Lea & Flood 2014, "Fast splittable pseudorandom number
     generators")."""
     z = photo.astype(np.uint64) << np.uint64(32)
     z |= pixel.astype(np.uint64)
@@ -35,40 +36,44 @@ def sample_hash(photo: NDArray[np.integer], pixel: NDArray[np.integer]) -> NDArr
 
 
 def water_level(counts: NDArray[np.integer], size: int) -> int:
-    """The most that each may keep so that all together keep no more than ``size``; counts: (c,)
-    what they have."""
+    """The largest number that each may keep so that all together keep at most ``size``; counts:
+    (c,) how many each has."""
     counts = np.sort(counts[counts > 0])
     if counts.sum() <= size:
         return int(counts[-1]) if len(counts) else 0
-    kept = np.concatenate([[0], np.cumsum(counts)[:-1]])  # by the smaller ones, whole
+    kept = np.concatenate(
+        [[0], np.cumsum(counts)[:-1]]
+    )  # by all smaller ones, which are kept whole
     left = np.arange(len(counts), 0, -1)
     full = np.flatnonzero(kept + counts * left > size)[0]  # the first that cannot be kept whole
     return int((size - kept[full]) // left[full])
 
 
 class SampleReservoir:
-    """At most ``size`` samples of one material from all ``photos``, but one of every photo in any
-    case; a SampleSink.
+    """Keeps at most ``size`` samples of one material from ``photos`` photos, at least one of every
+    photo; a SampleSink.
 
-    Where there are no more than ``size`` all are kept. Otherwise the rows' ``weight`` says how many
-    samples of their photo each stands for. The one sample that is brightest for its light (mean of
-    L / E) is kept beyond that: the paper takes it for the specular peak.
+    Up to ``size`` samples are all kept. Otherwise ``weight`` of a row says how many samples of its
+    photo it represents. The one sample that is brightest relative to its irradiance (mean of L / E)
+    is kept in addition: the paper assumes that it is the specular peak (equation (9)).
     """
 
     def __init__(self, photos: int, size: int = SIZE) -> None:
         self.size = size
         self._parts: list[SampleTable] = []
         self._hashes: list[NDArray[np.uint64]] = []
-        self._waiting = 0
-        self._counts = np.zeros(max(photos, 1), np.int64)  # what came, kept or not
-        self._limits = np.full(max(photos, 1), ALL)  # of a photo: hashes above are out
+        self._pending = 0
+        self._counts = np.zeros(max(photos, 1), np.int64)  # samples added, kept or not
+        self._limits = np.full(
+            max(photos, 1), ALL
+        )  # of a photo: samples with larger hashes are dropped
         self._brightest: tuple[float, int, SampleTable] | None = None  # L / E, −place, the sample
 
     def add(self, photo: int, table: SampleTable) -> None:
-        """Some samples of one photo."""
+        """Add some samples of one photo."""
         if not len(table):
             return
-        self._look_for_brighter(table)
+        self._update_brightest(table)
         self._counts[photo] += len(table)
         number = sample_hash(table.photo, table.pixel)
         if self._limits[photo] < ALL:
@@ -78,15 +83,15 @@ class SampleReservoir:
             table, number = table.select(rows), number[rows]
         self._parts.append(table)
         self._hashes.append(number)
-        self._waiting += len(table)
-        if self._waiting > self.size:
-            self._settle()
+        self._pending += len(table)
+        if self._pending > self.size:
+            self._prune()
 
     def table(self) -> SampleTable:
-        """What was kept, in the order of photo and pixel."""
+        """The samples that were kept, in the order of photo and pixel."""
         if not self._parts:
             return SampleTable.empty()
-        self._settle()
+        self._prune()
         found = SampleTable.concatenate(self._parts)
         kept = np.bincount(found.photo, minlength=len(self._counts))
         each = (self._counts / np.maximum(kept, 1)).astype(np.float32)
@@ -101,7 +106,8 @@ class SampleReservoir:
             return found
         return found.select(np.argsort(place, kind="stable"))
 
-    def _look_for_brighter(self, table: SampleTable) -> None:
+    def _update_brightest(self, table: SampleTable) -> None:
+        """Remember the sample with the largest mean of L / E."""
         light = table.radiance[:, 0] / table.irradiance[:, 0]
         for channel in (1, 2):
             light += table.radiance[:, channel] / table.irradiance[:, channel]
@@ -111,10 +117,10 @@ class SampleReservoir:
         if self._brightest is None or found > self._brightest[:2]:
             self._brightest = (*found, one)
 
-    def _settle(self) -> None:
-        """Drop what is out. Counts only grow, so a photo's room only shrinks: what is dropped now
-        would be in the end."""
-        self._waiting = 0
+    def _prune(self) -> None:
+        """Drop samples above the limits. Counts only grow, so the room of a photo only shrinks:
+        what is dropped now would be dropped in the end."""
+        self._pending = 0
         if self._counts.sum() <= self.size:
             return
         room = max(1, water_level(self._counts, self.size))

@@ -1,4 +1,4 @@
-"""Who wants the samples as they are taken, a piece of a photo at a time."""
+"""The interface of consumers of samples, which arrive in pieces of a photo."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from .table import SampleTable
 
 
 class SampleSink(Protocol):
-    """Takes the samples of one material. They come in the order of photos and rows, in pieces of
-    any size, each of one photo; a piece is not kept by anybody else."""
+    """Consumes the samples of one material. They arrive in the order of photos and rows, in pieces
+    of any size, each of one photo. The caller does not keep a piece."""
 
     def add(self, photo: int, table: SampleTable) -> None:
-        """Samples of a photo's piece; table.photo holds its number. Arrays may be read-only."""
+        """Samples of a piece of a photo; table.photo holds its index. Arrays may be read-only."""

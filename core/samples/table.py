@@ -1,4 +1,4 @@
-"""The table every estimator reads."""
+"""The table of samples that every estimator reads."""
 
 from __future__ import annotations
 
@@ -13,19 +13,20 @@ from ..angles import Angles
 
 @dataclass(frozen=True)
 class SampleTable:
-    """n reflectance samples; row i is one pixel of one photo.
+    """n reflectance samples; row i is one pixel of one photo. Vectors are in the scan frame.
 
-    photo: (n,) int16 index of the photo; pixel: (n,) int32 flat index in it.
-    theta_h, theta_d, phi_d: (n,) float32, radians, of the scanned normal.
-    cos_i, cos_o: (n,) float32. rho: (n, 3) float32, L / (E · cos θi), 1/sr.
-    radiance: (n, 3) float32, the photo's units. irradiance: (n, 3) float32 at normal incidence.
-    light: (n, 3) float32 unit direction surface → light, scan frame.
-    point: (n, 3) float64, where on the surface; normal, view: (n, 3) float32 unit; scan frame.
-    curvature: (n,) float32, 1/pixel, NaN unknown.
-    weight: (n,) float32, how many samples the row stands for where not all were kept, else 1.
-    response: (n, 3) float32, what the photo says more per radiance more: 1 unless a diagnosis took
-    back what the camera did; 0 where the photo says nothing, a clipped channel being what the
-    diagnosis predicts of it.
+    - photo: (n,) int16 index of the photo; pixel: (n,) int32 flat index in it.
+    - theta_h, theta_d, phi_d: (n,) float32, radians, relative to the scanned normal.
+    - cos_i, cos_o: (n,) float32. rho: (n, 3) float32, L / (E · cos θi), 1/sr.
+    - radiance: (n, 3) float32, in the photo's units. irradiance: (n, 3) float32 at normal
+      incidence.
+    - light: (n, 3) float32 unit vector surface → light.
+    - point: (n, 3) float64, on the surface, scan units; normal, view: (n, 3) float32 unit vectors.
+    - curvature: (n,) float32 image-space mean curvature, 1/pixel, NaN where unknown.
+    - weight: (n,) float32, how many samples the row represents where not all were kept, else 1.
+    - response: (n, 3) float32, derivative of the recorded value by radiance: 1 unless a diagnosis
+      corrected the camera's response; 0 where a channel is clipped and its radiance was predicted
+      by the diagnosis.
     """
 
     photo: NDArray[np.int16]
@@ -51,11 +52,12 @@ class SampleTable:
 
     @property
     def angles(self) -> Angles:
+        """Half/difference angles, (n,) each, radians."""
         return Angles(self.theta_h, self.theta_d, self.phi_d)
 
     @property
     def read(self) -> NDArray[np.bool_]:
-        """(n,) whether the photo says all of it."""
+        """(n,) whether all channels were recorded: none was clipped and predicted."""
         return (self.response > 0).all(axis=1)
 
     def select(self, which: NDArray) -> SampleTable:
@@ -79,7 +81,7 @@ class SampleTable:
 
     @staticmethod
     def concatenate(tables: Sequence[SampleTable]) -> SampleTable:
-        """Tables that speak of the same photos, one after the other (at least one)."""
+        """Tables with the same photo indices, one after the other (at least one)."""
         if len(tables) == 1:
             return tables[0]
         return SampleTable(
@@ -91,7 +93,7 @@ class SampleTable:
 
     @staticmethod
     def empty() -> SampleTable:
-        """No samples at all."""
+        """A table without samples."""
         flat, vectors = np.zeros(0, np.float32), np.zeros((0, 3), np.float32)
         return SampleTable(
             photo=np.zeros(0, np.int16), pixel=np.zeros(0, np.int32),
@@ -103,5 +105,5 @@ class SampleTable:
 
     @staticmethod
     def prepend(one: SampleTable, rest: SampleTable) -> SampleTable:
-        """Both tables speak of the same photos."""
+        """One table before another with the same photo indices."""
         return SampleTable.concatenate([one, rest])

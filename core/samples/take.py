@@ -1,4 +1,4 @@
-"""Reflectance samples of one photo under one light (the paper, section 3.1)."""
+"""Reflectance samples of one photo under one light (Ono et al. 2019, section 3.1)."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from ..geometry import RayScene, SurfaceView, edges
 from ..geometry.view import cast_shadow
 from ..light import Incidence, Light
 from ..scan import Camera
-from .criterion import Criterion, against
+from .criterion import Criterion, criterion_where
 from .table import SampleTable
 
-DARKEST = 1e-30  # irradiance
+MIN_IRRADIANCE = 1e-30
 
 
 @dataclass(frozen=True)
 class Margins:
-    """What is too close to trust. silhouette, shadow, mask: pixels left out along outlines, shadow
-    edges and the borders of painted masks; cosine: smallest cos θi and cos θo (0.1 is 84°: beyond,
-    a degree of normal error changes the irradiance by a fifth)."""
+    """Distances within which a pixel is rejected. silhouette, shadow, mask: pixels from outlines,
+    shadow edges and the borders of painted masks; cosine: smallest cos θi and cos θo (0.1 is 84°:
+    beyond, an error of 1° in the normal changes the irradiance by a fifth)."""
 
     silhouette: int = 2
     shadow: int = 3
@@ -34,8 +34,8 @@ class Margins:
 
 @dataclass(frozen=True)
 class Lighting:
-    """How light falls on a SurfaceView: incidence at every pixel's point; cos_i (n,) signed,
-    float32; shadowed (n,) attached or cast."""
+    """The light on a SurfaceView: incidence at every pixel's point; cos_i (n,) float32, negative
+    where the surface faces away; shadowed (n,) by an attached or cast shadow."""
 
     incidence: Incidence
     cos_i: NDArray[np.float32]
@@ -43,34 +43,38 @@ class Lighting:
 
 
 def light_surface(rays: RayScene, view: SurfaceView, light: Light, camera: Camera) -> Lighting:
-    """Light, irradiance cosine and shadow at every pixel's point, in the camera's photo."""
+    """Incidence, cos θi and shadow at every pixel's point of a view."""
     incidence = light.incidence(view.point, camera)
     cos_i = dot(_single(view.normal), _single(incidence.towards))
     shadowed = cos_i <= 0
     facing = np.flatnonzero(~shadowed)
     some = incidence.select(facing)
     shadowed[facing] = cast_shadow(
-        rays, _kept(view.point, facing), _kept(view.normal, facing), some.towards, some.distance
+        rays,
+        _gathered(view.point, facing),
+        _gathered(view.normal, facing),
+        some.towards,
+        some.distance,
     )
     return Lighting(incidence, cos_i, shadowed)
 
 
 def halo(margins: Margins) -> int:
-    """Rows around a window that its margins, outlines and curvature look at."""
+    """Rows around a window that margins, outlines and curvature depend on."""
     return max(1, margins.silhouette, margins.shadow, margins.mask)
 
 
 def light_criteria(view: SurfaceView, lighting: Lighting, margins: Margins) -> NDArray[np.uint8]:
-    """(n,) the Criterion that decides about each pixel as far as the light and the view go:
-    shadows and their edges, outlines, grazing angles; RELIABLE elsewhere."""
+    """(n,) the Criterion of each pixel as far as light and view decide: shadows and their edges,
+    outlines, grazing angles; RELIABLE elsewhere."""
     near = np.full(view.shape, Criterion.RELIABLE, np.uint8)
     if margins.silhouette > 0:
         outline = edges.widen(view.silhouette, margins.silhouette - 1)
-        near = against(Criterion.OUTLINE, outline)
+        near = criterion_where(Criterion.OUTLINE, outline)
     if margins.shadow > 0:
         lit = view.image(~lighting.shadowed, fill=0)
         edge = edges.widen(edges.shadow_edge(lit, view.seen), margins.shadow - 1)
-        np.minimum(near, against(Criterion.SHADOW_EDGE, edge), out=near)
+        np.minimum(near, criterion_where(Criterion.SHADOW_EDGE, edge), out=near)
     found = view.at(near)
     steep = (lighting.cos_i > margins.cosine) & (dot(view.normal, view.view) > margins.cosine)
     for criterion, pixels in (
@@ -78,7 +82,7 @@ def light_criteria(view: SurfaceView, lighting: Lighting, margins: Margins) -> N
         (Criterion.CAST_SHADOW, lighting.shadowed),
         (Criterion.TURNED_AWAY, lighting.cos_i <= 0),
     ):
-        np.minimum(found, against(criterion, pixels), out=found)
+        np.minimum(found, criterion_where(criterion, pixels), out=found)
     return found
 
 
@@ -90,7 +94,7 @@ def trusted_pixels(view: SurfaceView, lighting: Lighting, margins: Margins) -> N
 def inner_pixels(
     view: SurfaceView, pixels: NDArray[np.bool_], margins: Margins
 ) -> NDArray[np.bool_]:
-    """(n,) of the pixels (n,) of a mask those away from its borders with other surface."""
+    """(n,) those of the pixels (n,) of a mask that are not near its borders with other surface."""
     if margins.mask <= 0 or pixels.all():
         return pixels
     part = view.image(pixels, fill=0)
@@ -106,11 +110,11 @@ def deciding_criteria(
     usable: NDArray[np.bool_],
     calm: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.uint8]:
-    """(n,) the Criterion that decides about each pixel of a view.
+    """(n,) the Criterion of each pixel of a view.
 
-    materials: (n,) pixels of each; left_out: (criterion, (n,) pixels) of masks;
-    usable: (n,) of the photo; calm: (n,) where the fit believes no others, else None. A
-    pixel of several materials is at a mask's border where it is so in all of them.
+    materials: (n,) pixels of each; left_out: (criterion, (n,) pixels) of masks; usable: (n,)
+    neither clipped nor otherwise lost in the photo; calm: (n,) below the curvature limit, None for
+    no limit. A pixel of several materials is at a mask border where it is so in all of them.
     """
     some = np.zeros(len(view.pixel), bool)
     inner = some.copy()
@@ -118,18 +122,18 @@ def deciding_criteria(
         some |= pixels
         inner |= inner_pixels(view, pixels, margins)
     reached = _reached(_single(lighting.incidence.irradiance))
-    doubts = [
+    rejections = [
         (Criterion.NO_MATERIAL, ~some),
         *left_out,
         (Criterion.MASK_BORDER, ~inner),
         (Criterion.UNUSABLE, ~usable),
-        (Criterion.MISSED, ~reached),
+        (Criterion.OUTSIDE_BEAM, ~reached),
     ]
     if calm is not None:
-        doubts.append((Criterion.CURVED, ~calm))
+        rejections.append((Criterion.CURVED, ~calm))
     found = light_criteria(view, lighting, margins)
-    for criterion, pixels in doubts:
-        np.minimum(found, against(criterion, pixels), out=found)
+    for criterion, pixels in rejections:
+        np.minimum(found, criterion_where(criterion, pixels), out=found)
     return found
 
 
@@ -143,11 +147,11 @@ def sample_photo(
     """ρ = L / (E · n·l) for the pixels of ``view`` marked in ``keep`` (n,).
 
     radiance: (h, w, 3) of the whole photo, linear, in the units of the light's irradiance / sr.
-    photo: the number that the table says. Pixels that their light all but misses (beside a narrow
-    beam) have no reflectance that single precision holds, and are left out.
+    photo: index written to the table. Pixels that almost no light reaches (outside a narrow beam)
+    are skipped: their reflectance cannot be represented in single precision.
     """
     rows = np.flatnonzero(keep)
-    normal, towards = (_kept(_single(v), rows) for v in (view.normal, view.view))
+    normal, towards = (_gathered(_single(v), rows) for v in (view.normal, view.view))
     incidence = lighting.incidence.select(rows)
     light, irradiance = _single(incidence.towards), _single(incidence.irradiance)
     reached = _reached(irradiance)
@@ -173,7 +177,7 @@ def sample_photo(
         cos_o=dot(normal, towards),
         rho=rho,
         radiance=seen,
-        point=_kept(view.point, rows),
+        point=_gathered(view.point, rows),
         normal=normal,
         view=towards,
         curvature=view.curvature.take(rows),
@@ -185,20 +189,21 @@ def sample_photo(
 
 
 def _reached(irradiance: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """(n,), or (1,) for all: where single precision holds a reflectance under this irradiance."""
-    return (irradiance > DARKEST).all(axis=1)
+    """(n,), or (1,) for all: where the irradiance is large enough for a reflectance in single
+    precision."""
+    return (irradiance > MIN_IRRADIANCE).all(axis=1)
 
 
 def _single(values: NDArray[np.floating]) -> NDArray[np.float32]:
-    """(n, 3) in float32; (1, 3) where one row stands for all."""
+    """(n, 3) in float32; (1, 3) where one row applies to all."""
     if len(values) and values.strides[0] == 0:
         values = values[:1]
     return values.astype(np.float32, copy=False)
 
 
-def _kept(values: NDArray[np.floating], rows: NDArray[np.intp]) -> NDArray[np.floating]:
-    """(m, 3) rows, their components side by side in memory: three long rows are read faster than
-    many of three."""
+def _gathered(values: NDArray[np.floating], rows: NDArray[np.intp]) -> NDArray[np.floating]:
+    """(m, 3) rows in component-major memory order: three long rows are read faster than many short
+    ones."""
     out = np.empty((3, len(rows)), values.dtype)
     for axis in range(3):
         out[axis] = values[:, axis].take(rows)

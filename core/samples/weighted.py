@@ -1,4 +1,4 @@
-"""Statistics of all samples from those that were kept of them."""
+"""Statistics of all samples, computed from those that were kept."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from .table import SampleTable
 
 
 def thinned(table: SampleTable) -> bool:
-    """Whether rows stand for more than themselves."""
+    """Whether rows represent more than one sample."""
     return bool(len(table) and table.weight.max() > 1)
 
 
 def median(values: NDArray[np.floating], weight: NDArray[np.floating]) -> float:
-    """Of values (n,), n > 0, each of which counts as ``weight`` (n,)."""
+    """Weighted median of values (n,), n > 0, with weights (n,)."""
     if (weight == weight[0]).all():
         return float(np.median(values))
     order = np.argsort(values, kind="stable")

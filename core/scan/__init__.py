@@ -1,4 +1,4 @@
-"""What a reconstruction tool wrote, as a Scan: mesh and cameras in one frame. One reader a file."""
+"""Read a reconstruction tool's files as a Scan: mesh and cameras in one frame."""
 
 from .camera import Camera, Pose
 from .mesh import Mesh

@@ -13,8 +13,8 @@ from .lenses.fold import beyond_fold
 
 Array = NDArray[np.float64]
 
-ROUNDED = 0.75  # pixels a side: what rounding the size of a scaled copy can cost
-NO_SCALE = 0.02  # nobody scales a photo by less: it was cropped
+SIZE_ROUNDING = 0.75  # pixels per side that rounding can change the size of a scaled copy by
+MIN_SCALE_CHANGE = 0.02  # a smaller relative change of the width means that the photo was cropped
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Pose:
 
     @property
     def centre(self) -> Array:
-        """(3,) the camera's centre in the scan's frame."""
+        """(3,) the camera's centre in the scan's frame, scan units."""
         return -self.rotation.T @ self.translation
 
 
@@ -34,10 +34,10 @@ class Pose:
 class Camera:
     """One camera of the scan.
 
-    label: the name its photo has in the scan (unique).
-    model, parameters: the lens (lens.py): one of COLMAP's camera models, or one of our own where
-    COLMAP has none that is exact; pixels; the centre of the top left pixel is at (0.5, 0.5).
-    photo: the photo's path as the scan's tool wrote it, where it did.
+    label: unique name of its photo in the scan. model, parameters: the lens (lens.py): one of
+    COLMAP's camera models, or one of Patina's own where COLMAP has no exact one. Pixels; the centre
+    of the top left pixel is at (0.5, 0.5). photo: path of the photo as the scan's tool wrote it,
+    where available.
     """
 
     label: str
@@ -60,12 +60,13 @@ class Camera:
 
     @property
     def panoramic(self) -> bool:
-        """True for a lens that also sees behind itself: no Blender camera stands for it."""
+        """True for a lens that covers the whole sphere. No Blender camera represents it."""
         return self.model == "EQUIRECTANGULAR"
 
     @property
     def pinhole(self) -> bool:
-        """True where the lens has neither distortion nor oblong pixels: a Blender camera is one."""
+        """True where the lens has no distortion and square pixels, so that a Blender camera
+        represents it."""
         if self.panoramic:
             return False
         lens = self.lens
@@ -81,7 +82,7 @@ class Camera:
             front = np.ones(len(points), bool)
         if front.any():
             pixels[front] = self.lens.img_from_cam(np.ascontiguousarray(in_camera[front]))
-            # a polynomial lens folds: what lies far outside must not come back into the photo
+            # a distortion polynomial can fold points far outside back into the photo
             pixels[beyond_fold(self.model, self.parameters, in_camera)] = np.nan
         return pixels
 
@@ -92,14 +93,14 @@ class Camera:
         return directions @ self.pose.rotation
 
     def ray_starts(self, pixels: Array) -> Array:
-        """(3,) where all rays start, world frame; (n, 3) for an orthographic camera."""
+        """(3,) start of all rays, world frame; (n, 3) for an orthographic camera."""
         lens = self.lens
         if not hasattr(lens, "starts"):
             return self.pose.centre
         return (lens.starts(pixels) - self.pose.translation) @ self.pose.rotation
 
     def footprint(self, depth: NDArray[np.floating]) -> NDArray[np.floating]:
-        """The width of a pixel at a depth along the ray, scan units (any shape)."""
+        """Width of a pixel at a depth along the ray, scan units (any shape)."""
         lens = self.lens
         focal = 0.5 * (lens.focal_length_x + lens.focal_length_y)
         if self.panoramic:
@@ -107,9 +108,9 @@ class Camera:
         return np.full_like(depth, 1.0 / focal) if self.orthographic else depth / focal
 
     def rectified(self) -> Camera:
-        """The distortion-free camera with square pixels nearest to this one: same size, same pose.
+        """The nearest distortion-free camera with square pixels, of the same size and pose.
 
-        Blender's cameras are such pinholes; the photo behind them is resampled with
+        Blender's cameras are such pinholes. The photo is resampled for them with
         :func:`patina.core.geometry.rectify.rectify`.
         """
         lens = self.lens
@@ -117,24 +118,28 @@ class Camera:
         focal = 0.5 * (lens.focal_length_x + lens.focal_length_y)
         if self.orthographic:
             return replace(self, parameters=(focal, focal, cx, cy))
-        if self.panoramic:  # its forward third
+        if self.panoramic:  # 127° around the forward direction
             focal, cx, cy = self.width / 4, self.width / 2, self.height / 2
         return replace(self, model="SIMPLE_PINHOLE", parameters=(focal, cx, cy))
 
     def resized(self, width: int, height: int) -> Camera:
-        """The camera of a scaled copy of its photo. Raises PatinaError where the aspect differs:
-        the photo was cropped or turned."""
+        """The camera of a scaled copy of its photo. Raises PatinaError where the aspect ratio
+        differs: the photo was cropped or rotated."""
         if (width, height) == (self.width, self.height):
             return self
-        least = max((width - ROUNDED) / self.width, (height - ROUNDED) / self.height)
-        most = min((width + ROUNDED) / self.width, (height + ROUNDED) / self.height)
-        cropped = abs(width / self.width - 1.0) < NO_SCALE
-        if least > most or cropped:
+        min_scale = max(
+            (width - SIZE_ROUNDING) / self.width, (height - SIZE_ROUNDING) / self.height
+        )
+        max_scale = min(
+            (width + SIZE_ROUNDING) / self.width, (height + SIZE_ROUNDING) / self.height
+        )
+        cropped = abs(width / self.width - 1.0) < MIN_SCALE_CHANGE
+        if min_scale > max_scale or cropped:
             quarter = (height > width) != (self.height > self.width)
-            turned = " (is it turned by a quarter?)" if quarter else ""
+            rotated = " (is it rotated by 90°?)" if quarter else ""
             raise PatinaError(
-                f"{width} × {height} pixels are no scaled copy of the camera's {self.width} × "
-                f"{self.height}{turned}"
+                f"the photo has {width} × {height} pixels; expected a scaled copy of the camera's "
+                f"{self.width} × {self.height}{rotated}; do not crop or rotate it"
             )
         parameters = resized_parameters(
             self.model, self.parameters, (self.width, self.height), (width, height)

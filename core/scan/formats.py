@@ -1,4 +1,4 @@
-"""Which reader reads what: one format of a reconstruction tool a module."""
+"""Choose the reader for a file: each reader module handles one reconstruction tool's format."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ BY_SUFFIX = {
     ".csv": "realityscan",
     ".xmp": "realityscan",
 }
-READ = (
+SUPPORTED = (
     "a COLMAP model folder, Metashape .xml, .psx or .psz, Bundler .out, VisualSFM .nvm, Meshroom "
     ".sfm, transforms.json, RealityScan .csv or a folder of .xmp files, OpenMVG sfm_data.json or "
     "OpenSfM reconstruction.json"
@@ -34,10 +34,10 @@ READ = (
 def read_reconstruction(
     path: Path, images: Path | None = None, chunk: str | None = None
 ) -> Reconstruction:
-    """Cameras, points and frames of any model Patina reads. Raises InputError.
+    """Cameras, points and frames of any supported model. Raises InputError.
 
-    images: folder of the scan's own photos, for formats that do not say how large these are.
-    chunk: which part of a project, by its label, where it holds several.
+    images: folder of the scan's own photos, for formats that do not hold their sizes. chunk: label
+    of the part of a project, where it holds several.
     """
     if path.is_dir():
         return _folder(path, images, chunk)
@@ -46,29 +46,33 @@ def read_reconstruction(
     suffix = path.suffix.lower()
     name = _json_format(path) if suffix == ".json" else BY_SUFFIX.get(suffix)
     if name is None:
-        raise InputError(f"cameras of this kind are not read; expected {READ}", file=path)
+        raise InputError(
+            f"this type of camera file is not supported; expected {SUPPORTED}", file=path
+        )
     return _reader(name)(path, images, chunk)
 
 
 def _reader(name: str) -> Reader:
-    """read_NAME of the module NAME in readers/."""
+    """The function read_NAME of the module NAME in readers/."""
     return getattr(import_module(f".readers.{name}", __package__), f"read_{name}")
 
 
 def _folder(path: Path, images: Path | None, chunk: str | None) -> Reconstruction:
     if chunk is not None:
-        raise InputError("a folder has no chunks; expected one in a Metashape file", file=path)
+        raise InputError(
+            "a folder has no chunks; expected a Metashape file, or no chunk", file=path
+        )
     if is_colmap(path):
         return read_colmap(path)
     if any(path.glob("*.xmp")):
         return _reader("realityscan")(path, images, chunk)
     near = [p for p in (path / "sparse" / "0", path / "sparse", path / "0") if is_colmap(p)]
-    hint = f"; there is one in {near[0].relative_to(path)}" if near else ""
+    hint = f"; use the one in {near[0].relative_to(path)}" if near else ""
     raise InputError(f"the folder holds no COLMAP model (cameras and images){hint}", file=path)
 
 
 def _json_format(path: Path) -> str:
-    """Several tools write .json: what is in it tells them apart."""
+    """Name of the reader for a .json, from the keys in it."""
     data = read_json(path)
     if isinstance(data, list):
         return "opensfm"
@@ -84,7 +88,7 @@ def _json_format(path: Path) -> str:
             if key in data:
                 return name
     raise InputError(
-        "is none of the .json files that are read: transforms.json (key frames), OpenMVG "
-        "(sfm_data_version), Meshroom (views), OpenSfM (shots)",
+        "is not a supported .json; expected transforms.json (key frames), OpenMVG "
+        "(sfm_data_version), Meshroom (views) or OpenSfM (shots)",
         file=path,
     )

@@ -1,4 +1,4 @@
-"""Lenses: pycolmap's camera models, and a few of our own where it has none that is exact."""
+"""Lenses: pycolmap's camera models, and Patina's own where pycolmap has no exact one."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ Array = NDArray[np.float64]
 
 
 class Lens(Protocol):
-    """What Patina asks of a lens. Camera frame: x right, y down, z forward; the centre of the top
-    left pixel is at (0.5, 0.5). pycolmap.Camera is one."""
+    """Interface of a lens; pycolmap.Camera implements it. Camera frame: x right, y down, z forward;
+    the centre of the top left pixel is at (0.5, 0.5)."""
 
     @property
     def focal_length_x(self) -> float:
@@ -46,9 +46,9 @@ class Lens(Protocol):
 
 
 def make_lens(model: str, width: int, height: int, parameters: Sequence[float]) -> Lens:
-    """A lens by the name of its model: one of COLMAP's, METASHAPE_FRAME, METASHAPE_FISHEYE (their
-    parameters: metashape_lens.py), MEASURED_RADIAL (measured_radial_lens.py) or ORTHOGRAPHIC
-    (orthographic.py). Raises ValueError."""
+    """A lens by the name of its model: one of COLMAP's, METASHAPE_FRAME, METASHAPE_FISHEYE or
+    METASHAPE_EQUISOLID (metashape_lens.py), MEASURED_RADIAL (measured_radial_lens.py) or
+    ORTHOGRAPHIC (orthographic.py). Raises ValueError."""
     if model == "ORTHOGRAPHIC":
         from .lenses.orthographic import OrthographicLens
 
@@ -67,8 +67,8 @@ def make_lens(model: str, width: int, height: int, parameters: Sequence[float]) 
 def resized_parameters(
     model: str, parameters: Sequence[float], old: tuple[int, int], new: tuple[int, int]
 ) -> tuple[float, ...]:
-    """The same lens's parameters for a photo of ``new`` pixels (width, height) instead of ``old``:
-    a scaled copy."""
+    """The lens's parameters for a scaled copy of the photo, ``new`` instead of ``old`` pixels
+    (width, height)."""
     across, down = new[0] / old[0], new[1] / old[1]
     if model == "ORTHOGRAPHIC":
         scale_x, scale_y, cx, cy = parameters

@@ -1,4 +1,4 @@
-"""A triangle mesh, with smooth vertex normals, and the way to one from a file."""
+"""A triangle mesh with smooth vertex normals, and its reader."""
 
 from __future__ import annotations
 
@@ -24,20 +24,21 @@ READERS = {
     ".glb": read_gltf,
     ".gltf": read_gltf,
 }
-LARGEST_FILE = 4 << 30  # bytes; a mesh of 10^8 triangles has as many
-SMALLEST_SIZE = 1e-12  # scan units; products of shorter edges run out of numbers
+MAX_FILE_BYTES = 4 << 30  # the size of a file with 10^8 triangles
+MIN_SIZE = 1e-12  # scan units; products of shorter edges underflow
 
 
 @dataclass(frozen=True)
 class Mesh:
     """vertices: (v, 3) float64, scan units; faces: (f, 3) int32, counter-clockwise from outside;
     face_attributes: name → (f,) int32, the integer face properties of the file; "material" is the
-    place in face_materials of a file that names materials (-1: none).
+    index into face_materials of a file with named materials (−1: none).
 
-    What a file may lack: vertex_colours (v, 3) uint8 sRGB; uv (f, 3, 2) float32 of the faces'
-    corners, u to the right, v upwards; face_materials: names; textures: one file (or None) for each
-    material, or for the whole mesh where there is one (not opened, they need not exist); notes:
-    sentences about the file that a user should read."""
+    Optional: vertex_colours: (v, 3) uint8 sRGB; uv: (f, 3, 2) float32 of the faces' corners, u to
+    the right, v upwards; face_materials: names; textures: one file (or None) for each material, or
+    one for the whole mesh (not opened; they need not exist); notes: sentences about the file for
+    the user.
+    """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int32]
@@ -50,7 +51,7 @@ class Mesh:
 
     @cached_property
     def face_normals(self) -> NDArray[np.float64]:
-        """(f, 3) unit normals of the flat triangles, 0 of those without area."""
+        """(f, 3) unit normals of the flat triangles; 0 for triangles without area."""
         corners = self.vertices[self.faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
@@ -58,13 +59,13 @@ class Mesh:
 
     @cached_property
     def vertex_normals(self) -> NDArray[np.float64]:
-        """(v, 3) unit normals, the mean of the adjoining faces weighted by their angles
-        (Thürmer & Wüthrich 1998: independent of how a surface is cut into triangles)."""
+        """(v, 3) unit normals: the mean of the adjacent face normals weighted by the angles of the
+        faces at the vertex (Thürmer & Wüthrich 1998: independent of the triangulation)."""
         corners = self.vertices[self.faces]
         face_normals = self.face_normals
-        # vertices may be split where a texture has seams; the surface is smooth across them
+        # vertices may be split at texture seams; the surface is smooth across them
         first, welded = distinct_places(self.vertices)
-        joints = welded[self.faces]
+        welded_faces = welded[self.faces]
         normals = np.zeros((len(first), 3))
         for k in range(3):
             a = corners[:, (k + 1) % 3] - corners[:, k]
@@ -72,7 +73,7 @@ class Mesh:
             angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
             for axis in range(3):
                 normals[:, axis] += np.bincount(
-                    joints[:, k], angle * face_normals[:, axis], len(normals)
+                    welded_faces[:, k], angle * face_normals[:, axis], len(normals)
                 )
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         normals = np.where(length > 1e-12, normals / np.maximum(length, 1e-12), [0.0, 0.0, 1.0])
@@ -80,7 +81,7 @@ class Mesh:
 
     @cached_property
     def size(self) -> float:
-        """Diagonal of the bounding box of what the faces use, scan units."""
+        """Diagonal of the bounding box of the vertices that faces use, scan units."""
         used = self.vertices[np.unique(self.faces)]
         return float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))
 
@@ -88,22 +89,23 @@ class Mesh:
 def read_mesh(path: Path) -> Mesh:
     """The triangles of an OBJ, PLY, STL, GLB or glTF file, in the file's own frame and unit.
 
-    Larger polygons are cut; vertices at one place (and of one colour) become one; faces without
-    area in their corner numbers and doubled ones are dropped. Raises InputError.
+    Polygons are triangulated. Vertices with equal position (and colour) are merged. Duplicate faces
+    and faces with repeated vertices are dropped. Raises InputError.
     """
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         expected = ", ".join(sorted(READERS))
         raise InputError(
-            f"mesh format {path.suffix!r} is not read, expected one of {expected}", file=path
+            f"the mesh format {path.suffix!r} is not supported; expected one of {expected}",
+            file=path,
         )
     if not path.is_file():
         raise InputError("is not a file", file=path)
     try:
         size = path.stat().st_size
-        if size > LARGEST_FILE:
+        if size > MAX_FILE_BYTES:
             raise InputError(
-                f"has {size / 2**30:.1f} GiB, expected at most {LARGEST_FILE >> 30}: "
+                f"has {size / 2**30:.1f} GiB; expected at most {MAX_FILE_BYTES >> 30} GiB; "
                 "reduce the mesh",
                 file=path,
             )
@@ -112,7 +114,7 @@ def read_mesh(path: Path) -> Mesh:
         raise InputError(f"cannot be read ({error.strerror})", file=path) from error
     if not data:
         raise InputError("is empty", file=path)
-    with np.errstate(invalid="ignore", over="ignore"):  # what is no number is refused below
+    with np.errstate(invalid="ignore", over="ignore"):  # non-finite values are rejected below
         polygons = reader(data, path)
     polygons.check(path)
     return _mesh(polygons, path)
@@ -123,15 +125,17 @@ def _mesh(polygons: Polygons, path: Path) -> Mesh:
     corners, owner = polygons.triangles(path)
     first, number = distinct_places(polygons.vertices, polygons.vertex_colours)
     faces = number.astype(np.int32)[polygons.corners[corners]]
-    keep = _proper(faces)
+    keep = _valid_faces(faces)
     if not keep.any():
-        raise InputError("the mesh has no faces but degenerate ones", file=path)
+        raise InputError(
+            "all faces of the mesh are degenerate; expected triangles with an area", file=path
+        )
     notes, uv, colours = polygons.notes, None, polygons.vertex_colours
     if polygons.corner_uv is not None:
         if np.isfinite(polygons.corner_uv).all():
             uv = polygons.corner_uv[corners[keep]]
         else:
-            notes += ("its texture coordinates are not all numbers: left out",)
+            notes += ("Some texture coordinates of the mesh are not finite; all were left out.",)
     mesh = Mesh(
         polygons.vertices[first],
         faces[keep],
@@ -142,16 +146,18 @@ def _mesh(polygons: Polygons, path: Path) -> Mesh:
         polygons.textures,
         notes,
     )
-    if mesh.size < SMALLEST_SIZE:
-        raise InputError(f"the mesh has a size of {mesh.size:.2g}, which is none", file=path)
+    if mesh.size < MIN_SIZE:
+        raise InputError(
+            f"the mesh has a size of {mesh.size:.2g}; expected at least 1e-12 units", file=path
+        )
     return mesh
 
 
-def _proper(faces: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """(f,) faces with three different corners, the first of each that stands there twice: Blender
-    keeps no others, and face numbers must mean the same on both sides."""
+def _valid_faces(faces: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """(f,) faces with three different corners, and only the first of duplicates. Blender drops the
+    others too, so that face indices agree on both sides."""
     a, b, c = faces.T
-    proper = (a != b) & (b != c) & (c != a)
-    once = np.zeros(len(faces), bool)
-    once[distinct_rows(np.sort(faces, axis=1))[0]] = True
-    return proper & once
+    valid = (a != b) & (b != c) & (c != a)
+    first_occurrence = np.zeros(len(faces), bool)
+    first_occurrence[distinct_rows(np.sort(faces, axis=1))[0]] = True
+    return valid & first_occurrence

@@ -1,4 +1,4 @@
-"""What a reconstruction tool wrote, whichever it was: cameras, sparse points, frames."""
+"""A reconstruction tool's output in a common form: cameras, sparse points, frames."""
 
 from __future__ import annotations
 
@@ -23,28 +23,30 @@ class Similarity:
 
     @classmethod
     def of_matrix(cls, matrix: Array) -> Similarity:
-        """From a 4 × 4 matrix. Raises ValueError where it is none: a reflection, a shear …"""
+        """From a 4 × 4 matrix. Raises ValueError where it is not a similarity (for example a
+        reflection or a shear)."""
         matrix = np.asarray(matrix, np.float64)
         if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
             raise ValueError("not a 4 × 4 matrix of finite numbers")
         determinant = float(np.linalg.det(matrix[:3, :3]))
         if determinant <= 0:
-            raise ValueError(f"its determinant is {determinant:g}, expected a positive one")
+            raise ValueError(f"its determinant is {determinant:g}; expected a positive value")
         scale = determinant ** (1 / 3)
         rotation = matrix[:3, :3] / scale
         if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4):
-            raise ValueError("its axes are not perpendicular and of one length")
+            raise ValueError("its axes are not perpendicular with equal lengths")
         if not np.allclose(matrix[3], (0, 0, 0, 1), atol=1e-9):
             raise ValueError("its last row is not 0 0 0 1")
         u, _, vt = np.linalg.svd(rotation)
         return cls(u @ vt, matrix[:3, 3].copy(), scale)
 
     def points(self, points: Array) -> Array:
-        """(n, 3) moved points."""
+        """(n, 3) transformed points."""
         return self.scale * points @ self.rotation.T + self.translation
 
     def camera(self, camera: Camera) -> Camera:
-        """The camera that sees the moved points where it saw the points."""
+        """The camera transformed with the scene: it sees the transformed points at the same
+        pixels."""
         rotation = camera.pose.rotation @ self.rotation.T
         centre = self.scale * self.rotation @ camera.pose.centre + self.translation
         moved = replace(camera, pose=Pose(rotation, -rotation @ centre))
@@ -56,8 +58,8 @@ class Similarity:
 
 @dataclass(frozen=True)
 class Georeference:
-    """Where on Earth a scan lies. latitude, longitude: degrees north and east, WGS84; altitude:
-    metres; east, north, up: (3,) unit, in the frame of the reconstruction's cameras."""
+    """Location of a scan on Earth. latitude, longitude: degrees north and east, WGS84; altitude:
+    metres; east, north, up: (3,) unit vectors in the frame of the reconstruction's cameras."""
 
     latitude: float
     longitude: float
@@ -69,10 +71,10 @@ class Georeference:
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """cameras: sorted by label, in one frame. points: (n, 3) sparse points; colours: (n, 3) sRGB.
-    frames: other frames a mesh of this scan may have been exported in, by name: from the cameras'
-    frame to that one. georeference: where known. notes: what was left out or assumed, a sentence
-    each."""
+    """cameras: sorted by label, in one frame. points: (n, 3) sparse points, scan units; colours:
+    (n, 3) sRGB. frames: other frames that a mesh of this scan may be in: name → transform from the
+    cameras' frame. georeference: where known. notes: sentences about what was left out or assumed.
+    """
 
     cameras: tuple[Camera, ...]
     points: Array = field(default_factory=lambda: np.zeros((0, 3)))
@@ -82,12 +84,12 @@ class Reconstruction:
     notes: tuple[str, ...] = ()
 
     def moved(self, name: str) -> Reconstruction:
-        """All of it in one of the other frames."""
+        """The reconstruction transformed to one of the other frames."""
         move = self.frames[name]
         geo = self.georeference
         if geo is not None:
-            turned = {k: move.rotation @ getattr(geo, k) for k in ("east", "north", "up")}
-            geo = replace(geo, **turned)
+            rotated = {k: move.rotation @ getattr(geo, k) for k in ("east", "north", "up")}
+            geo = replace(geo, **rotated)
         return replace(
             self,
             cameras=tuple(move.camera(camera) for camera in self.cameras),
@@ -97,26 +99,29 @@ class Reconstruction:
         )
 
 
-LARGEST_SIDE = 1 << 17  # pixels
-LARGEST_PLACE = 1e9  # scan units: a georeferenced centre is 6.4e6 m from the Earth's
+MAX_SIDE = 1 << 17  # pixels
+MAX_COORDINATE = (
+    1e9  # scan units; georeferenced (geocentric) coordinates are 6.4e6 m from the origin
+)
 
 
 def check_camera(camera: Camera, file: object) -> None:
-    """Refuse what no camera is, whatever format said so. Raises InputError naming the file."""
+    """Raise InputError, naming the file, where a camera's values are not valid, whatever the
+    format."""
     found = None
     rotation = camera.pose.rotation
-    if not (0 < camera.width <= LARGEST_SIDE and 0 < camera.height <= LARGEST_SIDE):
-        found = f"is {camera.width} × {camera.height} pixels"
+    if not (0 < camera.width <= MAX_SIDE and 0 < camera.height <= MAX_SIDE):
+        found = f"has {camera.width} × {camera.height} pixels"
     elif not np.isfinite(camera.parameters).all():
-        found = "has parameters that are not finite numbers"
+        found = "has lens parameters that are not finite"
     elif not (np.isfinite(rotation).all() and np.isfinite(camera.pose.translation).all()):
-        found = "has a pose that is not made of finite numbers"
-    elif np.abs(camera.pose.translation).max() > LARGEST_PLACE:
-        found = f"stands {np.abs(camera.pose.translation).max():.3g} units away"
+        found = "has a pose that is not finite"
+    elif np.abs(camera.pose.translation).max() > MAX_COORDINATE:
+        found = f"has a translation of {np.abs(camera.pose.translation).max():.3g} units"
     elif not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4):
-        found = "has a rotation that is none"
+        found = "has an invalid rotation matrix"
     elif np.linalg.det(rotation) < 0:
-        found = "has a rotation that mirrors"
+        found = "has a rotation matrix that mirrors"
     elif not camera.panoramic:
         lens = camera.lens
         if min(lens.focal_length_x, lens.focal_length_y) <= 1e-6:
@@ -126,7 +131,8 @@ def check_camera(camera: Camera, file: object) -> None:
 
 
 def reconstruction_of(cameras: list[Camera], file: object, **others: object) -> Reconstruction:
-    """A Reconstruction of these cameras, each checked, sorted, no label twice; else InputError."""
+    """A Reconstruction of these cameras, sorted by label. Raises InputError for an invalid camera,
+    for duplicate labels and where there is no camera."""
     seen: set[str] = set()
     for camera in cameras:
         if camera.label in seen:

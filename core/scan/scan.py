@@ -15,14 +15,15 @@ from .formats import read_reconstruction
 from .mesh import Mesh, read_mesh
 from .reconstruction import Georeference, Reconstruction
 
-SOME = 2000  # vertices asked whether cameras see them
-MUCH_BETTER = 1.2  # times as much of the mesh seen, for another frame to be believed
+VISIBILITY_SAMPLES = 2000  # vertices tested for visibility in the cameras
+MIN_FRAME_GAIN = 1.2  # ratio of visible mesh fractions above which another frame is chosen
 
 
 @dataclass(frozen=True)
 class Scan:
-    """A scanned object: its mesh, the cameras that saw it, where its own photos lie (if known),
-    where on Earth it is (if known), and what its readers left out or assumed."""
+    """A scanned object: mesh and cameras in one frame. images: folder of the scan's own photos (if
+    known). georeference: location on Earth (if known). notes: what the readers left out or assumed.
+    """
 
     mesh: Mesh
     cameras: tuple[Camera, ...]
@@ -31,13 +32,13 @@ class Scan:
     notes: tuple[str, ...] = ()
 
     def camera(self, label: str) -> Camera | None:
-        """The camera of that label; a label is also found without its folder and extension
-        (COLMAP says "IMG_0041.jpg", Metashape "IMG_0041") where that is unambiguous."""
+        """The camera with that label. A label also matches without folder and extension (COLMAP
+        writes "IMG_0041.jpg", Metashape "IMG_0041") where that is unambiguous."""
         return find_camera(self.cameras, label)
 
 
 def find_camera(cameras: Sequence[Camera], label: str) -> Camera | None:
-    """The camera of that label, or the only one whose label is the same without folder and
+    """The camera with that label, or the only one whose label is equal apart from folder and
     extension."""
     for camera in cameras:
         if camera.label == label:
@@ -60,10 +61,10 @@ def read_scan(
     chunk: str | None = None,
     frame: str | None = None,
 ) -> Scan:
-    """Mesh and cameras from files, brought into one frame: the mesh's. Raises InputError.
+    """Read mesh and cameras and transform the cameras to the mesh's frame. Raises InputError.
 
-    frame: name of the frame the mesh was exported in, where the reconstruction knows several;
-    without it the one whose cameras see the mesh is taken.
+    frame: name of the frame the mesh was exported in, where the reconstruction has several; without
+    it, the frame in which the cameras see most of the mesh.
     """
     reconstruction = read_reconstruction(cameras, images, chunk)
     surface = read_mesh(mesh)
@@ -73,26 +74,28 @@ def read_scan(
 
 
 def with_extra_cameras(scan: Scan, file: Path) -> Scan:
-    """The scan with the cameras of another file in its frame: photos that were localised later.
-    Raises InputError where a label is there already."""
-    more = read_reconstruction(file)
-    there = {camera.label for camera in scan.cameras}
-    for camera in more.cameras:
-        if camera.label in there:
-            raise InputError(f"the scan has a camera {camera.label!r} already", file=file)
-    cameras = sorted((*scan.cameras, *more.cameras), key=lambda camera: camera.label)
-    return replace(scan, cameras=tuple(cameras), notes=(*scan.notes, *more.notes))
+    """The scan with the cameras of another file in its frame, from photos that were localised
+    later. Raises InputError where a label exists already."""
+    extra = read_reconstruction(file)
+    known_labels = {camera.label for camera in scan.cameras}
+    for camera in extra.cameras:
+        if camera.label in known_labels:
+            raise InputError(
+                f"the scan has a camera {camera.label!r} already; rename the photo", file=file
+            )
+    cameras = sorted((*scan.cameras, *extra.cameras), key=lambda camera: camera.label)
+    return replace(scan, cameras=tuple(cameras), notes=(*scan.notes, *extra.notes))
 
 
 def _in_common_frame(
     reconstruction: Reconstruction, mesh: Mesh, mesh_file: Path, frame: str | None
 ) -> tuple[Reconstruction, str | None]:
-    """(the reconstruction in the mesh's frame, a sentence where that was not its own)."""
+    """(the reconstruction in the mesh's frame, a note where that was not its own frame)."""
     if frame is not None and frame != "cameras":
         if frame not in reconstruction.frames:
             known = ", ".join(["cameras", *reconstruction.frames])
             raise InputError(
-                f"the scan has no frame {frame!r}; it knows: {known}", key="scan.frame"
+                f"found no frame {frame!r} in the scan; expected one of {known}", key="scan.frame"
             )
         moved = reconstruction.moved(frame)
         check_common_frame(moved.cameras, mesh, mesh_file)
@@ -102,34 +105,34 @@ def _in_common_frame(
         others = {name: reconstruction.moved(name) for name in reconstruction.frames}
         shares = {name: seen_fraction(other.cameras, mesh) for name, other in others.items()}
         best = max(shares, key=lambda name: shares[name], default=None)
-        if best is not None and shares[best] > MUCH_BETTER * own:
-            return others[best], f"the mesh lies in the frame {best!r} of the scan"
+        if best is not None and shares[best] > MIN_FRAME_GAIN * own:
+            return others[best], f"The mesh is in the frame {best!r} of the scan."
     check_common_frame(reconstruction.cameras, mesh, mesh_file)
     return reconstruction, None
 
 
 def seen_fraction(cameras: Sequence[Camera], mesh: Mesh) -> float:
     """Mean fraction of the mesh's vertices that project into a camera's photo."""
-    some = _some_vertices(mesh)
-    few = cameras[:: max(1, len(cameras) // 50)]
-    return float(np.mean([_inside(camera, some).mean() for camera in few]))
+    vertices = _some_vertices(mesh)
+    camera_sample = cameras[:: max(1, len(cameras) // 50)]
+    return float(np.mean([_inside(camera, vertices).mean() for camera in camera_sample]))
 
 
 def check_common_frame(cameras: Sequence[Camera], mesh: Mesh, mesh_file: Path) -> None:
-    """Refuse a mesh that no camera sees: it was exported in another frame than the cameras."""
-    some = _some_vertices(mesh)
-    if any(_inside(camera, some).any() for camera in cameras):
+    """Raise InputError where no camera sees the mesh: it was exported in another frame."""
+    vertices = _some_vertices(mesh)
+    if any(_inside(camera, vertices).any() for camera in cameras):
         return
     raise InputError(
-        "the mesh lies in another frame than the cameras: no vertex projects into any photo; "
-        "export mesh and cameras from the same project, without a transform of its own",
+        "the mesh is not in the frame of the cameras: no vertex projects into any photo; "
+        "export mesh and cameras from the same project, without an additional transform",
         file=mesh_file,
         key="scan.mesh",
     )
 
 
 def _some_vertices(mesh: Mesh) -> NDArray[np.float64]:
-    return mesh.vertices[:: max(1, len(mesh.vertices) // SOME)]
+    return mesh.vertices[:: max(1, len(mesh.vertices) // VISIBILITY_SAMPLES)]
 
 
 def _inside(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -1,5 +1,4 @@
-"""Cameras from photos alone (structure from motion, by COLMAP), and poses of further photos in a
-reconstruction that is there already."""
+"""Structure from motion (COLMAP), and poses of further photos in an existing reconstruction."""
 
 from .localise import Localised
 from .localise_job import LocaliseJob

@@ -1,4 +1,4 @@
-"""The photos' features in a COLMAP database: what its matcher and its mapper work on."""
+"""The photos' features in a COLMAP database, the input of its matcher and mapper."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from .photo_set import LensKey
 
 
 class FeatureStore:
-    """A COLMAP database under construction. Photos are named 0, 1, … in it: its lists of pairs
-    cannot hold names with spaces. One camera for every LensKey."""
+    """A COLMAP database under construction. Photos are named 0, 1, … in it, because COLMAP's lists
+    of pairs cannot hold names with spaces. One camera for every LensKey."""
 
     def __init__(self, path: Path, model: str) -> None:
         self.path, self.model = path, model
@@ -20,7 +20,7 @@ class FeatureStore:
         self._rigs: dict[LensKey, tuple[int, int]] = {}
 
     def add(self, number: int, key: LensKey, focal: tuple[float, bool], found: Features) -> None:
-        """One photo. focal: (pixels, whether a camera said it)."""
+        """Add one photo. focal: (pixels, whether it comes from Exif)."""
         rig_id, camera_id = self._rigs.get(key) or self._new_camera(key, focal)
         image_id = self._database.write_image(pycolmap.Image(name=str(number), camera_id=camera_id))
         frame = pycolmap.Frame()
@@ -34,7 +34,7 @@ class FeatureStore:
         self._database.write_descriptors(image_id, data)
 
     def verified(self) -> dict[str, tuple[int, int]]:
-        """By photo: (with how many others it agrees, in how many points all in all)."""
+        """Photo → (number of photos with verified matches, total number of matched points)."""
         names = {image.image_id: image.name for image in self._database.read_all_images()}
         totals = dict.fromkeys(names.values(), (0, 0))
         ids, counts = self._database.read_two_view_geometry_num_inliers()
@@ -46,18 +46,18 @@ class FeatureStore:
         return totals
 
     def compared(self) -> int:
-        """How many pairs the matcher has done so far."""
+        """Number of pairs that the matcher has completed."""
         return int(self._database.num_matched_image_pairs())
 
     def close(self) -> None:
         self._database.close()
 
     def _new_camera(self, key: LensKey, focal: tuple[float, bool]) -> tuple[int, int]:
-        pixels, said = focal
+        pixels, from_exif = focal
         camera = pycolmap.Camera.create_from_model_name(
             len(self._rigs) + 1, self.model, pixels, key.width, key.height
         )
-        camera.has_prior_focal_length = said
+        camera.has_prior_focal_length = from_exif
         camera_id = self._database.write_camera(camera)
         rig = pycolmap.Rig()
         rig.add_ref_sensor(_sensor(camera_id))

@@ -1,4 +1,4 @@
-"""SIFT features of one picture (pycolmap), and their matches with another's."""
+"""SIFT features of one picture (pycolmap), and matching with those of another."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from .picture import Grey
 
-LARGEST_SIDE = 3200  # pixels: larger pictures are searched in a smaller copy
-BLOCK = 2048  # descriptors compared at once
+MAX_SIDE = 3200  # pixels; larger pictures are reduced to this size
+BLOCK = 2048  # descriptors compared together
 
 
 @dataclass(frozen=True)
 class Features:
-    """pixels: (n, 2), the centre of the top left pixel at (0.5, 0.5); scale: (n,) pixels;
-    descriptors: (n, 128) uint8, square roots of L1-normalised SIFT (Arandjelović & Zisserman
-    2012), by falling scale. keypoints: (n, 4 or 6) as COLMAP keeps them."""
+    """pixels: (n, 2), the centre of the top left pixel at (0.5, 0.5); descriptors: (n, 128) uint8,
+    square roots of L1-normalised SIFT (Arandjelović & Zisserman 2012). keypoints: (n, 4 or 6) in
+    COLMAP's layout. Sorted by decreasing scale."""
 
     keypoints: NDArray[np.float32]
     descriptors: NDArray[np.uint8]
@@ -32,27 +32,28 @@ class Features:
 
 
 class Detector:
-    """SIFT with settings; one a thread."""
+    """A SIFT detector with its settings; use one per thread."""
 
-    def __init__(self, most: int = 8192, pooled: bool = False) -> None:
-        """most: features kept, the largest. pooled: descriptors averaged over domain sizes on
-        affine-adapted regions (Dong & Soatto 2015): half again as slow, sturdier."""
-        pycolmap.logging.minloglevel = 3  # it would write to stderr on its own
+    def __init__(self, max_features: int = 8192, pooled: bool = False) -> None:
+        """max_features: the number of features kept, largest first. pooled: descriptors averaged
+        over domain sizes on affine-adapted regions (Dong & Soatto 2015): takes 1.5 times as long
+        and is more robust."""
+        pycolmap.logging.minloglevel = 3  # otherwise it writes to stderr
         options = pycolmap.FeatureExtractionOptions()
         options.use_gpu = False
         options.num_threads = 1
-        options.sift.max_num_features = most
+        options.sift.max_num_features = max_features
         options.sift.domain_size_pooling = pooled
         options.sift.estimate_affine_shape = pooled
         self._extractor = pycolmap.FeatureExtractor.create(options, pycolmap.Device.cpu)
 
-        self._most = most
+        self._max_features = max_features
 
     def __call__(self, grey: Grey) -> Features:
         """Features of a picture (h, w)."""
         bitmap = pycolmap.Bitmap.from_array(np.ascontiguousarray(grey))
         height, width = grey.shape
-        factor = min(1.0, LARGEST_SIDE / max(height, width))
+        factor = min(1.0, MAX_SIDE / max(height, width))
         if factor < 1.0:
             bitmap.rescale(max(1, round(width * factor)), max(1, round(height * factor)))
         across, down = width / bitmap.width, height / bitmap.height
@@ -64,12 +65,12 @@ class Detector:
         keypoints[:, 1] *= down
         _stretch(keypoints, across, down)
         data = np.asarray(descriptors.data, np.uint8).reshape(-1, 128)
-        order = np.argsort(-_scale(keypoints), kind="stable")[: self._most]
+        order = np.argsort(-_scale(keypoints), kind="stable")[: self._max_features]
         return Features(keypoints[order], data[order])
 
 
 def _stretch(keypoints: NDArray[np.float32], across: float, down: float) -> None:
-    """Sizes found in a smaller copy become the photo's own."""
+    """Scale sizes found in a smaller copy to the photo's own size."""
     if keypoints.shape[1] == 6:
         keypoints[:, 2:4] *= across
         keypoints[:, 4:6] *= down
@@ -88,8 +89,8 @@ def _scale(keypoints: NDArray[np.float32]) -> NDArray[np.float32]:
 def match(
     one: NDArray[np.uint8], other: NDArray[np.uint8], ratio: float = 0.85
 ) -> NDArray[np.intp]:
-    """(m, 2) indices of mutually nearest descriptors whose angle is below ``ratio`` times that to
-    the second nearest (Lowe 2004)."""
+    """(m, 2) indices of mutually nearest descriptors whose angle is below ``ratio`` times the angle
+    to the second nearest (Lowe 2004)."""
     if len(one) < 2 or len(other) < 2:
         return np.zeros((0, 2), np.intp)
     b = _unit(other)

@@ -1,4 +1,4 @@
-"""Points of the scan that its own photos show, with what they look like there."""
+"""Points of the scan that its own photos show, with their descriptors."""
 
 from __future__ import annotations
 
@@ -16,20 +16,22 @@ from ..scan import Camera
 from .features import Features
 
 Array = NDArray[np.float64]
-FLATTEST = 0.2  # cosine between ray and surface: beyond it a pixel's error is many on the surface
-SAME_FEATURE = 1.5  # pixels between a feature of ours and one the model was made of
+MIN_RAY_COSINE = (
+    0.2  # between ray and normal; at lower values a pixel's error covers a large distance
+)
+MAX_FEATURE_DISTANCE = 1.5  # pixels between a feature found here and one of the COLMAP model
 
 
 @dataclass(frozen=True)
 class Landmarks:
-    """points: (n, 3), the scan's frame; descriptors: (n, 128)."""
+    """points: (n, 3), scan frame and units; descriptors: (n, 128)."""
 
     points: Array
     descriptors: NDArray[np.uint8]
 
     @classmethod
     def none(cls) -> Landmarks:
-        """Of a photo that shows nothing known."""
+        """Landmarks of a photo without known points."""
         return cls(np.zeros((0, 3)), np.zeros((0, 128), np.uint8))
 
     def __len__(self) -> int:
@@ -37,29 +39,30 @@ class Landmarks:
 
 
 class OnMesh:
-    """Features lifted to the surface: any format's cameras, any lens."""
+    """Lifts features to the mesh, for cameras of any format and any lens."""
 
     def __init__(self, rays: RayScene) -> None:
         self.rays = rays
 
     def lift(self, camera: Camera, found: Features) -> Landmarks:
-        """Where the rays of a photo's features meet the mesh. camera: with the photo's size."""
+        """Points where the rays of a photo's features hit the mesh. camera: of the photo's size."""
         points = np.full((len(found), 3), np.nan)
         if len(found):
             directions = camera.rays(found.pixels)
-            sound = np.isfinite(directions).all(axis=1)
-            directions[~sound] = (0.0, 0.0, 1.0)
+            finite = np.isfinite(directions).all(axis=1)
+            directions[~finite] = (0.0, 0.0, 1.0)
             hits = self.rays.first_hits(camera.ray_starts(found.pixels), directions)
-            there = sound & (hits.face >= 0)
-            met = hits.select(there)
-            normal = self.rays.mesh.face_normals[met.face]
-            steep = np.abs(np.einsum("ij,ij->i", normal, directions[there])) > FLATTEST
-            points[np.flatnonzero(there)[steep]] = self.rays.points(met)[steep]
+            hit = finite & (hits.face >= 0)
+            selected = hits.select(hit)
+            normal = self.rays.mesh.face_normals[selected.face]
+            not_grazing = np.abs(np.einsum("ij,ij->i", normal, directions[hit])) > MIN_RAY_COSINE
+            points[np.flatnonzero(hit)[not_grazing]] = self.rays.points(selected)[not_grazing]
         known = np.isfinite(points[:, 0])
         return Landmarks(points[known], found.descriptors[known])
 
     def visible(self, points: Array, centre: Array) -> NDArray[np.bool_]:
-        """(n,) whether nothing lies between ``centre`` and the points."""
+        """(n,) whether the mesh does not block the line from ``centre`` (3,) to the points (n,
+        3)."""
         towards = centre - points
         distance = np.linalg.norm(towards, axis=1, keepdims=True)
         start = points + 1e-3 * towards
@@ -67,14 +70,14 @@ class OnMesh:
 
 
 class OnSparsePoints:
-    """Features that a COLMAP model has triangulated; for a scan that has no mesh."""
+    """Features that a COLMAP model has triangulated, for a scan without a mesh."""
 
     def __init__(self, model: Path) -> None:
         """Raises InputError where the folder holds no readable model."""
         try:
             found = pycolmap.Reconstruction(str(model))
-        except Exception as error:  # pycolmap raises whatever its parser met
-            raise InputError(f"not a readable COLMAP model ({error})", file=model) from error
+        except Exception as error:  # pycolmap raises many types of exception
+            raise InputError(f"is not a readable COLMAP model ({error})", file=model) from error
         self._seen: dict[str, tuple[Array, Array, tuple[int, int]]] = {}
         positions = {i: point.xyz for i, point in found.points3D.items()}
         for image in found.images.values():
@@ -88,15 +91,17 @@ class OnSparsePoints:
                 )
 
     def lift(self, camera: Camera, found: Features) -> Landmarks:
-        """The model's points where its own features lie under ours."""
+        """The model's points at the features that coincide with the model's own."""
         pixels, points, size = self._seen[camera.label]
         if not len(pixels) or not len(found):
             return Landmarks.none()
         scaled = pixels * (camera.width / size[0], camera.height / size[1])
-        distance, nearest = cKDTree(scaled).query(found.pixels, distance_upper_bound=SAME_FEATURE)
+        distance, nearest = cKDTree(scaled).query(
+            found.pixels, distance_upper_bound=MAX_FEATURE_DISTANCE
+        )
         known = np.isfinite(distance)
         return Landmarks(points[nearest[known]], found.descriptors[known])
 
     def visible(self, points: Array, centre: Array) -> NDArray[np.bool_]:
-        """All: without a surface nobody knows better."""
+        """(n,) True for all: visibility is unknown without a surface."""
         return np.ones(len(points), bool)

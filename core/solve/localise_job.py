@@ -1,4 +1,4 @@
-"""Localising photos as a job; the work is in a thread, as solving is."""
+"""Localise photos as a job, in a background thread."""
 
 from __future__ import annotations
 
@@ -21,15 +21,18 @@ from .localise import Lift, Localised, Unsupported, localise
 from .picture import even_contrast, grey_of, read_picture
 from .scan_photos import ScanPhoto, scan_photos, spread
 
-LOOKED_AT = 40  # photos of the scan, spread over all, that every new photo is compared with
-MOST_LENSES = 6
-READ = 0.6  # of the whole job: features of the scan's photos
-OUT = "localised.cameras.json"
+COMPARED_PHOTOS = (
+    40  # photos of the scan, spread over all views, that every new photo is compared with
+)
+MAX_LENSES = 6
+READ_FRACTION = 0.6  # of the job's progress: features of the scan's photos
+OUTPUT_FILE = "localised.cameras.json"
 
 
 @dataclass(frozen=True)
 class LocalisedPhotos:
-    """placed; refused: a sentence each; notes: what was not of use. frame: see patina_cameras."""
+    """placed: localised photos; refused: a sentence about each photo that was rejected; notes:
+    sentences about unused photos. frame: see patina_cameras.py."""
 
     placed: tuple[Localised, ...]
     refused: tuple[str, ...]
@@ -37,9 +40,9 @@ class LocalisedPhotos:
     frame: str
 
     def write(self, folder: Path) -> Path:
-        """The file that a capture's ``[scan] extra`` names. Returns its path."""
-        path = folder / OUT
-        more = [
+        """Write the file for a capture's ``[scan] extra`` into ``folder``. Returns its path."""
+        path = folder / OUTPUT_FILE
+        statistics = [
             {
                 "inliers": found.inliers,
                 "error_pixels": found.error,
@@ -49,12 +52,12 @@ class LocalisedPhotos:
             }
             for found in self.placed
         ]
-        write_patina_cameras(path, [found.camera for found in self.placed], self.frame, more)
+        write_patina_cameras(path, [found.camera for found in self.placed], self.frame, statistics)
         return path
 
 
 class LocaliseJob(Job):
-    """Poses for extra photos in an existing reconstruction of any format."""
+    """Localise further photos in an existing reconstruction of any format."""
 
     def __init__(
         self,
@@ -65,25 +68,25 @@ class LocaliseJob(Job):
         model: Path | None = None,
         threads: int | None = None,
     ) -> None:
-        """cameras: the scan's, in the mesh's frame; images: the folder of the scan's own photos;
-        photos: those to place; mesh, or model: a COLMAP model's folder, whose sparse points then
-        stand in. Raises InputError."""
+        """cameras: the scan's, in the mesh's frame; images: folder of the scan's own photos;
+        photos: those to localise; mesh: of the scan; model: folder of a COLMAP model, whose sparse
+        points are used without a mesh. Raises InputError."""
         super().__init__()
         if not photos:
-            raise InputError("no photos to localise", key="--photos")
+            raise InputError("found no photos to localise; expected at least one", key="--photos")
         usable = [c for c in cameras if not (c.orthographic or c.panoramic)]
         self._scan, notes = scan_photos(usable, images)
         if not self._scan:
             raise InputError(
-                "none of the scan's own photos lies here: a new photo is found by comparing it "
-                f"with them (expected names like {cameras[0].label!r})",
+                "holds none of the scan's own photos, which are needed for comparison; "
+                f"expected names like {cameras[0].label!r}",
                 file=images,
                 key="--images",
             )
         if mesh is None and model is None:
             raise InputError(
-                "a mesh is needed for cameras of this format (only COLMAP's model has points with "
-                "their photos)",
+                "no mesh given; cameras of this format need one (only COLMAP's model links points "
+                "to photos)",
                 key="--mesh",
             )
         self._lenses = [_lenses(self._scan, path) for path in photos]
@@ -95,14 +98,14 @@ class LocaliseJob(Job):
 
     @property
     def result(self) -> LocalisedPhotos:
-        """Only when the job is done."""
+        """The result; only valid when the job is done."""
         return self._work.result
 
     def run(self) -> Iterator[Step]:
         yield from self._work.steps()
 
     def cancel(self) -> None:
-        """Let the work end; what it had found so far is thrown away."""
+        """Cancel the work and discard its results."""
         if self._steps is not None:
             self._steps.close()  # type: ignore[attr-defined]
 
@@ -112,31 +115,31 @@ class LocaliseJob(Job):
             lift = OnMesh(RayScene.build(self._mesh))
         elif self._model is not None:
             lift = OnSparsePoints(self._model)
-        shown: dict[int, Landmarks] = {}
-        bad: list[str] = []
+        landmarks_of: dict[int, Landmarks] = {}
+        unreadable: list[str] = []
 
         def landmarks(number: int) -> Landmarks:
             work.check()
-            if number not in shown:
+            if number not in landmarks_of:
                 photo = self._scan[number]
                 try:
-                    shown[number] = lift.lift(photo.camera, features_of(photo.path))
+                    landmarks_of[number] = lift.lift(photo.camera, features_of(photo.path))
                 except PatinaError as error:
-                    bad.append(str(error))
-                    shown[number] = Landmarks.none()
-            return shown[number]
+                    unreadable.append(str(error))
+                    landmarks_of[number] = Landmarks.none()
+            return landmarks_of[number]
 
-        first = spread(self._scan, LOOKED_AT)
+        first = spread(self._scan, COMPARED_PHOTOS)
         pool = ThreadPoolExecutor(min(self._threads, 4))
         try:
             for done, _ in enumerate(pool.map(landmarks, first)):
-                work.at("reading the scan's photos", READ * (done + 1) / len(first))
+                work.at("reading the scan's photos", READ_FRACTION * (done + 1) / len(first))
         finally:
             pool.shutdown(cancel_futures=True)
         placed: list[Localised] = []
         refused: list[str] = []
         for place, path in enumerate(self._photos):
-            work.at("localising", READ + (1 - READ) * place / len(self._photos))
+            work.at("localising", READ_FRACTION + (1 - READ_FRACTION) * place / len(self._photos))
             try:
                 found = localise(
                     path, features_of(path), self._lenses[place], self._scan, first, landmarks, lift
@@ -147,17 +150,17 @@ class LocaliseJob(Job):
             label = self._labels[place]
             placed.append(replace(found, camera=replace(found.camera, label=label)))
         frame = "mesh" if self._mesh is not None else "cameras"
-        return LocalisedPhotos(tuple(placed), tuple(refused), (*self._notes, *bad), frame)
+        return LocalisedPhotos(tuple(placed), tuple(refused), (*self._notes, *unreadable), frame)
 
 
 def features_of(path: Path) -> Features:
-    """What is compared: features of the photo with its contrast made even, so that one lamp and
-    even light leave the same. Raises InputError."""
+    """Features of the photo after contrast equalisation, which makes a single lamp and even light
+    comparable. Raises InputError."""
     return Detector(pooled=True)(even_contrast(grey_of(read_picture(path))))
 
 
 def _lenses(scan: Sequence[ScanPhoto], path: Path) -> list[Camera]:
-    """The scan's lenses a photo of that size may have been taken with, most used first."""
+    """The scan's lenses that fit a photo of that size, most used first."""
     size = image_size(path)
     used: dict[tuple[object, ...], list[Camera]] = {}
     for photo in scan:
@@ -169,21 +172,22 @@ def _lenses(scan: Sequence[ScanPhoto], path: Path) -> list[Camera]:
     if not used:
         sizes = sorted({f"{p.camera.width} × {p.camera.height}" for p in scan})
         raise InputError(
-            f"is {size[0]} × {size[1]} pixels; the scan's photos are {', '.join(sizes[:5])}: take "
-            "it with a lens of the scan, at the same focal length, and do not crop it",
+            f"is {size[0]} × {size[1]} pixels; expected a size of the scan's photos, "
+            f"{', '.join(sizes[:5])}; take "
+            "it with a lens of the scan at the same focal length, and do not crop it",
             file=path,
         )
-    return [group[0] for group in sorted(used.values(), key=len, reverse=True)[:MOST_LENSES]]
+    return [group[0] for group in sorted(used.values(), key=len, reverse=True)[:MAX_LENSES]]
 
 
-def _labels(photos: Sequence[Path], taken: set[str]) -> list[str]:
-    """A name for each that neither the scan nor another of them has."""
+def _labels(photos: Sequence[Path], used_labels: set[str]) -> list[str]:
+    """A label for each photo that neither the scan nor another of them uses."""
     labels: list[str] = []
     for path in photos:
         resolved = path.resolve()
         choices = [resolved.name, f"{resolved.parent.name}/{resolved.name}"]
         choices += [f"{n}/{resolved.name}" for n in range(2, len(photos) + 3)]
-        label = next(name for name in choices if name not in taken)
-        taken = taken | {label}
+        label = next(name for name in choices if name not in used_labels)
+        used_labels = used_labels | {label}
         labels.append(label)
     return labels

@@ -1,4 +1,4 @@
-"""A folder of photos: which files are photos, and which of them share a lens."""
+"""A folder of photos: which files are photos, and which photos share a lens."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from ..photo import Exif
 
 PICTURES = {".jpg", ".jpeg", ".png", ".tif", ".tiff", ".exr", ".hdr"}
 RAW = {".cr2", ".cr3", ".nef", ".arw", ".dng", ".raf", ".orf", ".rw2", ".pef"}
-MOST_PHOTOS = 20_000
+MAX_PHOTOS = 20_000
 UNKNOWN_FOCAL = 1.2  # × the longer side: what COLMAP assumes, about 45 mm on 35 mm film
-FILM = 36.0  # mm across
+FILM_WIDTH = 36.0  # mm
 
 
 @dataclass(frozen=True)
 class PhotoFile:
-    """name: path inside the folder, with / on every system: the photo's label."""
+    """name: path inside the folder, with / as separator on every system: the photo's label."""
 
     name: str
     path: Path
 
 
 def find_photos(folder: Path) -> list[PhotoFile]:
-    """All photos of a folder and of its folders, by name. Raises InputError.
+    """All photos of a folder and its subfolders, by name. Raises InputError.
 
-    A camera's RAW file is left out where a picture of the same name lies beside it; hidden files
+    A RAW file is left out where a picture with the same name is in the same folder. Hidden files
     and folders are left out.
     """
     if not folder.is_dir():
@@ -40,8 +40,8 @@ def find_photos(folder: Path) -> list[PhotoFile]:
     stems = {p.with_suffix("") for p in pictures}
     raws = [p for p in files if p.suffix.lower() in RAW and p.with_suffix("") not in stems]
     photos = [PhotoFile(p.relative_to(folder).as_posix(), p) for p in sorted(pictures + raws)]
-    if len(photos) > MOST_PHOTOS:
-        raise InputError(f"holds {len(photos)} photos, expected at most {MOST_PHOTOS}", file=folder)
+    if len(photos) > MAX_PHOTOS:
+        raise InputError(f"holds {len(photos)} photos; expected at most {MAX_PHOTOS}", file=folder)
     return photos
 
 
@@ -51,7 +51,7 @@ def _visible(path: Path, folder: Path) -> bool:
 
 @dataclass(frozen=True)
 class LensKey:
-    """Photos with the same key were taken through one lens at one setting, as far as known."""
+    """Photos with equal keys are assumed to share a lens at one setting."""
 
     width: int
     height: int
@@ -67,8 +67,8 @@ class LensKey:
 
 
 def first_focal(size: tuple[int, int], exif: Exif) -> tuple[float, bool]:
-    """(focal length to start from, pixels; whether a camera said it)."""
+    """(initial focal length, pixels; whether it comes from Exif)."""
     longer = max(size)
     if exif.focal_length_35mm:
-        return longer * exif.focal_length_35mm / FILM, True
+        return longer * exif.focal_length_35mm / FILM_WIDTH, True
     return UNKNOWN_FOCAL * longer, False

@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 from ..scan import Camera, Pose
 
 Array = NDArray[np.float64]
-STEEPEST = 5.0  # x/z of pixels used: a fisheye's rim has none that is finite
-TRIALS = 20_000
-HUBER = 1.345  # of the residuals' σ: 95 % efficient for normal ones (Huber 1981)
+MAX_SLOPE = 5.0  # of x/z and y/z; it is infinite at 90° from the axis of a fisheye
+MAX_TRIALS = 20_000
+HUBER = 1.345  # in units of the residuals' σ: 95 % efficiency for normal residuals (Huber 1981)
 
 
 @dataclass(frozen=True)
 class FoundPose:
     """pose; inliers: (n,) bool; error: median distance of the inliers, pixels; covariance: (6, 6)
-    of the rotation about the camera's own axes (radians) and of its centre (scan units)."""
+    of the rotation about the camera's axes (radians) and of its centre (scan units);
+    pixel_deviation: standard deviation of projected points, pixels."""
 
     pose: Pose
     inliers: NDArray[np.bool_]
@@ -44,32 +45,32 @@ def focal_of(camera: Camera) -> float:
     return 0.5 * (lens.focal_length_x + lens.focal_length_y)
 
 
-def straightened(camera: Camera, pixels: Array) -> Array:
-    """(n, 2) pixels of the distortion-free camera of the same focal length with its principal
-    point at (0, 0); NaN where the lens sees too steeply for one."""
+def undistorted(camera: Camera, pixels: Array) -> Array:
+    """(n, 2) pixels of the distortion-free camera with the same focal length and its principal
+    point at (0, 0); NaN where |x/z| or |y/z| reaches MAX_SLOPE."""
     flat = np.asarray(camera.lens.cam_from_img(np.ascontiguousarray(pixels)), np.float64)
     flat = flat.reshape(len(pixels), 2)
     with np.errstate(invalid="ignore"):
-        wild = ~(np.abs(flat).max(axis=1) < STEEPEST)
-    flat[wild] = np.nan
+        too_steep = ~(np.abs(flat).max(axis=1) < MAX_SLOPE)
+    flat[too_steep] = np.nan
     return flat * focal_of(camera)
 
 
 def find_pose(camera: Camera, pixels: Array, points: Array, limit: float) -> FoundPose | None:
-    """The pose of a camera (its own is ignored) that shows most points (n, 3) within ``limit``
-    pixels of pixels (n, 2), which may be wrong for most; None where no pose shows enough.
+    """The camera's pose (its own pose is ignored) that projects most points (n, 3) within ``limit``
+    pixels of pixels (n, 2), most of which may be outliers; None where no pose has enough inliers.
 
-    LO-RANSAC over the P3P solver, then least squares under a Cauchy loss (pycolmap).
+    LO-RANSAC with the P3P solver, then least squares with a Cauchy loss (pycolmap).
     """
-    flat = straightened(camera, pixels)
+    flat = undistorted(camera, pixels)
     usable = np.isfinite(flat).all(axis=1) & np.isfinite(points).all(axis=1)
     if usable.sum() < 6:
         return None
-    origin = np.median(points[usable], axis=0)  # georeferenced points are large numbers
+    origin = np.median(points[usable], axis=0)  # georeferenced coordinates are large
     options = pycolmap.AbsolutePoseEstimationOptions()
     options.ransac.max_error = limit
     options.ransac.min_inlier_ratio = 0.01
-    options.ransac.max_num_trials = TRIALS
+    options.ransac.max_num_trials = MAX_TRIALS
     options.ransac.random_seed = 0
     found = pycolmap.estimate_and_refine_absolute_pose(
         flat[usable], points[usable] - origin, _pinhole(camera), options
@@ -79,15 +80,15 @@ def find_pose(camera: Camera, pixels: Array, points: Array, limit: float) -> Fou
     rigid = found["cam_from_world"]
     pose = Pose(np.array(rigid.rotation.matrix()), np.array(rigid.translation))
     pose = Pose(pose.rotation, pose.translation - pose.rotation @ origin)
-    return judged(camera, pose, flat, points, limit)
+    return with_uncertainty(camera, pose, flat, points, limit)
 
 
 def refine_pose(
     camera: Camera, start: Pose, pixels: Array, points: Array, limit: float
 ) -> FoundPose | None:
-    """The pose near ``start`` that fits best what lies within ``limit`` pixels: Gauss-Newton
-    under Huber's weights. None where too little does."""
-    flat = straightened(camera, pixels)
+    """The pose near ``start`` that best fits the points within ``limit`` pixels: Gauss-Newton with
+    Huber's weights. None for fewer than 6 inliers."""
+    flat = undistorted(camera, pixels)
     pose = start
     focal = focal_of(camera)
     for _ in range(20):
@@ -106,14 +107,15 @@ def refine_pose(
         pose = _moved(pose, step)
         if np.abs(step * scale).max() < 1e-6 * np.sqrt(len(rows)):
             break
-    return judged(camera, pose, flat, points, limit)
+    return with_uncertainty(camera, pose, flat, points, limit)
 
 
-def judged(
+def with_uncertainty(
     camera: Camera, pose: Pose, flat: Array, points: Array, limit: float
 ) -> FoundPose | None:
-    """A pose with what speaks for it. The covariance is that of least squares with the inliers'
-    own scatter; it knows nothing of errors all of them share, such as a bent mesh."""
+    """The pose with its inliers and covariance. The covariance is that of least squares, scaled by
+    the scatter of the inliers. It does not include errors common to all of them, such as a deformed
+    mesh."""
     offset, jacobian, front = _linearised(pose, flat, points, focal_of(camera))
     length = np.linalg.norm(offset, axis=1)
     with np.errstate(invalid="ignore"):
@@ -136,14 +138,16 @@ def judged(
 
 
 def _deviation(offset: Array) -> float:
-    """σ of one coordinate, from the median distance (Rayleigh's is 1.1774 σ)."""
+    """σ of one coordinate, from the median distance (the median of a Rayleigh distribution is
+    1.1774 σ)."""
     return max(float(np.median(np.linalg.norm(offset, axis=1))) / 1.1774, 1e-6)
 
 
 def _linearised(
     pose: Pose, flat: Array, points: Array, focal: float
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """(seen − shown (n, 2), derivative of shown (n, 2, 6), in front and known (n,))."""
+    """(observed − projected (n, 2), derivative of projected (n, 2, 6), in front and finite
+    (n,))."""
     there = (points - pose.centre) @ pose.rotation.T
     with np.errstate(invalid="ignore", divide="ignore"):
         front = there[:, 2] > 0

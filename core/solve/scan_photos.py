@@ -1,4 +1,4 @@
-"""The scan's own photos as a map to find one's way by: where they lie, and which to look at."""
+"""The scan's own photos: find their files, and choose those to compare with."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ class ScanPhoto:
 
 
 def scan_photos(cameras: Sequence[Camera], images: Path) -> tuple[list[ScanPhoto], list[str]]:
-    """(the photos that are there, by camera; sentences about those that are not of use)."""
+    """(photos that were found, in the order of the cameras; notes about those that were not
+    used)."""
     found: list[ScanPhoto] = []
     notes: list[str] = []
     missing = 0
@@ -40,17 +41,17 @@ def scan_photos(cameras: Sequence[Camera], images: Path) -> tuple[list[ScanPhoto
         except PatinaError as error:
             notes.append(f"{path.name}: {error}")
     if missing:
-        notes.append(f"{missing} cameras have no photo in {images.name}")
+        notes.append(f"Cameras without a photo: {missing} (in the folder {images.name}).")
     return found, notes
 
 
 def _photo_of(camera: Camera, images: Path) -> Path | None:
-    """The file named like the camera, or like the photo its tool names, in the folder."""
-    told = [camera.label]
+    """The file in the folder with the camera's label, or with the name of the camera's photo."""
+    names = [camera.label]
     if camera.photo:
         inside = PurePosixPath(camera.photo.replace("\\", "/"))
-        told += [str(inside), inside.name] if not inside.is_absolute() else [inside.name]
-    for name in told:
+        names += [str(inside), inside.name] if not inside.is_absolute() else [inside.name]
+    for name in names:
         if ".." in PurePosixPath(name).parts or PurePosixPath(name).is_absolute():
             continue
         for suffix in SUFFIXES:
@@ -61,18 +62,18 @@ def _photo_of(camera: Camera, images: Path) -> Path | None:
 
 
 def spread(photos: Sequence[ScanPhoto], count: int) -> list[int]:
-    """Indices of ``count`` photos whose views differ most: farthest-point sampling of where they
-    stand and which way they look."""
+    """Indices of ``count`` photos with views as different as possible: farthest-point sampling of
+    their positions and directions."""
     centres = np.array([photo.camera.pose.centre for photo in photos])
     forward = np.array([photo.camera.pose.rotation[2] for photo in photos])
     size = max(float(np.median(np.linalg.norm(centres - centres.mean(axis=0), axis=1))), 1e-12)
     place = np.concatenate([(centres - centres.mean(axis=0)) / size, forward], axis=1)
-    chosen = [0]
+    selected = [0]
     distance = np.linalg.norm(place - place[0], axis=1)
-    while len(chosen) < min(count, len(photos)):
-        chosen.append(int(distance.argmax()))
-        distance = np.minimum(distance, np.linalg.norm(place - place[chosen[-1]], axis=1))
-    return sorted(chosen)
+    while len(selected) < min(count, len(photos)):
+        selected.append(int(distance.argmax()))
+        distance = np.minimum(distance, np.linalg.norm(place - place[selected[-1]], axis=1))
+    return sorted(selected)
 
 
 def nearest(
@@ -81,8 +82,8 @@ def nearest(
     target: NDArray[np.float64],
     count: int,
 ) -> list[int]:
-    """Indices of the photos that see ``target`` (3,) most nearly as a camera at ``centre`` does:
-    by the angle between them and the ratio of their distances."""
+    """Indices of the photos that see ``target`` (3,) most like a camera at ``centre``, by the angle
+    between them and the ratio of their distances."""
     away = np.array([photo.camera.pose.centre for photo in photos]) - target
     own = centre - target
     length, reach = np.linalg.norm(away, axis=1), max(float(np.linalg.norm(own)), 1e-300)

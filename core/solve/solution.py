@@ -1,4 +1,4 @@
-"""What solving a folder of photos found, and the files that say so."""
+"""The result of solving a folder of photos, and its files."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from ..errors import PatinaError
 
 MODEL = "sparse"
 REPORT = "report.txt"
-LISTED = 200  # names in a report, of each kind
+MAX_LISTED = 200  # names per list in the report
 
 
 @dataclass(frozen=True)
 class Unplaced:
-    """A photo without a pose. others: how many photos it agrees with; points: in how many points,
-    all in all."""
+    """A photo without a pose. others: number of photos with verified matches; points: total number
+    of matched points."""
 
     name: str
     others: int
@@ -27,17 +27,17 @@ class Unplaced:
 
     @property
     def why(self) -> str:
-        """One clause."""
+        """The reason, as a clause."""
         if not self.others:
-            return "shows nothing that another photo shows"
-        return f"shares {self.points} points with {self.others} photos: too few, or ambiguous"
+            return "no matches with any other photo"
+        return f"{self.points} points match {self.others} photos: too few, or ambiguous"
 
 
 @dataclass(frozen=True)
 class Solution:
-    """model: COLMAP's, its images named by the photos' paths in their folder; photos: how many
-    there were; unplaced; unreadable: (name, why); others: names in each smaller model that hangs
-    together in itself, but not with the largest."""
+    """model: COLMAP's model; its images are named by the photos' paths in their folder; photos:
+    number of photos; unplaced; unreadable: (name, reason); others: names of the photos in each
+    smaller, separate model."""
 
     model: pycolmap.Reconstruction
     photos: int
@@ -47,7 +47,7 @@ class Solution:
 
     @property
     def placed(self) -> int:
-        """How many photos have a pose."""
+        """Number of photos with a pose."""
         return int(self.model.num_reg_images())
 
     @property
@@ -56,37 +56,37 @@ class Solution:
         return float(self.model.compute_mean_reprojection_error())
 
     def summary(self) -> str:
-        """One line."""
+        """A summary in one line."""
         return (
             f"{self.placed} of {self.photos} photos placed, {self.model.num_points3D():,} points, "
-            f"reprojection error {self.error:.2f} pixels"
+            f"mean reprojection error {self.error:.2f} pixels"
         )
 
     def report(self) -> str:
-        """All of it as text."""
-        lines = [self.summary(), "", "lenses"]
+        """The full report as text."""
+        lines = [self.summary(), "", "Lenses"]
         for camera in self.model.cameras.values():
             used = sum(
                 image.camera_id == camera.camera_id and image.has_pose
                 for image in self.model.images.values()
             )
-            numbers = ", ".join(
+            parameters = ", ".join(
                 f"{name.strip()} {value:.5g}"
                 for name, value in zip(camera.params_info.split(","), camera.params, strict=False)
             )
             lines.append(
                 f"  {used} photos of {camera.width} x {camera.height}: {camera.model.name} "
-                f"{numbers}"
+                f"{parameters}"
             )
-        _list(lines, "without a pose", [f"{u.name}: {u.why}" for u in self.unplaced])
-        _list(lines, "not readable", [why for _, why in self.unreadable])
+        _list(lines, "Photos without a pose", [f"{u.name}: {u.why}" for u in self.unplaced])
+        _list(lines, "Unreadable photos", [why for _, why in self.unreadable])
         for names in self.others:
-            _list(lines, "hang together, but not with the rest", list(names))
+            _list(lines, "Separate group of photos, not connected to the others", list(names))
         return "\n".join(lines) + "\n"
 
     def write(self, folder: Path, final: Path, photos: Path) -> Path:
-        """sparse/, a capture file to go on from and the report, into ``folder``, which will be
-        moved to ``final``. photos: the folder they lie in. Returns the capture file's path."""
+        """Write sparse/, a capture file to continue from and the report into ``folder``, which will
+        be moved to ``final``. photos: their folder. Returns the path of the capture file."""
         sparse = folder / MODEL
         sparse.mkdir(exist_ok=True)
         try:
@@ -94,7 +94,7 @@ class Solution:
             (folder / REPORT).write_text(self.report(), "utf-8")
             name = photos.resolve().name or "photos"
             capture = folder / f"{name}.capture.toml"
-            capture.write_text(starter_capture(_between(final, photos)), "utf-8")
+            capture.write_text(starter_capture(_relative_path(final, photos)), "utf-8")
         except (OSError, RuntimeError, ValueError) as error:
             raise PatinaError(f"{final}: cannot be written ({error})") from error
         return capture
@@ -102,13 +102,17 @@ class Solution:
 
 def _list(lines: list[str], title: str, entries: list[str]) -> None:
     if entries:
-        lines += ["", f"{title} ({len(entries)})", *(f"  {entry}" for entry in entries[:LISTED])]
-    if len(entries) > LISTED:
-        lines.append(f"  … and {len(entries) - LISTED} more")
+        lines += [
+            "",
+            f"{title} ({len(entries)})",
+            *(f"  {entry}" for entry in entries[:MAX_LISTED]),
+        ]
+    if len(entries) > MAX_LISTED:
+        lines.append(f"  … and {len(entries) - MAX_LISTED} more")
 
 
-def _between(final: Path, photos: Path) -> str:
-    """Where the photos lie, seen from the capture file."""
+def _relative_path(final: Path, photos: Path) -> str:
+    """Path of the photos relative to the capture file."""
     target = photos.resolve()
     try:
         return Path(os.path.relpath(target, final.resolve())).as_posix()
@@ -119,20 +123,20 @@ def _between(final: Path, photos: Path) -> str:
 def starter_capture(images: str) -> str:
     """A capture file with the scan's part filled in and the rest explained."""
     return f"""\
-# Written by `solve`. What is still missing: a mesh, and at least one lit photo.
+# Written by `solve`. Still missing: a mesh, and at least one lit photo.
 
 [scan]
 cameras = "{MODEL}"
-mesh = "model.ply"                 # dense reconstruction makes it: docs/guide/solve.md says how
+mesh = "model.ply"                 # made by dense reconstruction, see docs/guide/solve.md
 images = {json.dumps(images, ensure_ascii=False)}
 
-# One lamp, and which way it is from the surface:
+# One lamp; direction: from the surface to the lamp:
 # [[light]]
 # name = "lamp"
 # direction = [0.3, 0.5, 0.81]
 
-# One of these for every lit photo; a photo that shares no viewpoint with a scan photo is given
-# a camera by `localise`:
+# One entry for every lit photo. For a photo that shares no viewpoint with a scan photo,
+# `localise` computes a camera:
 # [[photo]]
 # file = "lit/0001.exr"
 # camera = "IMG_0041.jpg"

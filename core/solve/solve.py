@@ -1,5 +1,5 @@
 """Structure from motion: photos → cameras and sparse points, by COLMAP's incremental mapper
-(Schönberger & Frahm 2016). Runs in a thread: see background.py."""
+(Schönberger & Frahm 2016). Runs in a thread, see background.py."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from .picture import grey_of, read_picture
 from .solution import Solution, Unplaced
 
 LENSES = ("SIMPLE_RADIAL", "RADIAL", "OPENCV", "OPENCV_FISHEYE", "SIMPLE_PINHOLE", "PINHOLE")
-FEWEST = 3  # photos: two have no third to agree with
-PAIRS_AT_ONCE = 100  # between two looks at whether to go on
-PHOTOS_AT_ONCE = 4  # a gigabyte each, for photos of LARGEST_SIDE
-EXTRACTED, CHOSEN, MATCHED = 0.45, 0.5, 0.8  # fractions of the whole job
-MORE_OVERLAP = (
-    "take more photos, each showing two thirds of what its neighbour shows, of a surface that has "
-    "marks to recognise, under light that stays still while the camera moves"
+MIN_PHOTOS = 3  # two photos cannot be verified by a third
+PAIRS_PER_BATCH = 100  # matched between two checks for cancellation
+MAX_PARALLEL_PHOTOS = 4  # each takes a gigabyte at the largest side that features use
+EXTRACTED_FRACTION, PAIRED_FRACTION, MATCHED_FRACTION = 0.45, 0.5, 0.8  # of the job's progress
+OVERLAP_ADVICE = (
+    "take more photos that each overlap the next by two thirds, of a surface with visible "
+    "texture, and keep the light still while the camera moves"
 )
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What is kept of one photo after its features were found. colours: (n, 3) at the features."""
+class PhotoFeatures:
+    """The data of one photo kept after feature detection. colours: (n, 3) at the features."""
 
     key: LensKey
     focal: tuple[float, bool]
@@ -47,31 +47,38 @@ class Seen:
 
 def solve(photos: Sequence[PhotoFile], lens: str, threads: int | None, work: Work) -> Solution:
     """Cameras of all photos that can be placed. Raises PatinaError where there are too few."""
-    _enough(len(photos), "")
+    _check_count(len(photos), "")
     cores = threads or os.cpu_count() or 1
-    with tempfile.TemporaryDirectory(prefix="patina-solve-") as room:
-        store = FeatureStore(Path(room) / "features.db", lens)
+    with tempfile.TemporaryDirectory(prefix="patina-solve-") as folder:
+        store = FeatureStore(Path(folder) / "features.db", lens)
         try:
             colours, first, unreadable = _extract(photos, store, cores, work)
-            _enough(len(colours), f"; {len(unreadable)} cannot be read: {_first(unreadable)}")
-            numbers = sorted(colours)
-            work.at("choosing pairs", EXTRACTED)
-            chosen = choose_pairs(
-                [first[n] for n in numbers],
-                lambda done: work.at("choosing pairs", EXTRACTED + done * (CHOSEN - EXTRACTED)),
+            _check_count(
+                len(colours),
+                f"; {len(unreadable)} cannot be read, for example: {_first_reason(unreadable)}",
             )
-            pairs = [(numbers[i], numbers[j]) for i, j in chosen]
+            indices = sorted(colours)
+            work.at("choosing pairs", EXTRACTED_FRACTION)
+            selected = choose_pairs(
+                [first[n] for n in indices],
+                lambda done: work.at(
+                    "choosing pairs",
+                    EXTRACTED_FRACTION + done * (PAIRED_FRACTION - EXTRACTED_FRACTION),
+                ),
+            )
+            pairs = [(indices[i], indices[j]) for i, j in selected]
             _match(store.path, pairs, cores, work)
             agreeing = store.verified()
         finally:
             store.close()
         models = _map(store.path, len(colours), cores, work)
     by_size = sorted(models, key=lambda model: -model.num_reg_images())
-    if not by_size or by_size[0].num_reg_images() < FEWEST:
+    if not by_size or by_size[0].num_reg_images() < MIN_PHOTOS:
         best = max((points for _, points in agreeing.values()), default=0)
         raise PatinaError(
-            f"no {FEWEST} of the {len(colours)} photos fit together (the best of them shares "
-            f"{best} points with all others); {MORE_OVERLAP}"
+            f"no group of {MIN_PHOTOS} of the {len(colours)} photos can be connected (the "
+            "best photo matches "
+            f"{best} points of all others); {OVERLAP_ADVICE}"
         )
     model = by_size[0]
     _colour(model, colours)
@@ -91,24 +98,25 @@ def solve(photos: Sequence[PhotoFile], lens: str, threads: int | None, work: Wor
     return Solution(model, len(photos), tuple(unplaced), tuple(unreadable), others)
 
 
-def _enough(count: int, why: str) -> None:
-    if count < FEWEST:
-        raise PatinaError(f"{count} photos are too few to solve, expected at least {FEWEST}{why}")
+def _check_count(count: int, why: str) -> None:
+    if count < MIN_PHOTOS:
+        raise PatinaError(f"found {count} usable photos; expected at least {MIN_PHOTOS}{why}")
 
 
-def _first(unreadable: Sequence[tuple[str, str]]) -> str:
+def _first_reason(unreadable: Sequence[tuple[str, str]]) -> str:
     return unreadable[0][1] if unreadable else "none"
 
 
 def _extract(
     photos: Sequence[PhotoFile], store: FeatureStore, cores: int, work: Work
 ) -> tuple[dict[int, NDArray[np.uint8]], dict[int, NDArray[np.uint8]], list[tuple[str, str]]]:
-    """(by number: colours at the features; descriptors of the largest; (name, why) not read)."""
+    """(colours at the features by photo index; descriptors of the largest features by photo index;
+    (name, reason) of unreadable photos)."""
     colours: dict[int, NDArray[np.uint8]] = {}
     first: dict[int, NDArray[np.uint8]] = {}
     unreadable: list[tuple[str, str]] = []
     for number, found in enumerate(_all_seen(photos, cores, work)):
-        work.at("finding features", EXTRACTED * (number + 1) / len(photos))
+        work.at("finding features", EXTRACTED_FRACTION * (number + 1) / len(photos))
         if isinstance(found, str):
             unreadable.append((photos[number].name, found))
             continue
@@ -118,35 +126,36 @@ def _extract(
     return colours, first, unreadable
 
 
-def _all_seen(photos: Sequence[PhotoFile], cores: int, work: Work) -> Iterator[Seen | str]:
-    """In the order of the photos: what was found, or why the photo cannot be read."""
+def _all_seen(photos: Sequence[PhotoFile], cores: int, work: Work) -> Iterator[PhotoFeatures | str]:
+    """In the order of the photos: the features, or the reason why the photo cannot be read."""
 
-    def see(photo: PhotoFile) -> Seen | str:
+    def see(photo: PhotoFile) -> PhotoFeatures | str:
         work.check()
         try:
-            return seen_in(photo.path)
+            return extract_features(photo.path)
         except PatinaError as error:
             return str(error)
 
-    pool = ThreadPoolExecutor(min(cores, PHOTOS_AT_ONCE))
+    pool = ThreadPoolExecutor(min(cores, MAX_PARALLEL_PHOTOS))
     try:
         yield from pool.map(see, photos)
     finally:
         pool.shutdown(cancel_futures=True)
 
 
-def seen_in(path: Path) -> Seen:
+def extract_features(path: Path) -> PhotoFeatures:
     """Features of a photo file. Raises InputError."""
     picture, exif = read_picture(path), read_exif(path)
     size = (picture.shape[1], picture.shape[0])
     features = Detector(pooled=True)(grey_of(picture))
     columns, rows = np.clip(features.pixels.astype(np.intp), 0, np.array(size) - 1).T
     key = LensKey.of(size, exif)
-    return Seen(key, first_focal(size, exif), features, picture[rows, columns])
+    return PhotoFeatures(key, first_focal(size, exif), features, picture[rows, columns])
 
 
 def _match(database: Path, pairs: Sequence[tuple[int, int]], cores: int, work: Work) -> None:
-    """Compare pairs of photos; each pair's geometry is checked (Schönberger & Frahm 2016)."""
+    """Match pairs of photos; each pair's two-view geometry is verified (Schönberger & Frahm
+    2016)."""
     matching = pycolmap.FeatureMatchingOptions()
     matching.use_gpu, matching.num_threads = False, cores
     checking = pycolmap.TwoViewGeometryOptions()
@@ -154,9 +163,11 @@ def _match(database: Path, pairs: Sequence[tuple[int, int]], cores: int, work: W
     pairing = pycolmap.ImportedPairingOptions()
     listed = database.with_name("pairs.txt")
     pairing.match_list_path = str(listed)
-    for begin in range(0, len(pairs), PAIRS_AT_ONCE):
-        work.at("matching", CHOSEN + (MATCHED - CHOSEN) * begin / len(pairs))
-        some = pairs[begin : begin + PAIRS_AT_ONCE]
+    for begin in range(0, len(pairs), PAIRS_PER_BATCH):
+        work.at(
+            "matching", PAIRED_FRACTION + (MATCHED_FRACTION - PAIRED_FRACTION) * begin / len(pairs)
+        )
+        some = pairs[begin : begin + PAIRS_PER_BATCH]
         listed.write_text("".join(f"{i} {j}\n" for i, j in some), "ascii")
         pycolmap.match_image_pairs(
             database,
@@ -172,26 +183,28 @@ def _map(database: Path, count: int, cores: int, work: Work) -> list[pycolmap.Re
     options = pycolmap.IncrementalPipelineOptions()
     options.num_threads = cores
     options.random_seed = 0
-    options.min_model_size = FEWEST
-    options.extract_colors = False  # it would look for the photos by their names in the database
-    out, nothing = database.with_name("models"), database.with_name("nothing")
+    options.min_model_size = MIN_PHOTOS
+    options.extract_colors = False  # it would search the photos by their names in the database
+    out, empty = database.with_name("models"), database.with_name("nothing")
     out.mkdir()
-    nothing.mkdir()
-    work.at("placing cameras", MATCHED)
+    empty.mkdir()
+    work.at("placing cameras", MATCHED_FRACTION)
     placed = 0
 
-    def one_more() -> None:
+    def count_image() -> None:
         nonlocal placed
         placed += 1
-        work.say("placing cameras", MATCHED + (1 - MATCHED) * min(1.0, placed / count))
+        work.report(
+            "placing cameras", MATCHED_FRACTION + (1 - MATCHED_FRACTION) * min(1.0, placed / count)
+        )
 
     found = pycolmap.incremental_mapping(
         database,
-        nothing,
+        empty,
         out,
         options,
-        initial_image_pair_callback=one_more,
-        next_image_callback=one_more,
+        initial_image_pair_callback=count_image,
+        next_image_callback=count_image,
         cancellation_token=work.token,
     )
     work.check()
@@ -199,7 +212,7 @@ def _map(database: Path, count: int, cores: int, work: Work) -> list[pycolmap.Re
 
 
 def _colour(model: pycolmap.Reconstruction, colours: dict[int, NDArray[np.uint8]]) -> None:
-    """Each point's colour: the mean over the photos it is seen in."""
+    """Set each point's colour to the mean over the photos that observe it."""
     for point in model.points3D.values():
         seen = [
             colours[int(model.images[e.image_id].name)][e.point2D_idx] for e in point.track.elements

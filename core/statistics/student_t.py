@@ -1,7 +1,7 @@
 """Student's t distribution as a robust error model (Lange, Little and Taylor 1989).
 
-With few degrees of freedom, residuals that do not belong (an unexplained shadow, a misregistered
-pixel) lose weight instead of pulling the fit.
+With few degrees of freedom, outliers (an unexplained shadow, a misregistered pixel) get less weight
+in the fit.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ def robust_cost(residual: Array) -> Array:
 
 
 def robust_weights(residual: Array) -> Array:
-    """Weights of the squared residuals in Gauss–Newton; residuals in units of their scale."""
+    """Weights of the squared residuals in Gauss–Newton; residuals are in units of their scale."""
     return weights_of_squares(np.square(residual))
 
 
 def weights_of_squares(squares: Array) -> Array:
-    """The same, from squared residuals in units of their scale."""
+    """Weights of the squared residuals in Gauss–Newton, from squared residuals in units of their
+    scale."""
     return (DEGREES_OF_FREEDOM + 1) / (DEGREES_OF_FREEDOM + squares)

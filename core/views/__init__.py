@@ -1,2 +1,1 @@
-"""What a person sees of a capture and its fit: pictures and figures, the same in the report and in
-Blender."""
+"""Pictures and charts of a capture and its fit, the same in the report and in Blender."""

@@ -1,4 +1,4 @@
-"""The charts by name, and what each needs."""
+"""The charts of a BRDF, selected by name."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from .sphere_view import sphere_view
 from .subject import Show, Subject
 
 CHARTS = ("sphere", "polar", "highlight", "slice", "interval", "ratio")
-BIN = 4.0  # degrees
+THETA_D_BIN = 4.0  # degrees, bin width of the histogram of the samples' θd
 
 
 @dataclass(frozen=True)
 class View:
-    """How charts are looked at. Angles in degrees: incidence of the polar slice, theta_d of the
-    highlight curve, phi_d of the image slices. exposure: of the sphere, in stops."""
+    """Settings of all charts. Angles in degrees: incidence of the polar slice, theta_d of the
+    highlight curve, phi_d of the image slices. exposure: of the lit sphere, in stops."""
 
     show: Show = field(default_factory=Show)
     incidence: float = 45.0
@@ -31,7 +31,8 @@ class View:
 
 
 def chart(kind: str, subject: Subject, other: Subject | None, view: View) -> Drawing:
-    """One of CHARTS. Raises PatinaError where what it shows is not known."""
+    """Draw one of CHARTS. Raises PatinaError for an unknown kind, for "interval" without an
+    interval, and for "ratio" without a second BRDF."""
     both = [subject] if other is None else [subject, other]
     if kind == "sphere":
         return sphere_view(subject, other, view.exposure)
@@ -44,20 +45,20 @@ def chart(kind: str, subject: Subject, other: Subject | None, view: View) -> Dra
     if kind == "interval":
         if subject.interval is None:
             raise PatinaError(
-                f"nothing is known of how far {subject.label} may be off: fit it with method "
-                '"measured"'
+                f"found no 90 % interval for {subject.label}; expected a fit with one: fit it with "
+                'method "measured"'
             )
         return interval_slice(subject, view.phi_d, view.show)
     if kind == "ratio":
         if other is None:
-            raise PatinaError("nothing to compare with: choose it first")
+            raise PatinaError("found no material to compare with; choose one first")
         return ratio_slice(subject, other, view.phi_d, view.show)
     raise PatinaError(f"found {kind!r}; expected one of {', '.join(CHARTS)}")
 
 
-def most_measured(subject: Subject) -> float | None:
-    """θd in degrees where most samples are; None without any."""
+def best_sampled_theta_d(subject: Subject) -> float | None:
+    """The θd in degrees (centre of a bin) with most samples; None without samples."""
     if subject.points is None or not len(subject.points):
         return None
-    place = np.floor(np.degrees(subject.points.angles.theta_d) / BIN).astype(int)
-    return float((np.bincount(place).argmax() + 0.5) * BIN)
+    bins = np.floor(np.degrees(subject.points.angles.theta_d) / THETA_D_BIN).astype(int)
+    return float((np.bincount(bins).argmax() + 0.5) * THETA_D_BIN)

@@ -1,4 +1,4 @@
-"""The criteria that decide about pixels, as a person meets them: a word, a colour, what to do."""
+"""The criteria that decide whether a pixel is sampled: a label, a colour and advice for each."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ..samples import Criterion
 
 @dataclass(frozen=True)
 class Look:
-    """key: for files and properties; word: "39 % …"; colour: sRGB, 0..255; advice: what it means
-    and what can be done."""
+    """How a criterion is shown. key: for files and properties; word: the label, as in "39 %
+    clipped"; colour: sRGB, 0..255; advice: the meaning, and what to do."""
 
     key: str
     word: str
@@ -21,81 +21,83 @@ class Look:
     advice: str
 
 
-# Reliable is blue-green, the only one; what was rejected is warm, purple or grey. Searched for the
-# largest differences between any two, also for eyes without red or green cones.
+# Only "reliable" is blue-green; the criteria that exclude pixels are warm, purple or grey. The
+# colours were optimised for the largest smallest difference of any two, also for viewers without
+# red or green cones.
 LOOKS: dict[Criterion, Look] = {
     Criterion.NO_SURFACE: Look(
         "no_surface", "no surface", (58, 60, 64),
-        "Nothing of the mesh is here. Where the photo shows the object, the mesh or the camera's "
-        "pose is off, or the scan has a hole.",
+        "There is no mesh behind these pixels. If the photo shows the object here, the mesh or the "
+        "camera pose is wrong, or the scan has a hole.",
     ),
     Criterion.NO_MATERIAL: Look(
         "no_material", "no material", (172, 172, 172),
-        "No mask and no face says what it is made of. Paint it, or name it in a mask, if it should "
-        "be measured.",
+        "No mask and no face assigns a material. To measure it, paint it or assign it in a mask.",
     ),
     Criterion.SHADOW_MASK: Look(
         "shadow_mask", "painted as shadow", (44, 0, 140),
-        "A shadow mask leaves it out. Erase it there if the lamp does reach it.",
+        "A shadow mask excludes these pixels. Erase the mask where the lamp reaches the surface.",
     ),
     Criterion.HIGHLIGHT_MASK: Look(
-        "highlight_mask", "painted as highlight to leave out", (160, 30, 200),
-        "A highlight mask leaves it out. Leave the lamp's own highlights in: they tell gloss.",
+        "highlight_mask", "painted as highlight to exclude", (160, 30, 200),
+        "A highlight mask excludes these pixels. Keep the highlights of the lamp itself: the gloss "
+        "is measured from them.",
     ),
     Criterion.IGNORE_MASK: Look(
         "ignore_mask", "painted as ignored", (207, 120, 255),
-        "An ignore mask leaves it out.",
+        "An ignore mask excludes these pixels.",
     ),
     Criterion.TURNED_AWAY: Look(
         "turned_away", "in shadow: turned away", (56, 53, 50),
-        "The surface faces away from the lamp. Lamps on other sides reach it; where the photo is "
-        "bright here, the light's direction is wrong.",
+        "The surface faces away from the lamp. Use lamps on other sides to reach it. If the photo "
+        "is bright here, the direction of the light is wrong.",
     ),
     Criterion.CAST_SHADOW: Look(
         "cast_shadow", "in shadow: cast", (112, 106, 104),
-        "Another part of the mesh blocks the lamp. Where the photo is bright here, the light's "
-        "direction is wrong or the mesh has too much.",
+        "Another part of the mesh blocks the lamp. If the photo is bright here, the direction of "
+        "the light is wrong, or the mesh has extra geometry.",
     ),
     Criterion.SHADOW_EDGE: Look(
         "shadow_edge", "near a shadow's edge", (255, 184, 0),
-        "A pixel of error puts it on the other side of the edge. shadow_margin says how far is "
-        "near; a large lamp casts soft edges: make shadow masks.",
+        "An error of one pixel would move these pixels to the other side of the shadow's edge. The "
+        "distance is set by shadow_margin. A large lamp casts soft edges: make shadow masks.",
     ),
     Criterion.OUTLINE: Look(
         "outline", "near an outline", (255, 243, 51),
-        "A pixel of error puts it on another surface. silhouette_margin says how far is near.",
+        "An error of one pixel would move these pixels to another surface. The distance is set by "
+        "silhouette_margin.",
     ),
     Criterion.GRAZING: Look(
         "grazing", "grazing", (196, 10, 55),
-        "Seen or lit so flatly that a small error of the mesh changes the result by much. Photos "
-        "from the front, and lamps beside the camera, see it better; smallest_cosine is the "
-        "limit.",
+        "The view or the light is so grazing that a small error of the mesh changes the result "
+        "much. Take photos from the front, with lamps near the camera. The limit is set by "
+        "smallest_cosine.",
     ),
     Criterion.MASK_BORDER: Look(
         "mask_border", "at a mask's border", (255, 134, 95),
-        "Its pixel may show both materials. mask_margin says how far is near.",
+        "These pixels may show both materials. The distance is set by mask_margin.",
     ),
     Criterion.UNUSABLE: Look(
         "unusable", "clipped", (210, 104, 15),
-        "Too bright for the photo (of a bracket: for all its exposures), so that its light is not "
-        "known. Expose less, or take a bracket.",
+        "The pixels are overexposed (in a bracket: in all exposures), so their radiance is "
+        "unknown. Expose less, or take a bracket.",
     ),
-    Criterion.MISSED: Look(
-        "missed", "missed by the light", (76, 93, 0),
-        "The lamp's beam all but misses it: there is nothing to measure.",
+    Criterion.OUTSIDE_BEAM: Look(
+        "missed", "outside the light's beam", (76, 93, 0),
+        "The beam of the lamp gives almost no light here. Turn the lamp, or use a wider one.",
     ),
     Criterion.CURVED: Look(
         "curved", "too curved", (255, 249, 215),
-        "More curved than the paper's method believes a scan. Its threshold is [fit] curvature; "
-        "the measured method uses such pixels.",
+        "The curvature is above the threshold of the paper's method, curvature in [fit]. The "
+        "measured method uses such pixels.",
     ),
     Criterion.RELIABLE: Look(
         "reliable", "reliable", (0, 147, 155),
-        "A sample: what the material is measured from.",
+        "These pixels are samples: the material is measured from them.",
     ),
 }  # fmt: skip
 
 PALETTE: NDArray[np.uint8] = np.array([LOOKS[c].colour for c in Criterion], np.uint8)
-"""(criteria, 3) sRGB of each, by its number."""
-SPARE = (121, 226, 225)
-"""Reliable, but not among the random part of the samples that a fit was given."""
+"""(criteria, 3) sRGB of each criterion, indexed by its number."""
+UNSELECTED = (121, 226, 225)
+"""sRGB of reliable pixels that are not in the random subset of the samples that a fit uses."""

@@ -1,7 +1,7 @@
-"""A drawing as a list of parts, so that a page (svg.py) and Blender (raster.py) show the same one.
+"""A drawing as a list of parts: svg.py writes it for HTML, raster.py renders it for Blender.
 
 Coordinates: pixels at scale 1, x to the right, y downwards from the top left corner. Colours:
-"#rrggbb". Parts lie over those before them; labels over everything.
+"#rrggbb". Later parts cover earlier ones; labels cover everything.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ FONT = 10.0
 
 @dataclass(frozen=True)
 class Line:
-    """Through points (n, 2). dash: lengths drawn and left out, None: whole."""
+    """A line through points (n, 2). dash: lengths of dashes and gaps, None for a solid line."""
 
     points: NDArray[np.floating]
     colour: str
@@ -28,7 +28,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Area:
-    """Inside a closed outline (n, 2)."""
+    """A filled polygon with the closed outline (n, 2)."""
 
     points: NDArray[np.floating]
     colour: str
@@ -47,7 +47,7 @@ class Dots:
 
 @dataclass(frozen=True)
 class Picture:
-    """Pixels (h, w, 3) uint8 in a rectangle."""
+    """An image (h, w, 3) uint8, scaled to a rectangle."""
 
     left: float
     top: float
@@ -73,7 +73,7 @@ Part = Line | Area | Dots | Picture | Label
 
 @dataclass(frozen=True)
 class Drawing:
-    """label: what it is, for those who do not see it."""
+    """A complete drawing. label: a description for screen readers."""
 
     width: float
     height: float
@@ -95,10 +95,10 @@ def box(left: float, top: float, right: float, bottom: float, colour: str) -> Ar
 
 
 def rgb(colour: str) -> NDArray[np.uint8]:
-    """(3,) of a "#rrggbb"."""
+    """(3,) 0 … 255 of a colour "#rrggbb"."""
     return np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)], np.uint8)
 
 
 def named(colour: Sequence[int] | NDArray[np.integer]) -> str:
-    """The "#rrggbb" of (3,) 0 … 255."""
+    """The colour (3,) 0 … 255 as "#rrggbb"."""
     return "#" + "".join(f"{int(c):02x}" for c in colour)

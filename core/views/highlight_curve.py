@@ -1,4 +1,4 @@
-"""Reflectance against θh: the highlight's shape, with the samples that it was measured by."""
+"""Reflectance against θh: the shape of the highlight, with the samples near it."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from .subject import OTHER_DASH, Show, Subject, dark, round_up
 LEFT, TOP, WIDTH, HEIGHT = 46.0, 16.0, 400.0, 200.0
 STEPS = 241
 TICKS = (0, 1, 5, 10, 20, 30, 45, 60, 75, 90)  # degrees
-NEAR = np.radians(4.0)  # of θd, for measured points
-QUARTER = np.pi / 2
+MAX_THETA_D_DISTANCE = np.radians(4.0)  # of the samples that are shown, from θd of the curve
+QUARTER = np.pi / 2  # a right angle
 
 
 def highlight_curve(
     subjects: Sequence[Subject], theta_d_degrees: float, show: Show | None = None
 ) -> Drawing:
-    """ρ from θh = 0 to the horizon at a θd, φd = 90°, θh on a square-root axis as MERL's: the first
-    subject whole, with its interval and its points, those after it dashed."""
+    """ρ against θh from 0° to 90° at one θd and φd = 90°, θh on a square-root axis as in the MERL
+    tables. The first subject is a solid line with its interval and samples, the others dashed."""
     show = show or Show()
     theta_d = np.radians(theta_d_degrees)
     theta_h = np.square(np.linspace(0.0, 1.0, STEPS)) * QUARTER
@@ -48,27 +48,33 @@ def highlight_curve(
         for c, colour in enumerate(show.colours):
             path = np.stack([x, _height(show, value[:, c], top)], axis=1)
             parts.append(Line(path, colour, 1.6, OTHER_DASH if number else None))
-    told = f"{show.unit} at θd = {theta_d_degrees:g}°"
-    told += f" · {near:,} samples within {np.degrees(NEAR):g}°" if first.points is not None else ""
-    parts.append(Label(LEFT, TOP - 5, told, colour=INK))
+    title = f"{show.unit} at θd = {theta_d_degrees:g}°"
+    title += (
+        f" · {near:,} samples within {np.degrees(MAX_THETA_D_DISTANCE):g}°"
+        if first.points is not None
+        else ""
+    )
+    parts.append(Label(LEFT, TOP - 5, title, colour=INK))
     if len(subjects) > 1:
-        told = " · ".join(f"dashed: {s.label}" for s in subjects[1:])
-        parts.append(Label(LEFT + WIDTH, TOP - 5, told, "end", INK))
+        title = " · ".join(f"dashed: {s.label}" for s in subjects[1:])
+        parts.append(Label(LEFT + WIDTH, TOP - 5, title, "end", INK))
     label = f"reflectance against theta h at theta d {theta_d_degrees:g} degrees"
     return Drawing(LEFT + WIDTH + 14, TOP + HEIGHT + 34, label, tuple(parts))
 
 
 def _across(theta_h: NDArray[np.floating]) -> NDArray[np.float64]:
+    """x of θh in radians."""
     return LEFT + WIDTH * np.sqrt(np.asarray(theta_h, np.float64) / QUARTER)
 
 
 def _height(show: Show, value: NDArray[np.floating], top: float) -> NDArray[np.float64]:
+    """y of reflectances; top: the value at the upper edge."""
     return TOP + HEIGHT * (1 - np.clip(show.length(value, top), 0.0, 1.0))
 
 
 def _measured(points: MeasuredPoints, theta_d: float, show: Show, top: float) -> Dots:
-    """Those above the chart lie on its edge."""
-    rows = np.flatnonzero(np.abs(points.angles.theta_d - theta_d) < NEAR)
+    """Samples near the θd of the curve; those above the chart are drawn at its upper edge."""
+    rows = np.flatnonzero(np.abs(points.angles.theta_d - theta_d) < MAX_THETA_D_DISTANCE)
     theta_h = points.angles.theta_h[rows]
     value = show.values(points.rho[rows], np.cos(theta_h) * np.cos(theta_d))
     x = _across(theta_h)
@@ -78,6 +84,7 @@ def _measured(points: MeasuredPoints, theta_d: float, show: Show, top: float) ->
 
 
 def _frame(show: Show, top: float) -> list[Part]:
+    """Grid lines and labels of both axes."""
     right, bottom = LEFT + WIDTH, TOP + HEIGHT
     parts: list[Part] = []
     for fraction in (*show.rings(), 0.0):
@@ -91,5 +98,5 @@ def _frame(show: Show, top: float) -> list[Part]:
         parts.append(straight(x, TOP, x, bottom, GRID))
         parts.append(Label(x, bottom + 13, f"{degrees}°", "middle"))
     parts.append(straight(LEFT, bottom, right, bottom, "#9999aa"))
-    parts.append(Label(LEFT, bottom + 28, f"θh, square-root axis · {show.way} scale"))
+    parts.append(Label(LEFT, bottom + 28, f"θh, square-root axis · {show.scale_name} scale"))
     return parts

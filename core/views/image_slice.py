@@ -1,5 +1,5 @@
-"""The θh × θd slice of a BRDF as a picture (Burley 2012, "Physically-based shading at Disney",
-"image slices"), θh on a square-root axis, with the samples that were measured over it."""
+"""The θh × θd slice of a BRDF as an image (Burley 2012, "Physically-based shading at Disney",
+"image slices"), θh on a square-root axis, with the samples drawn over it."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from .drawing import INK, Dots, Drawing, Label, Part, Picture, box, named
 from .subject import Show, Subject, round_up
 
 LEFT, TOP, WIDTH, HEIGHT = 40.0, 18.0, 400.0, 200.0
-CELLS = (200, 100)  # of θh and θd
-QUARTER = np.pi / 2
+CELLS = (200, 100)  # pixels along θh and θd
+QUARTER = np.pi / 2  # a right angle
 TICKS_H, TICKS_D = (0, 1, 5, 10, 20, 45, 90), (0, 15, 30, 45, 60, 75, 90)
-POINT_FULL = 0.30  # relative difference of a sample from the fit, for full colour
-WIDEST = 2.0  # log2 of the factor that is shown as the widest interval
-# light to dark, even in lightness: for one-sided quantities
+POINT_FULL = 0.30  # relative difference between sample and fit that is shown in full colour
+MAX_INTERVAL_STOPS = 2.0  # log2 of the half width of an interval that is shown in the last colour
+# light to dark in even steps of lightness, for one-sided quantities
 SEQUENCE = np.array([[252, 251, 240], [250, 205, 120], [226, 120, 75], [160, 45, 95], [55, 15, 80]])
-BODY = 20.0  # white is so much brighter than the typical direction: highlights clip, the body shows
-POINT = np.array([20, 22, 30], np.uint8)
+WHITE_TO_MEDIAN = 20.0  # white over the median reflectance: highlights clip, the rest is visible
+POINT = np.array([20, 22, 30], np.uint8)  # sRGB of samples on an interval slice
 
 
 @dataclass(frozen=True)
 class _Field:
-    """What is shown of every cell: pixels (d, h, 3), and the key under it: (text, colour) each."""
+    """A slice as an image: pixels (θd, θh, 3) uint8; key: (text, colour) of each legend entry."""
 
     pixels: NDArray[np.uint8]
     title: str
@@ -36,38 +36,39 @@ class _Field:
 
 
 def reflectance_slice(subject: Subject, phi_d_degrees: float, show: Show | None = None) -> Drawing:
-    """The BRDF itself. Samples: bluer darker, redder brighter than the fit says there."""
+    """The BRDF itself. Samples are blue where darker and red where brighter than the fit."""
     show = show or Show()
     angles, seen = _cells(phi_d_degrees)
     rho = np.maximum(np.asarray(subject.evaluate(angles), np.float64), 0)
     value = show.values(rho, np.maximum(cosines(*angles)[0], 0))
-    top = round_up(BODY * float(np.median(value[seen]))) if seen.any() else 1.0
+    top = round_up(WHITE_TO_MEDIAN * float(np.median(value[seen]))) if seen.any() else 1.0
     shown = np.clip(show.length(value, top), 0, 1)
     pixels = (np.broadcast_to(shown, (len(shown), 3)) * 255 + 0.5).astype(np.uint8)
-    title = f"{show.unit}, {show.way} up to {top:.3g} · φd = {phi_d_degrees:g}°"
+    title = f"{show.unit}, {show.scale_name} up to {top:.3g} · φd = {phi_d_degrees:g}°"
     key: tuple[tuple[str, NDArray[np.uint8]], ...] = ()
     if subject.points is not None:
         key = (
             ("sample darker than the fit", display.TOO_DARK.astype(np.uint8)),
-            ("as it says", display.RIGHT.astype(np.uint8)),
+            ("equal", display.RIGHT.astype(np.uint8)),
             (f"brighter (full at {100 * POINT_FULL:.0f} %)", display.TOO_BRIGHT.astype(np.uint8)),
         )
     return _drawing(_field(pixels, seen, title, key), _against(subject))
 
 
 def interval_slice(subject: Subject, phi_d_degrees: float, show: Show | None = None) -> Drawing:
-    """How far off the BRDF may be: half of its 90 % interval, mean of the channels shown."""
+    """Half width of the 90 % interval of the BRDF, mean of the channels shown. Raises ValueError
+    for a subject without an interval."""
     if subject.interval is None:
         raise ValueError("expected a fit with an interval")
     show = show or Show()
     angles, seen = _cells(phi_d_degrees)
-    low, high = (np.maximum(show.channelled(x), 1e-9) for x in subject.interval(angles))
+    low, high = (np.maximum(show.select_channels(x), 1e-9) for x in subject.interval(angles))
     stops = 0.5 * np.log2(high / low).mean(axis=1)
-    pixels = _sequential(stops / WIDEST)
+    pixels = _sequential(stops / MAX_INTERVAL_STOPS)
     title = f"90 % interval of ρ · φd = {phi_d_degrees:g}°"
     marks = (("± 0 %", 1.0), ("± 20 %", 1.2), ("× or / 1.5", 1.5), ("× or / 2", 2.0),
-             (f"× or / {2**WIDEST:g}", 2**WIDEST))  # fmt: skip
-    key = tuple((text, _sequential(np.log2([f]) / WIDEST)[0]) for text, f in marks)
+             (f"× or / {2**MAX_INTERVAL_STOPS:g}", 2**MAX_INTERVAL_STOPS))  # fmt: skip
+    key = tuple((text, _sequential(np.log2([f]) / MAX_INTERVAL_STOPS)[0]) for text, f in marks)
     points = subject.points
     dots = None if points is None else _dots(points, np.tile(POINT, (len(points), 1)))
     return _drawing(_field(pixels, seen, title, key), dots)
@@ -76,10 +77,12 @@ def interval_slice(subject: Subject, phi_d_degrees: float, show: Show | None = N
 def ratio_slice(
     subject: Subject, other: Subject, phi_d_degrees: float, show: Show | None = None
 ) -> Drawing:
-    """What another fit says, over what this one says; mean of the channels shown."""
+    """Ratio of another BRDF to this one, mean of the channels shown."""
     show = show or Show()
     angles, seen = _cells(phi_d_degrees)
-    mine, its = (np.maximum(show.channelled(s.evaluate(angles)), 1e-6) for s in (subject, other))
+    mine, its = (
+        np.maximum(show.select_channels(s.evaluate(angles)), 1e-6) for s in (subject, other)
+    )
     stops = np.log2(its / mine).mean(axis=1)[:, None]
     pixels = display.difference_picture(stops[None], np.zeros_like(stops)[None], 1.0)[0]
     title = f"{other.label} ÷ {subject.label} · φd = {phi_d_degrees:g}°"
@@ -92,7 +95,8 @@ def ratio_slice(
 
 
 def _cells(phi_d_degrees: float) -> tuple[Angles, NDArray[np.bool_]]:
-    """(angles (d · h,), which of them are above the horizon); θd upwards, so from the last row."""
+    """(angles (d · h,), True where light and view are above the horizon). θd increases upwards, so
+    the last row has the smallest."""
     across, along = CELLS
     theta_h = np.square((np.arange(across) + 0.5) / across) * QUARTER
     theta_d = (1 - (np.arange(along) + 0.5) / along) * QUARTER
@@ -115,7 +119,7 @@ def _field(
 
 
 def _against(subject: Subject) -> Dots | None:
-    """The samples, coloured by how they differ from the fit at their own angles."""
+    """The samples, coloured by their relative difference from the fit at their own angles."""
     points = subject.points
     if points is None or not len(points):
         return None
@@ -125,12 +129,14 @@ def _against(subject: Subject) -> Dots | None:
 
 
 def _dots(points: MeasuredPoints, colours: NDArray[np.uint8]) -> Dots:
+    """Samples (n) as dots of the given colours (n, 3)."""
     x = LEFT + WIDTH * np.sqrt(points.angles.theta_h / QUARTER)
     y = TOP + HEIGHT * (1 - points.angles.theta_d / QUARTER)
     return Dots(np.stack([x, y], axis=1).astype(np.float64), colours, 0.7, 0.75)
 
 
 def _drawing(field: _Field, dots: Dots | None) -> Drawing:
+    """The image with axes, samples and legend."""
     bottom = TOP + HEIGHT
     parts: list[Part] = [Picture(LEFT, TOP, WIDTH, HEIGHT, field.pixels)]
     if dots is not None:
@@ -153,7 +159,7 @@ def _drawing(field: _Field, dots: Dots | None) -> Drawing:
 
 
 def _sequential(part: NDArray[np.floating] | list[float]) -> NDArray[np.uint8]:
-    """(n,) 0 … 1 → (n, 3)."""
+    """(n,) values 0 … 1 → (n, 3) colours of SEQUENCE."""
     at = np.clip(np.asarray(part, np.float64), 0, 1) * (len(SEQUENCE) - 1)
     shown = [np.interp(at, np.arange(len(SEQUENCE)), SEQUENCE[:, c]) for c in range(3)]
     return (np.stack(shown, axis=-1) + 0.5).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""Looking at one photo, as a job that Blender steps."""
+"""The comparison of one photo with its prediction, as a job that Blender runs in steps."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from .photo_view import Fitted, PhotoView, look_at_photo
 
 
 class LookJob(Job):
-    """``view`` is there when the job is done.
+    """Compute the PhotoView of one photo; ``view`` holds it when the job is done.
 
-    known: the fit that found ``fitted``, where it is still there: its scan, lights and photos are
-    used again. prepare: what is done to the scan once it is read. chosen: (column, row) of pixels
-    of this photo that a fit rests on.
+    fitted: the materials; known: the fit that they come from, if it is still in memory, whose scan,
+    lights and photos are then reused. prepare: applied to the scan after reading. chosen: (column,
+    row) of the pixels of this photo that the fit uses.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class LookJob(Job):
         self.view: PhotoView | None = None
 
     def run(self) -> Iterator[Step]:
-        """The scan and the lights where they are not known, then the photo."""
+        """Read the scan and the lights if necessary, then compare the photo."""
         capture, known = self.capture, self.known
         start = 0.0
         if known is not None:
@@ -67,11 +67,13 @@ class LookJob(Job):
         used = self._used(capture_data.camera_of(capture, scan, self.place).width)
         self.view = yield from relayed(
             look_at_photo(capture, scan, rays, photos, lights, self.fitted, self.place, used),
-            lambda done: Step("looking at the photo", start + (1 - start) * done),
+            lambda done: Step(
+                "comparing the photo with its prediction", start + (1 - start) * done
+            ),
         )
 
     def _used(self, width: int) -> NDArray[np.int64] | None:
-        """Flat indices."""
+        """(k,) flat pixel indices of ``chosen`` in a photo of this width."""
         if not self.chosen:
             return None
         column, row = np.array(self.chosen, np.int64).T

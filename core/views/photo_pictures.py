@@ -1,4 +1,4 @@
-"""Pictures of a PhotoView: photo, prediction, difference; and where samples came from."""
+"""Images of a PhotoView: photo, prediction and difference, and where samples came from."""
 
 from __future__ import annotations
 
@@ -9,21 +9,22 @@ from numpy.typing import NDArray
 
 from ..samples import Criterion
 from . import display
-from .criteria import PALETTE, SPARE
+from .criteria import PALETTE, UNSELECTED
 from .photo_view import PhotoView
 
-FULL_COLOUR = 0.3  # difference, of what is shown as white
+FULL_COLOUR = 0.3  # difference shown in full colour, relative to the radiance shown as white
 GAP = 6  # pixels between pictures
-TINT = 0.65  # how much of a pixel's colour is its criterion's, and not the photo's
-DIMMED = 0.45  # the photo where there is no surface
-RINGED = 100  # chosen pixels up to which each gets a ring
-RING, LINE = 6.0, 1.1  # pixels of the picture: radius, and half the width of a line
+TINT = 0.65  # share of the criterion's colour; the rest is the photo in grey
+DIMMED = 0.45  # brightness factor of the photo where there is no surface
+MAX_RINGS = 100  # selected pixels that are marked with rings; more are marked by colour
+RING, LINE = 6.0, 1.1  # pixels of the picture: radius of a ring and half the width of its line
 
 Picture = NDArray[np.uint8]
 
 
 class Comparison(NamedTuple):
-    """(h, w, 3) sRGB each. difference: signed, prediction too dark blue, too bright red."""
+    """(h, w, 3) sRGB each. difference: blue where the prediction is too dark, red where it is too
+    bright."""
 
     photo: Picture
     prediction: Picture
@@ -31,8 +32,8 @@ class Comparison(NamedTuple):
 
 
 def compared(view: PhotoView, longest: int, exposure: float = 0.0) -> Comparison:
-    """Photo and prediction at one exposure, so many stops above the usual; no side longer than
-    ``longest`` pixels."""
+    """Photo, prediction and difference at the same exposure. exposure: stops above the default;
+    longest: the largest side in pixels."""
     white = view.white / 2.0**exposure
     photo, prediction = (display.shrink(p, longest) for p in (view.measured, view.predicted))
     return Comparison(
@@ -43,17 +44,17 @@ def compared(view: PhotoView, longest: int, exposure: float = 0.0) -> Comparison
 
 
 def comparison_picture(view: PhotoView, longest: int, exposure: float = 0.0) -> Picture:
-    """(h, w, 3) photo | prediction | difference side by side; none longer than ``longest``."""
+    """(h, w, 3) photo | prediction | difference side by side; longest: largest side of each."""
     first, *others = compared(view, longest, exposure)
     gap = np.full((len(first), GAP, 3), display.UNKNOWN, np.uint8)
     return np.concatenate([first, *(p for other in others for p in (gap, other))], axis=1)
 
 
 def criteria_picture(view: PhotoView, longest: int) -> Picture:
-    """(h, w, 3) the colours of the criteria over the photo in grey; no side longer than
-    ``longest`` pixels. A handful of chosen pixels is ringed; of very many, the reliable ones that
-    were not chosen are paler."""
-    few = len(view.chosen) <= RINGED
+    """(h, w, 3) the colours of the criteria over the photo in grey; longest: the largest side in
+    pixels. Up to MAX_RINGS selected pixels get rings; if there are more, the reliable pixels that
+    were not selected are paler."""
+    few = len(view.chosen) <= MAX_RINGS
     colours = display.shrink(PALETTE[view.criteria] if few else _with_spare(view), longest)
     surface = display.shrink((view.criteria != Criterion.NO_SURFACE).astype(np.float32), longest)
     photo = display.photo_picture(display.shrink(view.measured, longest), view.white)
@@ -69,17 +70,17 @@ def criteria_picture(view: PhotoView, longest: int) -> Picture:
 
 
 def _with_spare(view: PhotoView) -> Picture:
-    """(h, w, 3) the colours, paler where a reliable pixel is not among the chosen."""
+    """(h, w, 3) the colours of the criteria, paler for reliable pixels that are not selected."""
     colours = PALETTE[view.criteria]
     spare = view.criteria == Criterion.RELIABLE
     rows, columns = view.chosen.T
     spare[rows, columns] = False
-    colours[spare] = SPARE
+    colours[spare] = UNSELECTED
     return colours
 
 
 def _ring(picture: Picture, row: float, column: float) -> None:
-    """A white ring with a black rim around a place, drawn into (h, w, 3)."""
+    """Draw a white ring with a black rim around a position into the picture (h, w, 3)."""
     reach = RING + 3 * LINE + 1
     top, left = max(0, int(row - reach)), max(0, int(column - reach))
     part = picture[top : int(row + reach) + 1, left : int(column + reach) + 1]

@@ -1,4 +1,4 @@
-"""One lit photo beside its prediction, and why which of its pixels became samples."""
+"""One lit photo, its prediction, and the criterion that decided about each of its pixels."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from ..capture.model import HIGHLIGHT_MASK, IGNORE_MASK, SHADOW_MASK
 from ..fit import PaperFit
 from ..fit.held_out import DARK
 from ..fit.measured_result import MeasuredResult
-from ..fit.reliability import calm
+from ..fit.reliability import below_curvature_limit
 from ..geometry import PixelRays, RayScene, SurfaceView, Window, bands, view_window
 from ..inputs import capture_data
 from ..inputs.lights import Lights
+from ..inputs.material_pixels import material_pixels
 from ..inputs.photos import LitPhoto, LitPhotos
 from ..predict.compose import predict_photo
 from ..samples import Criterion
@@ -26,8 +27,8 @@ from ..scan import Camera, Scan
 from . import display
 
 MARGIN = 12  # pixels around the object
-PIXELS = 1 << 15  # of a band: a tenth of a second with its prediction
-ROWS = 256  # of a photo at a time
+BAND_PIXELS = 1 << 15  # pixels of a band: a tenth of a second with its prediction
+ROWS_AT_ONCE = 256  # rows of a photo that are summed at once, to save memory
 MASK_CRITERIA = {
     SHADOW_MASK: Criterion.SHADOW_MASK,
     HIGHLIGHT_MASK: Criterion.HIGHLIGHT_MASK,
@@ -35,7 +36,7 @@ MASK_CRITERIA = {
 }
 
 Fitted = tuple[str, PrincipalBRDF, float]
-"""(material, its BRDF, what the BRDF is too large by where the irradiance is unknown)."""
+"""(material, its BRDF, scale: the factor of the BRDF where the irradiance is unknown, else 1)."""
 
 
 @dataclass(frozen=True)
@@ -43,11 +44,12 @@ class PhotoView:
     """One photo of a capture, cut to ``box`` (rows, columns of the whole photo): h × w pixels.
 
     measured: (h, w, 3) linear radiance; predicted: (h, w, 3), NaN where there is no BRDF, 0 in
-    shadow; criteria: (h, w) uint8, the Criterion of each; material: (h, w) int16, its place in the
-    capture, −1 none (masks overlap: the last); chosen: (k, 2) int, row and column in the box of
-    the pixels that a fit rests on, where they are known; white: radiance to be shown as white;
-    error: ‖predicted − measured‖ / ‖measured‖ where there is a prediction, edges and shadows
-    included; counts: (criteria,) pixels of the surface that each decided about.
+    shadow; criteria: (h, w) uint8, the deciding Criterion of each pixel; material: (h, w) int16,
+    index of the material in the capture, −1 for none (the last one where masks overlap); chosen:
+    (k, 2) int, row and column in the box of the pixels that a fit uses, where they are known;
+    white: the radiance shown as white; error: ‖predicted − measured‖ / ‖measured‖ where there is a
+    prediction, including edges and shadows; counts: (criteria,) number of pixels of the surface
+    for each criterion.
     """
 
     place: int
@@ -64,32 +66,32 @@ class PhotoView:
 
     @property
     def surface(self) -> int:
-        """Pixels that see the mesh."""
+        """Number of pixels that show the mesh."""
         return int(self.counts.sum())
 
     @property
     def typical(self) -> float:
-        """Median relative error of the reliable pixels that are not dark, NaN without any: as
-        HeldOut's, of a photo that the fit has seen."""
+        """Median relative error of the reliable pixels that are not dark, NaN without any. Defined
+        as the error on held-out photos, but the fit has used this photo."""
         known = (self.criteria == Criterion.RELIABLE) & np.isfinite(self.predicted[..., 0])
         photo, ours = self.measured[known], self.predicted[known]
         level = photo.mean(axis=-1)
         if not len(level):
             return float("nan")
         bright = level > max(DARK * float(np.median(level)), 0.0)
-        missed = np.abs(ours - photo).mean(axis=-1)
-        return float(np.median(missed[bright] / level[bright])) if bright.any() else float("nan")
+        residual = np.abs(ours - photo).mean(axis=-1)
+        return float(np.median(residual[bright] / level[bright])) if bright.any() else float("nan")
 
     @property
     def shares(self) -> dict[Criterion, float]:
-        """The criteria that decided about some of the surface, and about which part of it."""
+        """Criterion → share 0 … 1 of the surface that it decided about; only those with any."""
         some = {c: int(self.counts[c]) for c in Criterion}
         return {c: count / self.surface for c, count in some.items() if count}
 
 
 @dataclass(frozen=True)
 class _Canvas:
-    """What the bands of a photo fill in: some of its rows and columns."""
+    """The images that the bands of a photo are written into: a part of its rows and columns."""
 
     top: int
     left: int
@@ -99,7 +101,7 @@ class _Canvas:
 
     @classmethod
     def around(cls, windows: Sequence[Window], camera: Camera) -> _Canvas:
-        """Large enough for the bands and a margin; the whole photo where there are none."""
+        """A canvas that holds all bands and a margin; the whole photo without any bands."""
         top = left = 0
         bottom, right = camera.height, camera.width
         if windows:
@@ -132,10 +134,11 @@ def look_at_photo(
     place: int,
     used: NDArray[np.integer] | None = None,
 ) -> Generator[float, None, PhotoView]:
-    """Look at one photo a band at a time; yields the fraction done. Raises InputError.
+    """Predict one photo and classify its pixels, band by band; yields the fraction done. Raises
+    InputError for masks or photos that cannot be read.
 
-    brdfs: of some or all of the capture's materials, of whatever fit. used: (k,) flat indices in
-    the photo of pixels that a fit rests on (see chosen_pixels).
+    brdfs: of some or all materials of the capture, of any fit. used: (k,) flat indices in the
+    photo of the pixels that a fit uses (see chosen_pixels).
     """
     camera = capture_data.camera_of(capture, scan, place)
     masks = capture_data.photo_masks(capture, place)
@@ -144,43 +147,43 @@ def look_at_photo(
     photo = photos.read(place)
     lines = PixelRays.of(camera)
     margins, limit = capture.fit.margins, _curvature_limit(capture)
-    numbers = {material.name: index for index, material in enumerate(capture.materials)}
-    windows = list(bands(camera, halo(margins), rays.cover.columns(camera), PIXELS))
+    index_of = {material.name: index for index, material in enumerate(capture.materials)}
+    windows = list(bands(camera, halo(margins), rays.cover.columns(camera), BAND_PIXELS))
     canvas = _Canvas.around(windows, camera)
     for done, window in enumerate(windows):
         yield (1 + done) / (2 + len(windows))
         view = view_window(rays, lines, window)
         lighting = light_surface(rays, view, light, camera)
-        where, _ = capture_data.material_pixels(capture, scan, view, place, masks)
+        where, _ = material_pixels(capture, scan, view, masks)
         criteria = deciding_criteria(
             view,
             lighting,
             margins,
             list(where.values()),
-            _left_out(masks, view),
+            _excluded(masks, view),
             photo.usable.ravel().take(view.pixel),
-            None if limit is None else calm(view.curvature, limit),
+            None if limit is None else below_curvature_limit(view.curvature, limit),
         )
         material = np.full(len(view.pixel), -1, np.int16)
         for index, pixels in enumerate(where.values()):
             material[pixels] = index
         own = np.full_like(material, -1)
         own[view.wanted] = material[view.wanted]
-        parts = [(own == numbers[n], brdf, scale) for n, brdf, scale in brdfs if n in numbers]
+        parts = [(own == index_of[n], brdf, scale) for n, brdf, scale in brdfs if n in index_of]
         predicted = predict_photo(view, lighting, parts)
         target = canvas.places(view, camera)
         canvas.criteria.reshape(-1)[target] = criteria[view.wanted]
         canvas.material.reshape(-1)[target] = material[view.wanted]
         canvas.predicted.reshape(-1, 3)[target] = predicted[view.wanted]
     yield (1 + len(windows)) / (2 + len(windows))
-    return _seen(capture, camera, photo, canvas, place, used)
+    return _cropped(capture, camera, photo, canvas, place, used)
 
 
 def chosen_pixels(
     fits: Iterable[PaperFit | MeasuredResult], place: int
 ) -> NDArray[np.int32] | None:
-    """(k,) flat indices in a photo of the handful of pixels that the paper's method chose; None
-    where it was not used."""
+    """(k,) flat indices in photo ``place`` of the pixels that the paper's method selected; None
+    without fits by that method."""
     tables = [fit.chosen for fit in fits if isinstance(fit, PaperFit)]
     if not tables:
         return None
@@ -188,14 +191,14 @@ def chosen_pixels(
 
 
 def _curvature_limit(capture: Capture) -> float | None:
-    """What the capture's method believes, None for all."""
+    """The largest curvature that the capture's method accepts, None for no limit."""
     return capture.fit.paper.curvature if capture.fit.method == "paper" else None
 
 
-def _left_out(
+def _excluded(
     masks: Mapping[str, NDArray[np.bool_]], view: SurfaceView
 ) -> list[tuple[Criterion, NDArray[np.bool_]]]:
-    """(criterion, (n,) pixels) of each mask that leaves something out."""
+    """(criterion, (n,) True for excluded pixels) of each mask that excludes pixels."""
     return [
         (criterion, masks[name].ravel().take(view.pixel))
         for name, criterion in MASK_CRITERIA.items()
@@ -203,7 +206,7 @@ def _left_out(
     ]
 
 
-def _seen(
+def _cropped(
     capture: Capture,
     camera: Camera,
     photo: LitPhoto,
@@ -211,7 +214,7 @@ def _seen(
     place: int,
     used: NDArray[np.integer] | None,
 ) -> PhotoView:
-    """The view, cut to what shows the surface."""
+    """The PhotoView, cropped to the surface and a margin."""
     surface = canvas.criteria != Criterion.NO_SURFACE
     height, width = surface.shape
     rows, columns = display.crop_box(surface, MARGIN)
@@ -223,7 +226,9 @@ def _seen(
     measured, predicted = photo.radiance[box].copy(), canvas.predicted[inner]
     row, column = np.divmod(np.asarray([] if used is None else used, np.intp), camera.width)
     chosen = np.stack([row - box[0].start, column - box[1].start], axis=1)
-    there = ((chosen >= 0) & (chosen < measured.shape[:2])).all(axis=1)  # of another mesh: not all
+    there = ((chosen >= 0) & (chosen < measured.shape[:2])).all(
+        axis=1
+    )  # those of another mesh may lie outside
     return PhotoView(
         place=place,
         name=capture.photo_name(place),
@@ -240,11 +245,11 @@ def _seen(
 
 
 def relative_error(predicted: NDArray[np.floating], measured: NDArray[np.floating]) -> float:
-    """‖predicted − measured‖ / ‖measured‖ of radiances (h, w, 3), where there is a prediction."""
-    missed = size = 0.0
-    for top in range(0, len(predicted), ROWS):
-        ours, photo = predicted[top : top + ROWS], measured[top : top + ROWS]
+    """‖predicted − measured‖ / ‖measured‖ of radiances (h, w, 3), over pixels with a prediction."""
+    residual = size = 0.0
+    for top in range(0, len(predicted), ROWS_AT_ONCE):
+        ours, photo = predicted[top : top + ROWS_AT_ONCE], measured[top : top + ROWS_AT_ONCE]
         known = np.isfinite(ours[..., 0])
-        missed += float(np.sum(np.square((ours - photo)[known], dtype=np.float64)))
+        residual += float(np.sum(np.square((ours - photo)[known], dtype=np.float64)))
         size += float(np.sum(np.square(photo[known], dtype=np.float64)))
-    return (missed / max(size, 1e-300)) ** 0.5
+    return (residual / max(size, 1e-300)) ** 0.5

@@ -1,4 +1,4 @@
-"""Polar slices of a BRDF in the plane of incidence (the paper, Fig. 9)."""
+"""Polar slices of a BRDF in the plane of incidence (Ono et al. 2019, Fig. 9)."""
 
 from __future__ import annotations
 
@@ -15,25 +15,27 @@ from .subject import OTHER_DASH, Show, Subject, dark, round_up
 WIDTH, RADIUS, CENTRE_Y = 340, 150, 172
 STEP = np.radians(0.5)
 LAMP = "#e0a000"
-NEAR_INCIDENCE, NEAR_PLANE = np.radians(2.5), np.radians(4.0)  # of the slice, for measured points
+# largest distance of the samples that are shown: from the incidence, and from the plane
+NEAR_INCIDENCE, NEAR_PLANE = np.radians(2.5), np.radians(4.0)
 
 
 def slice_angles(incidence: float) -> tuple[NDArray[np.float64], Angles]:
-    """(θo signed, angles) in the plane of incidence, light from the left at ``incidence``."""
+    """(signed θo, angles) in the plane of incidence, light from the left at ``incidence``; all in
+    radians."""
     theta_o = np.arange(-np.radians(89), np.radians(89) + STEP / 2, STEP)
     light = np.array([-np.sin(incidence), 0.0, np.cos(incidence)])
     view = np.stack([np.sin(theta_o), np.zeros_like(theta_o), np.cos(theta_o)], axis=1)
     normal = np.broadcast_to(np.array([0.0, 0.0, 1.0]), view.shape)
     angles = half_difference(normal, np.broadcast_to(light, view.shape), view)
-    # the plane's own azimuth: where θh = 0 none is defined, and a basis may differ between them
+    # φd = 0 in this plane; at θh = 0 the azimuth is undefined, and a basis may depend on it
     return theta_o, angles._replace(phi_d=np.zeros_like(angles.phi_d))
 
 
 def in_slice(
     points: MeasuredPoints, incidence: float
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """(rows, θo signed) of the samples near a slice; light and view may be exchanged, as a BRDF
-    allows, so that a sample can be there twice."""
+    """(rows, signed θo) of the samples near a slice. By reciprocity light and view may be swapped,
+    so a sample can appear twice."""
     cos_i, cos_o = (np.clip(c, 0.0, 1.0) for c in cosines(*points.angles))
     cos_between = np.cos(2 * points.angles.theta_d.astype(np.float64))
     rows, places = [], []
@@ -52,9 +54,9 @@ def in_slice(
 def polar(
     subjects: Sequence[Subject], incidence_degrees: float, show: Show | None = None
 ) -> Drawing:
-    """One half-circle chart: the first subject whole, with its interval and its points, those after
-    it dashed. The radius is the cube root of ρ, so that lobe and body both show, if not told
-    otherwise."""
+    """A half-circle chart: the first subject as a solid line with its interval and samples, the
+    others dashed. By default the radius is the cube root of ρ, so that the specular lobe and the
+    diffuse part are both visible."""
     show = show or Show()
     incidence = np.radians(incidence_degrees)
     theta_o, angles = slice_angles(incidence)
@@ -75,16 +77,17 @@ def polar(
             parts.append(Line(path, colour, 1.6, OTHER_DASH if number else None))
     x, y = WIDTH / 2 - RADIUS * np.sin(incidence), CENTRE_Y - RADIUS * np.cos(incidence)
     parts.append(Line(np.array([[x, y], [WIDTH / 2, CENTRE_Y]]), LAMP, 1.6, (5.0, 3.0)))
-    told = f"light at {incidence_degrees:g}° · radius: {show.way} of {show.unit}"
-    parts.append(Label(4, CENTRE_Y + 24, told))
+    text = f"light at {incidence_degrees:g}° · radius: {show.scale_name} of {show.unit}"
+    parts.append(Label(4, CENTRE_Y + 24, text))
     if len(subjects) > 1:
-        told = " · ".join(f"dashed: {s.label}" for s in subjects[1:])
-        parts.append(Label(WIDTH - 4, 10, told, "end", INK))
+        text = " · ".join(f"dashed: {s.label}" for s in subjects[1:])
+        parts.append(Label(WIDTH - 4, 10, text, "end", INK))
     label = f"polar slice at {incidence_degrees:g} degrees"
     return Drawing(WIDTH, CENTRE_Y + 30, label, tuple(parts))
 
 
 def _rings(show: Show, ring: float) -> list[Part]:
+    """Labelled half circles; ring: the reflectance at the rim."""
     centre = WIDTH / 2
     turn = np.linspace(-np.pi / 2, np.pi / 2, 91)
     parts: list[Part] = []
@@ -99,7 +102,7 @@ def _rings(show: Show, ring: float) -> list[Part]:
 
 
 def _measured(points: MeasuredPoints, incidence: float, show: Show, ring: float) -> Dots:
-    """Beyond the chart they lie on its rim."""
+    """Samples near the slice; those beyond the chart are drawn on its rim."""
     rows, theta_o = in_slice(points, incidence)
     value = show.values(points.rho[rows], np.cos(incidence))
     radius = RADIUS * np.minimum(show.length(value, ring), 1.02)
@@ -121,7 +124,7 @@ def _shaded(
     theta_o: NDArray[np.floating],
     ring: float,
 ) -> list[Part]:
-    """Between low and high, as far as the chart reaches."""
+    """The interval between low and high, clipped to the chart."""
     inner, outer = (RADIUS * np.clip(show.length(x, ring), 0.0, 1.0) for x in (low, high))
     return [
         Area(

@@ -1,5 +1,4 @@
-"""A drawing as pixels: smooth edges by the part of a pixel that is covered. Letters by
-OpenImageIO."""
+"""A drawing as pixels: antialiased by the covered fraction of each pixel. Text by OpenImageIO."""
 
 from __future__ import annotations
 
@@ -14,14 +13,14 @@ from .drawing import Area, Dots, Drawing, Label, Line, Picture, rgb
 Array = NDArray[np.float32]
 
 PAPER = "#f7f8fa"
-FINE = 3  # parts of a pixel each way, for what is inside of an outline
-APART = 0.35  # pixels between the discs that make a line
-FACE, GREEK_FACE = "DroidSans", "DroidSansMono"  # come with OpenImageIO; the first has no Greek
+FINE = 3  # subpixels along each side of a pixel, for the coverage of polygons
+DISC_STEP = 0.35  # pixels between the discs that a line is made of
+FACE, GREEK_FACE = "DroidSans", "DroidSansMono"  # ship with OpenImageIO; the first has no Greek
 GREEK = re.compile("([\u0370-\u03ff]+)")
 
 
 def raster(drawing: Drawing, scale: float = 2.0) -> NDArray[np.uint8]:
-    """(h, w, 3) pixels as a display shows them, ``scale`` to one of the drawing's."""
+    """(h, w, 3) sRGB pixels; scale: pixels per unit of the drawing."""
     height, width = round(drawing.height * scale), round(drawing.width * scale)
     image = np.empty((height, width, 3), np.float32)
     image[:] = _rgb(PAPER)
@@ -39,7 +38,7 @@ def raster(drawing: Drawing, scale: float = 2.0) -> NDArray[np.uint8]:
 
 
 def inside(corners: NDArray[np.floating], height: int, width: int) -> Array:
-    """(height, width) the part of every pixel inside a closed outline (n, 2), by the even-odd
+    """(height, width) fraction 0 … 1 of each pixel inside a closed outline (n, 2), by the even-odd
     rule."""
     rows, columns = height * FINE, width * FINE
     start = np.asarray(corners, np.float64) * FINE
@@ -61,7 +60,7 @@ def inside(corners: NDArray[np.floating], height: int, width: int) -> Array:
 
 
 def _area(image: Array, part: Area, scale: float) -> None:
-    """Where the outline is, not the whole drawing."""
+    """Fill a polygon; only its bounding box is computed."""
     corners = part.points * scale
     left, top = np.maximum(np.floor(corners.min(axis=0)).astype(int), 0)
     right, bottom = np.ceil(corners.max(axis=0)).astype(int) + 1
@@ -71,12 +70,12 @@ def _area(image: Array, part: Area, scale: float) -> None:
 
 
 def _line(image: Array, part: Line, scale: float) -> None:
-    """Discs close together; what is left out of a dashed one by its length so far."""
+    """Draw a line as closely spaced discs; a dashed line omits those in its gaps."""
     points = part.points * scale
     if len(points) < 2:
         return
     length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    at = np.arange(0.0, length[-1] + APART, APART)
+    at = np.arange(0.0, length[-1] + DISC_STEP, DISC_STEP)
     if part.dash is not None:
         at = at[np.mod(at, sum(part.dash) * scale) < part.dash[0] * scale]
     places = np.stack([np.interp(at, length, points[:, k]) for k in (0, 1)], axis=1)
@@ -91,7 +90,8 @@ def _line(image: Array, part: Line, scale: float) -> None:
 
 
 def _dots(image: Array, part: Dots, scale: float) -> None:
-    """What shows through all the discs of a pixel, and their mean colour where they lie."""
+    """Blend discs: the transmittances of all discs at a pixel multiply, and their colours are
+    averaged by opacity."""
     if not len(part.points):
         return
     rows, columns, part_of, which = _discs(part.points * scale, part.radius * scale, image.shape)
@@ -110,7 +110,7 @@ def _dots(image: Array, part: Dots, scale: float) -> None:
 def _discs(
     places: NDArray[np.floating], radius: float, shape: tuple[int, ...]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64], NDArray[np.intp]]:
-    """(rows, columns, the part covered, which disc) of all pixels that discs touch."""
+    """(rows, columns, covered fractions, indices of the discs) of all pixels that discs touch."""
     reach = int(np.ceil(radius + 0.5))
     steps = np.arange(-reach, reach + 1)
     corner = np.floor(places).astype(int)
@@ -125,7 +125,7 @@ def _discs(
 
 
 def _picture(image: Array, part: Picture, scale: float) -> None:
-    """The nearest of its pixels."""
+    """Draw an image, resampled to the nearest pixel."""
     left, top = round(part.left * scale), round(part.top * scale)
     width, height = round(part.width * scale), round(part.height * scale)
     rows = (np.arange(height) + 0.5) * part.pixels.shape[0] / height
@@ -136,7 +136,7 @@ def _picture(image: Array, part: Picture, scale: float) -> None:
 
 
 def _written(image: Array, labels: list[Label], scale: float) -> NDArray[np.uint8]:
-    """The labels over it."""
+    """(h, w, 3) uint8 the image with its labels drawn over it."""
     height, width, _ = image.shape
     buffer = oiio.ImageBuf(oiio.ImageSpec(width, height, 4, "float"))
     opaque = np.concatenate([image, np.ones((height, width, 1), np.float32)], axis=2)
@@ -156,12 +156,13 @@ def _written(image: Array, labels: list[Label], scale: float) -> NDArray[np.uint
 
 
 def _advance(text: str, face: str, size: int) -> float:
-    """Pixels from where a text begins to where the next one does; its spaces count."""
+    """Advance width of a text in pixels, spaces included."""
     both, ends = (oiio.ImageBufAlgo.text_size(t, size, face) for t in (f"|{text}|", "||"))
     return float(both.width - ends.width)
 
 
 def _over(image: Array, covered: Array, colour: Array) -> None:
+    """Blend a colour (3,) over the image in place; covered: (h, w) opacity."""
     image += covered[..., None] * (colour - image)
 
 

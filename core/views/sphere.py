@@ -1,4 +1,4 @@
-"""A lit sphere: the picture by which a material is recognised."""
+"""The picture of a sphere with the material, lit by a key light and a rim light."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from ..appearance.principled import Configuration, Principled
 from ..photo import write_png
 from . import display
 
-KEY = np.array([-0.5, 0.6, 0.62])  # left, above, in front
+KEY = np.array([-0.5, 0.6, 0.62])  # direction to the key light: left, above, in front
 RIM = np.array([0.85, 0.25, -0.30])
 RIM_STRENGTH = 0.7
 
 Reflector = Callable[[Angles], NDArray[np.floating]] | Principled | LobeStack
-"""A table (angles -> ρ (n, 3) in 1/sr), or a model of which light and view are not alike."""
+"""A function (angles -> ρ (n, 3) in 1/sr), or a model that is not reciprocal in light and view."""
 
 
 @dataclass(frozen=True)
 class LitPart:
-    """What one light meets of a sphere: the places (n,) among all points inside; unit vectors
-    (n, 3), (1, 3) and (n, 3); factor (n,): what ρ is multiplied by."""
+    """The part of a sphere that one light reaches. places: (n,) indices into the points inside;
+    normal (n, 3), light (1, 3), view (n, 3): unit vectors; factor: (n,) irradiance, by which ρ is
+    multiplied."""
 
     places: NDArray[np.intp]
     normal: NDArray[np.float64]
@@ -36,16 +37,16 @@ class LitPart:
 
     @property
     def angles(self) -> Angles:
-        """(n,) of each."""
+        """Half/difference angles, (n,) each."""
         return half_difference(self.normal, self.light, self.view)
 
 
 @dataclass(frozen=True)
 class LitSphere:
-    """A sphere of ``size`` pixels across under two distant lights, before anything is put on it.
+    """The geometry of a sphere under two distant lights, ``size`` pixels wide, without a material.
 
-    Orthographic view along −z; key light of irradiance π, so that a white matte sphere reaches 1.
-    inside: (m, m) points of the picture on the sphere, m = size · oversample.
+    Orthographic view along −z; the key light has irradiance π, so that a white diffuse sphere
+    reaches radiance 1. inside: (m, m) True on the sphere, m = size · oversample.
     """
 
     size: int
@@ -75,7 +76,7 @@ class LitSphere:
     def picture(
         self, rho: Sequence[NDArray[np.floating]]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """(radiance (size, size, 3), coverage (size, size)) of ρ (n, 3) in 1/sr of each part."""
+        """(radiance (size, size, 3), coverage (size, size)); rho: (n, 3) in 1/sr of each part."""
         radiance = np.zeros((int(self.inside.sum()), 3), np.float32)
         for part, own in zip(self.parts, rho, strict=True):
             radiance[part.places] += (part.factor[:, None] * own).astype(np.float32)
@@ -90,13 +91,13 @@ class LitSphere:
 def lit_sphere(
     reflector: Reflector, size: int = 320, oversample: int = 2
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """(radiance (size, size, 3), coverage (size, size)) of LitSphere with the reflector on it."""
+    """(radiance (size, size, 3), coverage (size, size)) of a LitSphere with this reflector."""
     sphere = LitSphere.of(size, oversample)
     return sphere.picture([_reflectance(reflector, part) for part in sphere.parts])
 
 
 def write_sphere(path: Path, reflector: Reflector) -> None:
-    """The picture as a PNG, transparent beside the sphere."""
+    """Write the picture as a PNG with a transparent background."""
     sphere, coverage = lit_sphere(reflector)
     alpha = (coverage * 255 + 0.5).astype(np.uint8)
     write_png(path, np.dstack([display.srgb(sphere), alpha]))

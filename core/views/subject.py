@@ -1,4 +1,4 @@
-"""What charts are drawn of, and how they show it."""
+"""The BRDF that a chart shows, and the scale and channels that it is shown with."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Scale = Literal["cube_root", "linear", "log"]
 
 COLOURS = ("#d62728", "#2a9d3a", "#1f5fd6")
 MEAN = "#333944"
-DECADES = 3.0  # below the top, of a logarithmic scale
+DECADES = 3.0  # factors of ten that a logarithmic scale spans
 OTHER_DASH = (5.0, 3.0)
 RINGS = {"cube_root": (1.0, 0.3, 0.1, 0.03, 0.01), "linear": (1.0, 0.75, 0.5, 0.25),
          "log": (1.0, 0.1, 0.01)}  # fmt: skip
@@ -27,8 +27,8 @@ RINGS = {"cube_root": (1.0, 0.3, 0.1, 0.03, 0.01), "linear": (1.0, 0.75, 0.5, 0.
 
 @dataclass(frozen=True)
 class Subject:
-    """One fit. evaluate(angles) → ρ (n, 3) in 1/sr. interval(angles) → (low, high) (n, 3), the 90 %
-    one. points: what was measured."""
+    """A fitted BRDF. evaluate(angles) → ρ (n, 3) in 1/sr. interval(angles) → (low, high), (n, 3)
+    each, the 90 % interval. points: the samples."""
 
     label: str
     evaluate: Evaluate
@@ -38,8 +38,8 @@ class Subject:
 
 @dataclass(frozen=True)
 class Show:
-    """scale: of reflectance. cosine: times cos θi, what a surface sends out for a light. channels:
-    each of R, G and B, one of them, or their mean."""
+    """How reflectance is shown. scale: of the axis. cosine: show ρ·cos θi instead of ρ. channels:
+    R, G and B, one of them, or their mean."""
 
     scale: Scale = "cube_root"
     cosine: bool = False
@@ -47,23 +47,23 @@ class Show:
 
     @property
     def colours(self) -> tuple[str, ...]:
-        """Of the curves."""
+        """The colour of each curve."""
         if self.channels == "mean":
             return (MEAN,)
         return COLOURS if self.channels == "rgb" else (COLOURS["rgb".index(self.channels)],)
 
     @property
     def unit(self) -> str:
-        """What is shown."""
+        """The quantity and its unit, for labels."""
         return "ρ cos θi, 1/sr" if self.cosine else "ρ, 1/sr"
 
     @property
-    def way(self) -> str:
-        """How lengths stand for it."""
+    def scale_name(self) -> str:
+        """The name of the scale, for labels."""
         return {"cube_root": "cube root", "linear": "linear", "log": "logarithmic"}[self.scale]
 
-    def channelled(self, rho: NDArray[np.floating]) -> NDArray[np.float64]:
-        """(n, 3) → (n, c) of the channels that are shown."""
+    def select_channels(self, rho: NDArray[np.floating]) -> NDArray[np.float64]:
+        """(n, 3) → (n, c), the channels that are shown."""
         if self.channels == "mean":
             return np.asarray(rho, np.float64).mean(axis=1, keepdims=True)
         if self.channels == "rgb":
@@ -74,12 +74,13 @@ class Show:
     def values(
         self, rho: NDArray[np.floating], cos_i: NDArray[np.floating] | float
     ) -> NDArray[np.float64]:
-        """(n, 3) ρ → (n, c) what is shown, not below 0; cos_i: (n,) or one."""
-        found = np.maximum(self.channelled(rho), 0.0)
+        """ρ (n, 3) → (n, c) the values that are shown, not below 0; cos_i: (n,) or a number."""
+        found = np.maximum(self.select_channels(rho), 0.0)
         return found * np.broadcast_to(cos_i, len(found))[:, None] if self.cosine else found
 
     def length(self, value: NDArray[np.floating] | float, top: float) -> NDArray[np.float64]:
-        """0 … 1 of a scale that ends at ``top``."""
+        """Position of a value on the scale: 0 at its start, 1 at the value ``top``; larger values
+        give more than 1."""
         part = np.clip(np.asarray(value, np.float64) / top, 0.0, None)
         if self.scale == "linear":
             return part
@@ -88,16 +89,16 @@ class Show:
         return np.cbrt(part)
 
     def rings(self) -> tuple[float, ...]:
-        """Parts of the top where the scale has a line."""
+        """The grid lines of the scale, as fractions of its top value."""
         return RINGS[self.scale]
 
 
 def round_up(x: float) -> float:
-    """The next of 1, 2, 5 × 10ⁿ."""
+    """The smallest 1, 2 or 5 × 10ⁿ that is not below x."""
     power = 10.0 ** np.floor(np.log10(max(x, 1e-9)))
     return float(next(m * power for m in (1, 2, 5, 10) if m * power >= x * (1 - 1e-9)))
 
 
 def dark(colour: str) -> NDArray[np.uint8]:
-    """(3,) the colour of the points over a curve of that colour."""
+    """(3,) a darker shade of a colour, for samples drawn over a curve of that colour."""
     return (rgb(colour).astype(int) * 2 // 3).astype(np.uint8)

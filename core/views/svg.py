@@ -1,4 +1,4 @@
-"""A drawing for a page."""
+"""A drawing as an SVG element for an HTML page."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FAMILY = "system-ui,sans-serif"
 
 
 def svg(drawing: Drawing) -> str:
-    """The whole element. Pictures are left out: a page has files of their own for them."""
+    """The complete SVG element. Pictures are omitted: a page refers to them as separate files."""
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {drawing.width:g} '
         f'{drawing.height:g}" role="img" aria-label="{escape(drawing.label)}">',
@@ -50,7 +50,7 @@ def _element(part: Part) -> str:
 
 
 def _dots(part: Dots) -> str:
-    """All of one colour in one path: strokes of no length with round ends."""
+    """One path for all dots of a colour: strokes of zero length with round caps."""
     found = []
     for colour in np.unique(part.colours, axis=0):
         mine = part.points[(part.colours == colour).all(axis=1)]

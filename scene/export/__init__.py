@@ -1,1 +1,1 @@
-"""What is written from Blender: .blend, glTF, USD, renders."""
+"""Files that are written through Blender: .blend, glTF, USD, renders."""

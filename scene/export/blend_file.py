@@ -1,4 +1,4 @@
-"""Write a capture, or a whole result, as a .blend of its own (headless)."""
+"""Write a capture or a whole result as a .blend file (headless)."""
 
 from __future__ import annotations
 
@@ -18,12 +18,14 @@ from ..material.measured_materials import measured_materials
 from ..scan.apply_result import apply_result
 from ..scan.scan_collection import ScanCollection, create_reconstruction, create_scan_collection
 
-RECTIFIED = "rectified"  # folder beside the .blend for resampled photos of distorted lenses
+RECTIFIED = "rectified"  # folder next to the .blend for resampled photos of distorted lenses
 
 
 def write_import(path: Path, final: Path, capture: Capture, scan: Scan, lights: Lights) -> None:
-    """Mesh, cameras with photos, lights. final: where the file will be moved to, with all that
-    lies beside it."""
+    """Write a .blend with mesh, cameras with photos, and lights.
+
+    final: the path that the file and its companion files will be moved to.
+    """
     _imported(path, capture, scan, lights)
     save(path, final)
 
@@ -34,7 +36,7 @@ def write_reconstruction(
     found: Reconstruction,
     images: Path | None,
 ) -> None:
-    """Cameras and sparse points of a reconstruction that has no mesh yet."""
+    """Write a .blend with the cameras and sparse points of a reconstruction without a mesh."""
     scene = _new_file()
     create_reconstruction(scene, final.stem, found, images, path.parent / RECTIFIED)
     save(path, final)
@@ -43,12 +45,13 @@ def write_reconstruction(
 def write_blend(
     path: Path, final: Path, result: CaptureResult, stages: Sequence[Stage]
 ) -> list[str]:
-    """A capture with the fitted materials on its mesh; returns notes for the user."""
+    """Write a .blend of a capture with the fitted materials on its mesh; returns notes for the
+    user."""
     _imported(path, result.capture, result.scan, result.lights)
-    save(path, final)  # the shader's EXRs go beside a saved file
+    save(path, final)  # the shader's EXRs are written next to a saved file
     notes = apply_result(bpy.context.scene, result, stages)
     for material in measured_materials():
-        osl_files.lead_to(material, final.parent)
+        osl_files.redirect_files(material, final.parent)
     save(path, final)
     return notes
 
@@ -62,7 +65,7 @@ def _imported(path: Path, capture: Capture, scan: Scan, lights: Lights) -> ScanC
 
 
 def _new_file() -> bpy.types.Scene:
-    """An empty file with a black world, Cycles, and the photos' own transfer curve."""
+    """An empty file with a black world, Cycles, and the view transform of the photos."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True, load_ui=False)
     scene = bpy.context.scene
     scene.world = bpy.data.worlds.new("Black")
@@ -81,11 +84,14 @@ def _new_file() -> bpy.types.Scene:
 
 
 def save(path: Path, final: Path) -> None:
-    """Save with pictures by paths relative to ``final`` and without a .blend1."""
+    """Save the open file with image paths relative to ``final`` and without a .blend1.
+
+    Raises PatinaError if Blender cannot write the file.
+    """
     here, there = path.absolute().parent, final.absolute().parent
     for image in bpy.data.images:
         if image.source != "FILE" or image.filepath.startswith("//"):
-            continue  # no file of its own, or done at an earlier save
+            continue  # has no file, or was made relative at an earlier save
         picture = Path(image.filepath)
         if picture.is_relative_to(here):
             picture = there / picture.relative_to(here)

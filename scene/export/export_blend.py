@@ -1,4 +1,4 @@
-"""A .blend of the materials: an asset each, on a preview sphere, with the files of its shader."""
+"""Export the materials as a .blend: each is an asset on a preview sphere, with its shader files."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from pathlib import Path
 from ...core.export.subject import Subject
 from ..material import osl_files
 from .blend_file import save
-from .export_scene import create_materials, new_stage, preview_spheres
+from .export_scene import create_materials, new_scene, preview_spheres
 
 
 def write_blend(path: Path, final: Path, subjects: Sequence[Subject]) -> dict[str, list[str]]:
-    """Write the .blend and, beside it, the EXRs its shaders read; returns the names of the EXRs
-    by material.
+    """Write the .blend and, next to it, the EXRs that its shaders read.
 
-    final: where the file will be moved to, with all that lies beside it.
+    final: the path that the file and its companion files will be moved to. Returns the names of
+    the EXRs by material.
     """
-    new_stage()
-    save(path, final)  # the shader's EXRs go beside a saved file
+    new_scene()
+    save(path, final)  # the shader's EXRs are written next to a saved file
     made = create_materials(subjects, whole=True)
     preview_spheres(made)
-    beside: dict[str, list[str]] = {}
+    shader_files: dict[str, list[str]] = {}
     for subject, material in zip(subjects, made, strict=True):
         material.asset_mark()
-        own = osl_files.lead_to(material, final.parent)
-        beside.setdefault(subject.name, []).extend(file.name for file in own)
+        own = osl_files.redirect_files(material, final.parent)
+        shader_files.setdefault(subject.name, []).extend(file.name for file in own)
     save(path, final)
-    return beside
+    return shader_files

@@ -1,4 +1,4 @@
-"""Which formats the artist wants the materials in, and which cannot be written now."""
+"""The export formats that the user selects, and the reasons why one cannot be written."""
 
 from __future__ import annotations
 
@@ -13,51 +13,51 @@ FORMATS: dict[str, tuple[str, str]] = {
     "gltf": (
         "glTF",
         "The scanned mesh for viewers and game engines (.glb): metallic-roughness with KHR "
-        "extensions. Loses Diffuse Roughness, and the coat's index and tint",
+        "extensions. Diffuse Roughness, Coat IOR and Coat Tint cannot be stored",
     ),
     "usd": (
         "USD",
         "The scanned mesh (.usdc) with UsdPreviewSurface and, from Blender 5.0, MaterialX",
     ),
     "blend": (
-        "Blender assets",
-        "A .blend of the materials alone, marked as assets, with the EXRs of their OSL shader",
+        "Blender Assets",
+        "A .blend with only the materials, marked as assets, and the EXRs of their OSL shader",
     ),
     "mtlx": ("MaterialX", "A stack of lobes and OpenPBR as .mtlx, without textures or geometry"),
     "mitsuba": (
         "Mitsuba 3",
-        "Scenes with our plugin, which reads the measurement exactly, and with Mitsuba's own "
-        "measured material",
+        "Scenes with Patina's plugin, which evaluates the measured BRDF exactly, and with the "
+        "measured material of Mitsuba",
     ),
-    "pbrt": ("pbrt-v4", "A scene and the .bsdf that its measured material reads"),
+    "pbrt": ("pbrt-v4", "A scene and the .bsdf file of its measured material"),
     "binary": (
-        "MERL table",
-        "NAME.binary in the format of the MERL database, values at the cells' centres",
+        "MERL Table",
+        "NAME.binary in the format of the MERL database, with values at the cell centres",
     ),
-    "exr": ("EXR tables", "Table, coefficients and basis as 32-bit pictures, with a README"),
-    "npz": ("NumPy tables", "The same as NumPy archives, with a README"),
+    "exr": ("EXR Tables", "Table, coefficients and basis as 32-bit images, with a README"),
+    "npz": ("NumPy Tables", "Table, coefficients and basis as NumPy archives, with a README"),
     RECORD: (
         "Record",
-        "result.json, and diagnosis.json where there was a check: all that was found, with its "
-        "uncertainty, for programs",
+        "All results with their uncertainty for use by programs: result.json, and diagnosis.json "
+        "after a check",
     ),
     REPORT: (
         "Report",
-        "A page with spheres, curves and every photo beside its prediction. Needs the photos of "
-        "the fit: only as long as Blender runs after it",
+        "A page with spheres, curves and every photo next to its prediction. It needs the photos "
+        "of the fit, which are kept only until Blender is closed",
     ),
 }
-"""Word → (name, what it holds). Most words are those of the command."""
+"""Identifier → (label, tooltip). Most identifiers are format names of the export command."""
 
 
 def missing(scene: bpy.types.Scene, word: str) -> str | None:
-    """Why a format cannot be written now; None where it can."""
+    """Why a format cannot be written now; None if it can."""
     if word == REPORT:
         capture = capture_path(scene)
         if kept_fit(capture, stored_result(capture)) is None:
-            return "The report needs the photos of the fit: fit again in this session"
+            return "The report needs the photos of the fit; fit again in this session"
     if word == "usd" and not bpy.app.build_options.usd:
-        return "This Blender was built without USD; use one from blender.org"
+        return "This build of Blender has no USD; use a build from blender.org"
     return None
 
 
@@ -66,7 +66,7 @@ class PatinaExport(bpy.types.PropertyGroup):
 
     formats: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Formats",
-        description="What the materials are written as",
+        description="File formats to write the materials in",
         items=[(word, name, holds) for word, (name, holds) in FORMATS.items()],
         options={"ENUM_FLAG"},
         default={"gltf"},

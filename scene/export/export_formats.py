@@ -1,4 +1,4 @@
-"""The exports that Blender writes: .blend, GLB and USD, each with what it could not take along."""
+"""The exports that Blender writes (.blend, GLB and USD), each with a record of what it loses."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from .export_gltf import write_glb
 from .export_usd import check_usd, write_usd
 
 OPEN_PBR_SINCE = (5, 0, 0)
-SCAN, PREVIEW = "scan", "materials"  # stems of files
-FIT = "what the fit has beyond one Principled BSDF"
+SCAN, PREVIEW = "scan", "materials"  # stems of the file names
+BEYOND_PRINCIPLED = "everything of the fitted BRDF that one Principled BSDF cannot represent"
 
 
 def to_blend(
     folder: Path, final: Path, result: FittedResult, subjects: Sequence[Subject]
 ) -> list[Loss]:
-    """materials.blend: measured in Cycles with OSL, the Principled elsewhere."""
+    """Write materials.blend: the measured BRDF in Cycles with OSL, the Principled elsewhere."""
     file = f"{PREVIEW}.blend"
     files = write_blend(folder / file, final / file, subjects)
     reason = osl_missing()
@@ -44,7 +44,7 @@ def to_blend(
                 subject.name,
                 (file, *sorted(files[subject.name])),
                 errors if reason else {"Cycles with OSL": 0.0, **errors},
-                dropped=(f"the measured material: {reason}",) if reason else (),
+                dropped=(f"the measured BRDF, because {reason}",) if reason else (),
                 notes=subject.scale_note,
             )
         )
@@ -54,7 +54,7 @@ def to_blend(
 def to_gltf(
     folder: Path, final: Path, result: FittedResult, subjects: Sequence[Subject]
 ) -> list[Loss]:
-    """scan.glb with the scan's mesh, else materials.glb with a preview sphere each."""
+    """Write scan.glb with the scan's mesh, or materials.glb with a preview sphere per material."""
     objects, stem = _objects(result, subjects)
     write_glb(folder / f"{stem}.glb", objects)
     losses = []
@@ -70,7 +70,7 @@ def to_gltf(
                     "metallic-roughness with KHR extensions": subject.error(held),
                     "the Principled BSDF it was made of": subject.error(principled.evaluate),
                 },
-                dropped=(*dropped_inputs(principled, gltf_model.DROPPED), FIT),
+                dropped=(*dropped_inputs(principled, gltf_model.DROPPED), BEYOND_PRINCIPLED),
                 notes=subject.scale_note,
             )
         )
@@ -80,7 +80,8 @@ def to_gltf(
 def to_usd(
     folder: Path, final: Path, result: FittedResult, subjects: Sequence[Subject]
 ) -> list[Loss]:
-    """scan.usdc with the scan's mesh, else materials.usdc with a preview sphere each."""
+    """Write scan.usdc with the scan's mesh, or materials.usdc with a preview sphere per
+    material."""
     check_usd()
     objects, stem = _objects(result, subjects)
     with_materialx = write_usd(folder / f"{stem}.usdc", objects)
@@ -94,14 +95,14 @@ def to_usd(
         if with_materialx:
             surface = "OpenPBR" if bpy.app.version >= OPEN_PBR_SINCE else "its surface"
             errors = {f"MaterialX ({surface}, taken for the Principled)": whole, **errors}
-        notes = () if with_materialx else ("this Blender writes no MaterialX into USD",)
+        notes = () if with_materialx else ("this version of Blender writes no MaterialX into USD",)
         losses.append(
             Loss(
                 "usd",
                 subject.name,
                 (f"{stem}.usdc",),
                 errors,
-                dropped=(*(f"in UsdPreviewSurface: {what}" for what in lost), FIT),
+                dropped=(*(f"in UsdPreviewSurface: {what}" for what in lost), BEYOND_PRINCIPLED),
                 notes=(*notes, *subject.scale_note),
             )
         )
@@ -109,14 +110,16 @@ def to_usd(
 
 
 def _objects(result: FittedResult, subjects: Sequence[Subject]) -> tuple[list, str]:
-    """The scan's mesh where there is one that wears all of the result's materials, and no part
-    of them alone is asked for; else preview spheres. With the stem of the file."""
+    """(objects to export, stem of the file name): the scan's mesh, or preview spheres.
+
+    The mesh is exported if all materials of the result are requested and it has all of them.
+    """
     names = [material.name for material in result.materials]
     if result.scene is not None and len(subjects) == len(names):
         mesh = export_scene.open_scan(result.scene, names)
         if mesh is not None:
             return [mesh], SCAN
-    export_scene.new_stage()
+    export_scene.new_scene()
     made = export_scene.create_materials(subjects, whole=False)
     return export_scene.preview_spheres(made), PREVIEW
 

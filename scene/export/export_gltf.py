@@ -1,4 +1,4 @@
-"""GLB through Blender's own exporter: the portable output of every material, KHR extensions."""
+"""Write GLB with Blender's exporter: the portable output of every material, KHR extensions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ ADD_ON = "io_scene_gltf2"
 
 
 def write_glb(path: Path, objects: Sequence[bpy.types.Object]) -> None:
-    """Write the objects as one binary glTF; y up, as the format wants it."""
+    """Write the objects as one binary glTF with y up, as the format requires.
+
+    Raises PatinaError if Blender's exporter fails.
+    """
     import addon_utils
 
     if not hasattr(bpy.ops.export_scene, "gltf") or ADD_ON not in bpy.context.preferences.addons:
@@ -34,7 +37,7 @@ def write_glb(path: Path, objects: Sequence[bpy.types.Object]) -> None:
             export_image_format="AUTO",
         )
     except (RuntimeError, AttributeError) as error:
-        said = " ".join(str(error).split())
-        raise PatinaError(f"{path.name}: Blender's glTF exporter failed ({said})") from error
+        message = " ".join(str(error).split())
+        raise PatinaError(f"{path.name}: Blender's glTF exporter failed ({message})") from error
     if not path.is_file():
         raise PatinaError(f"{path.name}: Blender's glTF exporter wrote nothing")

@@ -1,8 +1,8 @@
-"""The materials of the open .blend for other programs, as ``headless material`` exports them.
+"""Export the materials of the open .blend for other programs, as ``headless material`` does.
 
-What was measured is in the .blend as result.json has it; it is laid down in a folder for the time
-being, with a copy of the .blend as the scene.blend of a result, and the command's own functions do
-the rest. Formats that Blender writes open files of their own: a second Blender does that.
+The .blend stores the fit in the form of result.json. The job writes this to a temporary folder,
+with a copy of the .blend as scene.blend, and then calls the functions of the command ``material``.
+Blender's own formats have to open other files, so that a second Blender process writes them.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from ..session.last_fit import kept_fit
 from ..session.scene_properties import DIAGNOSIS, capture_path, stored_result
 from .export_choice import FORMATS, RECORD, REPORT, missing
 
-MARKS = ("losses.txt", "result.json", "report/index.html")  # of an earlier export
-FIT = ("scene.blend",)  # of a folder that `fit` left: the record of the fit itself
+MARKS = ("losses.txt", "result.json", "report/index.html")  # files that identify an earlier export
+FIT = ("scene.blend",)  # identifies the output folder of `fit`, which is never overwritten
 
 
 class ExportJob(Job):
-    """Write what a scene's last fit found into a folder. formats: words of FORMATS; cache: folder
-    of bases from the user's own MERL files. Raises PatinaError."""
+    """Export the last fit of a scene to a folder. formats: entries of FORMATS; cache: folder of the
+    bases that were computed from the user's own MERL files. Raises PatinaError."""
 
     def __init__(
         self, scene: bpy.types.Scene, formats: Sequence[str], out: Path, cache: Path
@@ -44,9 +44,11 @@ class ExportJob(Job):
         capture = capture_path(scene)
         found = stored_result(capture)
         if found is None:
-            raise PatinaError("nothing is measured yet: fit the materials first")
+            raise PatinaError("found no fitted material; fit the materials first")
         if not formats:
-            raise InputError("choose at least one format", key="formats")
+            raise InputError(
+                "found no format, expected at least one; choose a format", key="formats"
+            )
         for word in formats:
             reason = missing(scene, word)
             if reason is not None:
@@ -60,26 +62,26 @@ class ExportJob(Job):
         self.files: list[str] = []
 
     def run(self) -> Iterator[Step]:
-        """The record and the report, then what the command writes."""
-        told = [word for word in self.formats if word not in (RECORD, REPORT)]
+        """Write the record and the report, then the files of the command ``material``."""
+        exported = [word for word in self.formats if word not in (RECORD, REPORT)]
         yield from self._own_files()
-        if not told:
+        if not exported:
             return
         with tempfile.TemporaryDirectory(prefix="patina-", ignore_cleanup_errors=True) as folder:
             result = Path(folder)
             write_json(result / "result.json", self.found)
-            if set(told) & set(BLENDER):
+            if set(exported) & set(BLENDER):
                 yield Step("copying the scene", 0.0)
                 _save_copy(result / "scene.blend")
-                yield from self._by_another_blender(result, told)
+                yield from self._by_another_blender(result, exported)
             else:
                 fitted = read_result(result, self.cache)
-                self.losses, _ = yield from export_materials(self.out, fitted, told)
+                self.losses, _ = yield from export_materials(self.out, fitted, exported)
         self.files += ["losses.txt", "losses.json"]
         self.files += sorted({file for loss in self.losses for file in loss.files})
 
-    def _by_another_blender(self, result: Path, told: list[str]) -> Generator[Step, None, None]:
-        words = ["material", str(result), "--to", *told, "--out", str(self.out)]
+    def _by_another_blender(self, result: Path, exported: list[str]) -> Generator[Step, None, None]:
+        words = ["material", str(result), "--to", *exported, "--out", str(self.out)]
         yield from in_background(words, {"PATINA_CACHE": str(self.cache)})
         content = json.loads((self.out / "losses.json").read_text("utf-8"))
         for loss in content["losses"]:
@@ -87,7 +89,7 @@ class ExportJob(Job):
             self.losses.append(Loss(**{**loss, **lists}))
 
     def _own_files(self) -> Generator[Step, None, None]:
-        """What a fit leaves beside the materials."""
+        """Write result.json, diagnosis.json and the report, as requested."""
         records: dict[str, dict[str, Any] | None] = {}
         if RECORD in self.formats:
             records = {"result.json": self.found, "diagnosis.json": self.diagnosis}
@@ -106,22 +108,23 @@ class ExportJob(Job):
 
 
 def _check_own(out: Path) -> None:
-    """Refuse a folder with something in it that no earlier export left: files are replaced by
-    name, and the scan's own may have the names."""
+    """Raise InputError for a folder with files that are not from an earlier export: files of the
+    same name are replaced, and these could belong to the scan."""
     if not out.is_dir() or not any(out.iterdir()):
         return
     exported = any((out / mark).is_file() for mark in MARKS)
     if exported and not any((out / name).exists() for name in FIT) and not any(out.glob("*.toml")):
         return
     raise InputError(
-        "holds files that are no earlier export; expected an empty folder, or a new one", file=out
+        "contains files that are not from an earlier export; expected an empty or new folder",
+        file=out,
     )
 
 
 def _save_copy(path: Path) -> None:
-    """The open .blend as it is now, saved or not; the open one stays what it is."""
+    """Save a copy of the open .blend in its present state; the open file itself is not saved."""
     try:
         bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, check_existing=False)
     except RuntimeError as error:
-        said = " ".join(str(error).split())
-        raise PatinaError(f"a copy of the scene cannot be saved ({said})") from error
+        message = " ".join(str(error).split())
+        raise PatinaError(f"cannot save a copy of the scene ({message})") from error

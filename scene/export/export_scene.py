@@ -1,4 +1,4 @@
-"""The .blend that an exporter writes from: the scan's own, or a preview sphere a material."""
+"""The scene that an exporter writes: that of the scan, or a preview sphere for each material."""
 
 from __future__ import annotations
 
@@ -13,32 +13,35 @@ from ...core.export.subject import Subject
 from ..material import material_nodes, osl_files
 from ..property_keys import MEASURED_NAME
 
-RINGS, SEGMENTS = 48, 96
+RINGS, SEGMENTS = 48, 96  # of a preview sphere
 SPACING = 2.5  # between the centres of preview spheres of radius 1
 
 
 def open_scan(file: Path, names: Sequence[str]) -> bpy.types.Object | None:
-    """Open a result's scene.blend; its scanned mesh, or None where it has none that wears all of
-    the named materials."""
+    """Open a result's scene.blend; returns its scanned mesh, or None if it has no mesh with all of
+    the named materials.
+
+    Raises PatinaError if the file cannot be opened.
+    """
     try:
         bpy.ops.wm.open_mainfile(filepath=str(file), load_ui=False, use_scripts=False)
     except RuntimeError as error:
-        said = " ".join(str(error).split())
-        raise PatinaError(f"{file}: cannot be opened as a .blend ({said})") from error
+        message = " ".join(str(error).split())
+        raise PatinaError(f"{file}: cannot be opened as a .blend ({message})") from error
     mesh = bpy.context.scene.patina.mesh
     if mesh is None or mesh.type != "MESH" or mesh.name not in bpy.context.scene.objects:
         return None
-    worn = {slot.material.get(MEASURED_NAME) for slot in mesh.material_slots if slot.material}
-    if not set(names) <= worn:
+    assigned = {slot.material.get(MEASURED_NAME) for slot in mesh.material_slots if slot.material}
+    if not set(names) <= assigned:
         return None
     _show(mesh)
     return mesh
 
 
 def _show(thing: bpy.types.Object) -> None:
-    """Exporters take nothing that is hidden, and the artist may have hidden it."""
+    """Unhide an object: exporters skip hidden objects, and the user may have hidden it."""
     thing.hide_viewport = False
-    if thing.name not in bpy.context.view_layer.objects:  # its collection is switched off
+    if thing.name not in bpy.context.view_layer.objects:  # its collection is excluded
         bpy.context.scene.collection.objects.link(thing)
         bpy.context.view_layer.update()
     thing.hide_set(False)
@@ -47,8 +50,8 @@ def _show(thing: bpy.types.Object) -> None:
         bpy.context.view_layer.update()
 
 
-def new_stage() -> bpy.types.Scene:
-    """An empty file with what factory settings enable."""
+def new_scene() -> bpy.types.Scene:
+    """Open an empty file with factory settings; returns its scene."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True, load_ui=False)
     scene = bpy.context.scene
     if hasattr(scene, "cycles"):
@@ -61,8 +64,11 @@ def new_stage() -> bpy.types.Scene:
 def create_materials(
     subjects: Sequence[Subject], whole: bool, stack: bool = True
 ) -> list[bpy.types.Material]:
-    """The materials: whole as a fit makes them, or what exporters take of them alone; stack: with
-    the lobe stack that EEVEE shows, which takes seconds to fit."""
+    """Create the materials.
+
+    whole: with all outputs, as a fit creates them; False: only the Principled that exporters read.
+    stack: also fit the lobe stack that EEVEE shows, which takes seconds.
+    """
     made = []
     for subject in subjects:
         item = subject.material
@@ -101,14 +107,14 @@ def preview_spheres(made: Sequence[bpy.types.Material]) -> list[bpy.types.Object
 
 
 def select_only(objects: Sequence[bpy.types.Object]) -> None:
-    """Exporters take what is selected."""
+    """Select exactly these objects: exporters write the selection."""
     for item in bpy.context.view_layer.objects:
         item.select_set(item in objects)
     bpy.context.view_layer.objects.active = objects[0]
 
 
 def fill_sphere(mesh: bpy.types.Mesh, rings: int = RINGS, segments: int = SEGMENTS) -> None:
-    """Make a mesh a smooth unit sphere with UVs."""
+    """Replace the geometry of a mesh by a smooth unit sphere with UVs."""
     import bmesh
 
     shape = bmesh.new()

@@ -1,4 +1,4 @@
-"""USD through Blender's own exporter: UsdPreviewSurface, and MaterialX (OpenPBR) where it can."""
+"""Write USD with Blender's exporter: UsdPreviewSurface, and MaterialX (OpenPBR) if supported."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...core.errors import PatinaError
 from .export_scene import select_only
 
 MATERIALX = "generate_materialx_network"
-WANTED = {
+OPTIONS = {
     "selected_objects_only": True,
     "export_materials": True,
     "generate_preview_surface": True,
@@ -29,21 +29,24 @@ WANTED = {
 
 
 def check_usd() -> None:
-    """Raises PatinaError where this Blender writes no USD (some distributions' builds)."""
+    """Raise PatinaError if this build of Blender has no USD (some distributions' builds)."""
     if not bpy.app.build_options.usd:
-        raise PatinaError("this Blender was built without USD; use one from blender.org")
+        raise PatinaError("this build of Blender has no USD; use a build from blender.org")
 
 
 def write_usd(path: Path, objects: Sequence[bpy.types.Object]) -> bool:
-    """Write the objects as USD; True where the materials are there as MaterialX too."""
+    """Write the objects as USD; returns whether the materials are also written as MaterialX.
+
+    Raises PatinaError if Blender's exporter fails.
+    """
     select_only(objects)
     known = bpy.ops.wm.usd_export.get_rna_type().properties.keys()
-    told = {key: value for key, value in WANTED.items() if key in known}
+    options = {key: value for key, value in OPTIONS.items() if key in known}
     try:
-        bpy.ops.wm.usd_export(filepath=str(path), **told)
+        bpy.ops.wm.usd_export(filepath=str(path), **options)
     except RuntimeError as error:
-        said = " ".join(str(error).split())
-        raise PatinaError(f"{path.name}: Blender's USD exporter failed ({said})") from error
+        message = " ".join(str(error).split())
+        raise PatinaError(f"{path.name}: Blender's USD exporter failed ({message})") from error
     if not path.is_file():
         raise PatinaError(f"{path.name}: Blender's USD exporter wrote nothing")
-    return bool(told.get(MATERIALX))
+    return bool(options.get(MATERIALX))

@@ -1,13 +1,13 @@
-"""Maps on the measured materials of a .blend.
+"""Assign maps to the measured materials of a .blend.
 
-The portable branch gets them as image textures. Where a mesh has several materials, all of them
-wear the same maps, blended by the painted masks: a face still has one material slot, but its base
-colour, roughness, metallic and specular fade into the neighbour's within the masks' soft border, so
-no edge of a face shows. Inputs are blended rather than shaders: a Mix Shader is what no exporter
-keeps (glTF and USD know one surface a face), and within the few texels of a border the two look
-alike.
+The portable branch gets them as image textures. If a mesh has multiple materials, all of them use
+the same maps, blended by the painted masks: a face still has one material slot, but base colour,
+roughness, metallic and specular change smoothly to those of the neighbour within the soft border of
+the masks, so that face edges are not visible. Inputs are blended rather than shaders, because no
+exporter keeps a Mix Shader (glTF and USD have one surface per face), and within the few texels of a
+border both look alike.
 
-The OSL branch takes a colour, BODY_SCALE, and a level, BODY, where its shader has such inputs.
+The OSL branch takes a colour, BODY_SCALE, and a level, BODY, if its shader has these inputs.
 """
 
 from __future__ import annotations
@@ -48,9 +48,12 @@ def write_mapped_blend(
     source: Path | None,
     stages: Sequence[Stage],
 ) -> list[str]:
-    """A scene with the maps on its materials, saved as ``path``; the maps lie beside it and move
-    with it to ``final``. The scene is that of the fit without paint, where there was one, else
-    ``source``, which a fit left; None: nothing is written. Returns notes for the user."""
+    """Save a scene with the maps on its materials as ``path``; returns notes for the user.
+
+    The maps are in the same folder and move with the file to ``final``. The scene is that of the
+    refit without painted texture, if there was one, else ``source``, the .blend of the fit. If
+    ``source`` is None as well, nothing is written.
+    """
     notes: list[str] = []
     if result.refit is not None:
         notes += write_blend(path, final, result.refit, stages)
@@ -58,14 +61,14 @@ def write_mapped_blend(
         _open(source)
         _own_shader_files(path, final)
     else:
-        return ["the result has no scene.blend: the maps are on no material"]
+        return ["The result has no scene.blend, so the maps were not assigned to materials."]
     notes += apply_maps(bpy.context.scene, result, path.parent, files)
     save(path, final)
     return notes
 
 
 def _open(source: Path) -> None:
-    """Open a .blend; its pictures by absolute paths, so that it can be saved elsewhere."""
+    """Open a .blend and make its image paths absolute, so that it can be saved elsewhere."""
     try:
         bpy.ops.wm.open_mainfile(filepath=str(source.resolve()), load_ui=False)
     except RuntimeError as error:
@@ -84,22 +87,24 @@ def apply_maps(
     notes = []
     mesh = scene.patina.mesh
     if mesh is None or mesh.type != "MESH":
-        notes.append("the scanned mesh is not in this scene: its UVs were not set")
+        notes.append("The scanned mesh is not in this scene, so its UVs were not set.")
     elif not _set_uv(mesh.data, result):
-        notes.append(f"{mesh.name} no longer has the scan's faces: its UVs were not set")
-    several = len(result.materials) > 1
+        notes.append(f"{mesh.name} no longer has the faces of the scan, so its UVs were not set.")
+    multiple = len(result.materials) > 1
     by_name = {str(m[MEASURED_NAME]): m for m in measured_materials()}
     for index, fitted in enumerate(result.materials):
         material = by_name.get(fitted.name)
         if material is None:
-            notes.append(f"{fitted.name}: no such material in this scene, its maps are not used")
+            notes.append(
+                f"{fitted.name}: the scene has no such material, so its maps are not used."
+            )
             continue
-        own = {f.kind: f for f in files if f.material == (BLEND if several else fitted.name)}
+        own = {f.kind: f for f in files if f.material == (BLEND if multiple else fitted.name)}
         own |= {f.kind: f for f in files if f.kind == "normal"}
         scale = next(f for f in files if f.material == fitted.name and f.kind == "scale")
         for shader in _principled(material):
             fill_principled(shader, fitted.principled)
-        _wear(material, own, scale, result.levels[index].split.body, folder)
+        _assign_maps(material, own, scale, result.levels[index].split.body, folder)
     return notes
 
 
@@ -107,7 +112,7 @@ def _principled(material: bpy.types.Material) -> list[bpy.types.Node]:
     return [n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED"]
 
 
-def _wear(
+def _assign_maps(
     material: bpy.types.Material,
     own: dict[str, MapFile],
     scale: MapFile,
@@ -171,7 +176,7 @@ def _image_node(
 
 
 def _set_uv(data: bpy.types.Mesh, result: MapsResult) -> bool:
-    """Write the texture coordinates that the maps are in; False where the faces are others."""
+    """Set the texture coordinates of the maps; False if the mesh does not have the scan's faces."""
     uv = result.scan.mesh.uv
     if uv is None or len(data.polygons) != len(uv) or len(data.loops) != 3 * len(uv):
         return False
@@ -183,11 +188,11 @@ def _set_uv(data: bpy.types.Mesh, result: MapsResult) -> bool:
 
 
 def _own_shader_files(path: Path, final: Path) -> None:
-    """Put the shader's EXRs, which travel packed, beside the new file; point its nodes there."""
+    """Write the shader's packed EXRs next to the new file, and point its nodes to them."""
 
     def moved(file: Path) -> bool:
         image = bpy.data.images.get(file.name)
         return write_packed(image, path.parent / file.name)
 
     for material in measured_materials():
-        osl_files.lead_to(material, final.parent, moved)
+        osl_files.redirect_files(material, final.parent, moved)

@@ -1,7 +1,8 @@
-"""Fitted materials under other light: a sphere for each, and the scanned object on a turntable.
+"""Render fitted materials under new lighting: a sphere for each, and the scanned object on a
+turntable.
 
-Rendered by Cycles with the measured material itself (OSL), where this Blender can run it, under
-pictures of the world.
+Cycles renders the measured BRDF (OSL), if this build of Blender can run it, lit by environment
+images.
 """
 
 from __future__ import annotations
@@ -23,16 +24,19 @@ from ..material.material_nodes import osl_missing
 from ..material.world_inputs import update_worlds
 from . import export_scene
 
-HEIGHT = math.radians(15)  # of the camera above the turntable
+HEIGHT = math.radians(15)  # elevation of the camera above the turntable
 LENS = 85.0  # mm on a sensor of 36
-MARGIN = 1.08
+MARGIN = 1.08  # frame size over object size
 SPHERE = (96, 192)  # rings, segments
 
 
 @dataclass(frozen=True)
 class Quality:
-    """size: pixels along a picture's side; samples: a pixel; turns: pictures of a whole turn of the
-    object, 0 for none; denoise: by Open Image Denoise, where this Blender has it."""
+    """Render settings.
+
+    size: side of a picture, pixels; samples: per pixel; turns: pictures per full turn of the
+    object, 0 for none; denoise: use Open Image Denoise, if this build of Blender has it.
+    """
 
     size: int = 512
     samples: int = 128
@@ -41,18 +45,21 @@ class Quality:
 
 
 def shipped_worlds() -> dict[str, Path]:
-    """Name → the pictures of worlds that come with Blender."""
+    """Name → file of the environment images that are included with Blender."""
     folder = bpy.utils.system_resource("DATAFILES", path="studiolights/world")
     if not folder:
         return {}
     return {file.stem: file for file in sorted(Path(folder).glob("*.exr"))}
 
 
-def worlds_named(told: Sequence[str]) -> dict[str, Path]:
-    """Name → file of what ``--world`` names: files, names of Blender's own worlds, or "all" of
-    them. Raises InputError for what is neither."""
+def find_worlds(names: Sequence[str]) -> dict[str, Path]:
+    """Name → file of the environment images that ``--world`` requests.
+
+    names: files, names of Blender's own images, or "all" for all of Blender's. Raises InputError
+    for anything else.
+    """
     shipped, found = shipped_worlds(), {}
-    for name in told:
+    for name in names:
         if name == "all":
             found |= shipped
         elif name in shipped:
@@ -61,12 +68,15 @@ def worlds_named(told: Sequence[str]) -> dict[str, Path]:
             found[Path(name).stem] = Path(name).resolve()
         else:
             raise InputError(
-                f"{name!r} is no file and no world of this Blender, which has "
-                f"{', '.join(shipped) or 'none'}; expected one of those, a .hdr or .exr, or all",
+                f"{name!r} is neither a file nor an environment image of this Blender, which has "
+                f"{', '.join(shipped) or 'none'}; expected one of those, a .hdr or .exr file, or "
+                "all",
                 key="--world",
             )
     if not found:
-        raise InputError("this Blender comes without worlds: name a .hdr or .exr", key="--world")
+        raise InputError(
+            "this Blender includes no environment images; give a .hdr or .exr file", key="--world"
+        )
     return found
 
 
@@ -77,20 +87,21 @@ def relight(
     worlds: dict[str, Path],
     quality: Quality,
 ) -> Iterator[tuple[float, Picture | None]]:
-    """Render into ``folder``; yields the fraction done, and each picture when it is there.
+    """Render into ``folder``; yields (fraction done, the picture just rendered or None).
 
-    Raises InputError for a world that is no picture, PatinaError where Blender cannot render."""
+    Raises InputError for a world that is not an image, PatinaError if Blender cannot render.
+    """
     spheres = len(subjects) * len(worlds)
     turns = quality.turns * len(worlds) if result.scene is not None else 0
     count, done = spheres + turns, 0
-    export_scene.new_stage()
+    export_scene.new_scene()
     made = export_scene.create_materials(subjects, whole=True, stack=osl_missing() is not None)
     scene = bpy.context.scene
     sphere = _sphere()
     _prepare(scene, quality)
     _camera(scene, Vector((0, 0, 0)), 1.0)
     for name, file in worlds.items():
-        light_by(scene, file)
+        light_with(scene, file)
         for subject, material in zip(subjects, made, strict=True):
             yield done / count, None
             sphere.data.materials.clear()
@@ -109,7 +120,7 @@ def relight(
     _prepare(scene, quality)
     _camera(scene, Vector((0, 0, 0)), radius)
     for name, file in worlds.items():
-        light_by(scene, file)
+        light_with(scene, file)
         for turn in range(quality.turns):
             yield done / count, None
             table.rotation_euler.z = 2 * math.pi * turn / quality.turns
@@ -128,8 +139,11 @@ def _sphere() -> bpy.types.Object:
 
 
 def _turntable(scene: bpy.types.Scene, mesh: bpy.types.Object) -> tuple[bpy.types.Object, float]:
-    """Put the object upright on an empty that turns around z; everything else goes. Returns the
-    empty and the object's radius. Upright is as most of the scan's cameras were held."""
+    """Put the object upright on an empty that turns around z, and remove all other objects.
+
+    The mean up direction of the scan's cameras is taken as upright. Returns (the empty, the
+    object's radius).
+    """
     up = Vector((0, 0, 0))
     for item in list(scene.objects):
         if item.type == "CAMERA":
@@ -155,14 +169,19 @@ def _turntable(scene: bpy.types.Scene, mesh: bpy.types.Object) -> tuple[bpy.type
 
 def _prepare(scene: bpy.types.Scene, quality: Quality) -> None:
     if not hasattr(scene, "cycles"):
-        raise PatinaError("this Blender has no Cycles, which renders the measured material")
+        raise PatinaError(
+            "this build of Blender has no Cycles, which renders the measured BRDF; use a build "
+            "from blender.org"
+        )
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
     cycles.device, cycles.samples, cycles.use_adaptive_sampling = "CPU", quality.samples, False
     if osl_missing() is None:
         cycles.shading_system = True
     cycles.use_denoising = quality.denoise and _can_denoise()
-    cycles.transparent_max_bounces = max(cycles.transparent_max_bounces, 16)  # portals count here
+    cycles.transparent_max_bounces = max(
+        cycles.transparent_max_bounces, 16
+    )  # portals count as transparent bounces
     render = scene.render
     render.resolution_x = render.resolution_y = quality.size
     render.resolution_percentage = 100
@@ -193,14 +212,19 @@ def _camera(scene: bpy.types.Scene, centre: Vector, radius: float) -> None:
     scene.camera = camera
 
 
-def light_by(scene: bpy.types.Scene, file: Path) -> None:
-    """Light a scene by a picture of the world. Raises InputError where it is none."""
+def light_with(scene: bpy.types.Scene, file: Path) -> None:
+    """Light a scene by an environment image. Raises InputError if the file is not an image."""
     try:
         image = bpy.data.images.load(str(file), check_existing=True)
     except RuntimeError as error:
-        raise InputError(f"is no picture of a world ({error})", file=file) from error
+        raise InputError(
+            f"cannot be read as an environment image ({error}); expected a .hdr or .exr file",
+            file=file,
+        ) from error
     if min(image.size) < 2:
-        raise InputError("cannot be read as a picture of a world", file=file)
+        raise InputError(
+            "cannot be read as an environment image; expected a .hdr or .exr file", file=file
+        )
     world = bpy.data.worlds.new(file.stem)
     if world.node_tree is None:
         world.use_nodes = True

@@ -1,4 +1,4 @@
-"""A measured material that is found again, with where it comes from."""
+"""Measured materials as assets, with tags and provenance."""
 
 from __future__ import annotations
 
@@ -12,19 +12,22 @@ from .trait_offsets import movable, state
 
 
 def mark(material: bpy.types.Material, result: dict[str, Any]) -> bool:
-    """As an asset, with tags and provenance; result: the content of result.json that it is in.
-    False where that does not know the material."""
+    """Mark a material as an asset, with tags and provenance.
+
+    result: the content of the result.json that the material belongs to. Returns False if it does
+    not contain the material.
+    """
     name = material[MEASURED_NAME]
-    mine = next((m for m in result["materials"] if m["name"] == name), None)
-    if mine is None:
+    own = next((m for m in result["materials"] if m["name"] == name), None)
+    if own is None:
         return False
-    told = provenance(mine, result, material.get(MEASURED_DATE, ""))
+    origin = provenance(own, result, material.get(MEASURED_DATE, ""))
     if movable(material) and state(material):
-        told["changed"] = "with its traits changed by hand since"
-    material[PROVENANCE] = told
+        origin["changed"] = "traits edited after the fit"
+    material[PROVENANCE] = origin
     material.asset_mark()
     data = material.asset_data
-    data.description = "; ".join(told.values())
+    data.description = "; ".join(origin.values())
     data.author = f"Patina {result['program']['version']}"
     for tag in ("Patina", "measured", name, Path(result["capture"]).name.split(".")[0]):
         data.tags.new(tag, skip_if_exists=True)
@@ -32,19 +35,23 @@ def mark(material: bpy.types.Material, result: dict[str, Any]) -> bool:
 
 
 def provenance(material: dict[str, Any], result: dict[str, Any], date: str) -> dict[str, str]:
-    """In words: scan, photos, date, version, errors."""
+    """Sentences on scan, photos, date, version and error, by key.
+
+    material: an entry of ``result["materials"]``; result: the content of result.json; date: ISO
+    8601, "" if unknown.
+    """
     photos = sum(count > 0 for count in material["samples"]["per_photo"].values())
     lights = [light["name"] for light in result["lights"]]
-    told = {
+    sentences = {
         "scan": f"measured from {Path(result['capture']).name}",
         "photos": f"{photos} lit photos under {', '.join(lights)}",
-        "date": f"on {date}" if date else "on a day that is not known",
+        "date": f"on {date}" if date else "on an unknown date",
         "version": f"by Patina {result['program']['version']}, {material['estimator']} method",
     }
     held = material.get("held_out")
     if held:
-        told["error"] = f"predicts unseen photos to {100 * held['typical']:.1f} %"
+        sentences["error"] = f"median error of held-out photos {100 * held['typical']:.1f} %"
     effects = [effect["cause"] for effect in result.get("effects", [])]
     if effects:
-        told["effects"] = f"with {', '.join(effects)} taken into account"
-    return told
+        sentences["effects"] = f"with {', '.join(effects)} included in the model"
+    return sentences

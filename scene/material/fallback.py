@@ -1,7 +1,7 @@
-"""Where the measured shader cannot run, Cycles gets the portable material, visibly.
+"""Use the portable material in Cycles if the measured shader cannot run.
 
-Cycles renders a script node as black when Open Shading Language is off, and on a GPU. The output
-for Cycles is led from the portable branch then, and back again when the shader can run.
+Cycles renders a script node as black if Open Shading Language is off or it renders on a GPU. The
+output for Cycles is then linked to the portable branch, and back to the shader when it can run.
 """
 
 from __future__ import annotations
@@ -15,32 +15,33 @@ from .osl_files import own_materials, script_nodes
 
 
 def osl_hindrance(scene: bpy.types.Scene) -> str | None:
-    """Why this scene's renders do not show the measured shader, for the user; or None."""
+    """Why renders of this scene do not show the measured shader (for the user); None if they do."""
     missing = osl_missing()
     if missing is not None:
         return missing
     if scene.render.engine != "CYCLES":
-        return "Cycles alone shows the measurement: this scene renders with another engine"
-    if scene.cycles.device == "GPU" and _gpu_chosen():
-        return "Cycles renders on the GPU: the measurement needs the CPU (Render properties)"
+        return "only Cycles renders the measured BRDF, and this scene uses another render engine"
+    if scene.cycles.device == "GPU" and _gpu_enabled():
+        return "the measured BRDF needs the CPU; set the device to CPU in the Render properties"
     if not scene.cycles.shading_system:
-        return "Open Shading Language is off: switch it on in the Render properties"
+        return "Open Shading Language is off; enable it in the Render properties"
     return None
 
 
 def update_fallback(scene: bpy.types.Scene) -> int:
-    """Lead each Patina material's output for Cycles from what can run; returns how many changed."""
+    """Link each Patina material's Cycles output to a branch that can run; returns the number of
+    changed materials."""
     if scene.render.engine != "CYCLES":
         return 0  # other engines have outputs of their own
     runs = osl_hindrance(scene) is None
     return sum(
-        _lead(material, node, runs)
+        _link_output(material, node, runs)
         for material in own_materials()
         for node in script_nodes(material)[:1]
     )
 
 
-def _lead(material: bpy.types.Material, measured: bpy.types.Node, runs: bool) -> bool:
+def _link_output(material: bpy.types.Material, measured: bpy.types.Node, runs: bool) -> bool:
     tree = material.node_tree
     outputs = {n.target: n for n in tree.nodes if n.type == "OUTPUT_MATERIAL"}
     portable = next(
@@ -54,15 +55,15 @@ def _lead(material: bpy.types.Material, measured: bpy.types.Node, runs: bool) ->
     links = outputs["CYCLES"].inputs["Surface"].links if "CYCLES" in outputs else ()
     if portable is None or not links:
         return False
-    now, wanted = links[0].from_node, measured if runs else portable
-    if now not in (measured, portable) or now == wanted:  # the artist's own wiring stays
+    current, wanted = links[0].from_node, measured if runs else portable
+    if current not in (measured, portable) or current == wanted:  # the user's own links stay
         return False
     tree.links.new(wanted.outputs["BSDF"], outputs["CYCLES"].inputs["Surface"])
     return True
 
 
-def _gpu_chosen() -> bool:
-    """True where the preferences name a device that "GPU" would mean."""
+def _gpu_enabled() -> bool:
+    """Whether the preferences select a device for "GPU"."""
     cycles = bpy.context.preferences.addons.get("cycles")
     return cycles is not None and cycles.preferences.compute_device_type != "NONE"
 

@@ -1,7 +1,7 @@
-"""What Patina keeps on disk to be quick, or to show .blend files that have no folder yet.
+"""The cache on disk: files that Patina can create again.
 
-Bases of the artist's own MERL files, the shaders' EXRs and the straightened photos of unsaved
-.blend files: all of it can be made again. Masks that were painted are no cache.
+It holds bases of the user's own MERL files, and the shader EXRs and undistorted photos of unsaved
+.blend files. Painted masks are not part of it.
 """
 
 from __future__ import annotations
@@ -28,28 +28,32 @@ MB = 1_000_000  # bytes
 
 
 def cached_files() -> dict[Path, int]:
-    """Every file that can be made again → its bytes."""
+    """Every cached file → its size in bytes."""
     own = own_folder()
     found = [p for p in own.glob("*.exr") if osl_atlas.is_own_name(p.name)]
-    if not (own / "rectified").is_symlink():  # a link may lead to files that are not Patina's
+    if not (own / "rectified").is_symlink():  # a link may point to other files
         found += (own / "rectified").rglob("*")
     found += cache_folder().glob("merl_basis_*.npz")
     return {path: path.stat().st_size for path in found if path.is_file()}
 
 
 def empty_cache() -> tuple[int, int]:
-    """Remove all but what the open .blend shows; returns (files, bytes) that are gone."""
+    """Remove all files that the open .blend does not use; returns (files, bytes) removed."""
     return _drop(0)
 
 
 def trim_cache() -> tuple[int, int]:
-    """Remove the oldest until it is no larger than the preferences say; likewise."""
+    """Remove the oldest files until the cache has the size set in the preferences. Files that the
+    open .blend uses stay. Returns (files, bytes) removed."""
     return _drop(preferences().cache_size * MB)
 
 
 def own_basis() -> Callable[[], Basis] | None:
-    """How to come by the basis of the artist's own MERL files, where there are any; it takes a
-    while and knows no Blender. Raises InputError where the files are not the database."""
+    """A function that computes the basis of the user's own MERL files; None without such files.
+
+    The function is slow and does not use Blender. It raises InputError if the files are not the
+    MERL database.
+    """
     folder = preferences().merl_folder
     if not folder:
         return None
@@ -57,27 +61,27 @@ def own_basis() -> Callable[[], Basis] | None:
     return lambda: _basis(source, cache)
 
 
-@lru_cache(maxsize=1)  # the files' sums take seconds
+@lru_cache(maxsize=1)  # computing the checksums of the files takes seconds
 def _basis(folder: Path, cache: Path) -> Basis:
     return cached_basis(folder, cache=cache)
 
 
-def _drop(most: int) -> tuple[int, int]:
+def _drop(limit: int) -> tuple[int, int]:
     files = cached_files()
-    size, kept = sum(files.values()), _in_use()
-    count = gone = 0
+    size, used = sum(files.values()), _in_use()
+    count = removed = 0
     for path in sorted(files, key=_age):
-        if size - gone <= most:
+        if size - removed <= limit:
             break
-        if kept & {os.path.abspath(path), str(path.resolve())}:
+        if used & {os.path.abspath(path), str(path.resolve())}:
             continue
         try:
             path.unlink()
         except OSError as error:
             log.warning("%s: cannot be removed (%s)", path, error.strerror)
             continue
-        count, gone = count + 1, gone + files[path]
-    return count, gone
+        count, removed = count + 1, removed + files[path]
+    return count, removed
 
 
 def _age(path: Path) -> float:
@@ -88,12 +92,14 @@ def _age(path: Path) -> float:
 
 
 def _in_use() -> set[str]:
-    """What the open .blend reads: pictures, and the files of its shaders. The paths are not looked
-    up on disk: they may name somebody's server."""
-    told = [bpy.path.abspath(i.filepath) for i in bpy.data.images if i.filepath]
+    """Absolute paths of the files that the open .blend reads: images and shader files.
+
+    The paths are not looked up on disk, because they may point to a foreign server.
+    """
+    paths = [bpy.path.abspath(i.filepath) for i in bpy.data.images if i.filepath]
     for node in osl_files.own_shaders():
-        told += [socket.default_value for socket in osl_files.file_sockets(node)]
-    return {os.path.abspath(one) for one in told if one}
+        paths += [socket.default_value for socket in osl_files.file_sockets(node)]
+    return {os.path.abspath(path) for path in paths if path}
 
 
 @bpy.app.handlers.persistent
@@ -105,11 +111,11 @@ HANDLERS = (("load_post", _after_load),)
 
 
 def register() -> None:
-    """Keep to the largest size from now on."""
+    """Trim the cache whenever a file is opened."""
     attach(HANDLERS)
 
 
 def unregister() -> None:
-    """No more."""
+    """Remove the handler and forget the basis."""
     detach(HANDLERS)
     _basis.cache_clear()

@@ -1,7 +1,8 @@
-"""The scene's lamps, written into the inputs of every Patina shader.
+"""Write the scene's lamps into the inputs of every Patina shader.
 
-A shader cannot ask Cycles for lamps, and the paths that leave it never meet one without a size: the
-shader evaluates them itself, from a table in its hidden inputs (assets/osl/patina_brdf.osl).
+An OSL shader cannot query the lamps of Cycles, and light paths never hit a lamp without a size. The
+shader therefore evaluates lamps itself, from a table in its hidden inputs
+(assets/osl/patina_brdf.osl).
 """
 
 from __future__ import annotations
@@ -21,16 +22,16 @@ log = logging.getLogger(__name__)
 
 Vector3 = tuple[float, float, float]
 OFF, SUN, POINT, AREA = range(4)
-NO_CONE = -2.0  # a point lamp: below any cosine
+NO_CONE = -2.0  # cosine of a point lamp's cone, below every real cosine
 
 
 @dataclass(frozen=True)
 class Lamp:
-    """One row of the table, in world space; see lamp_light in the shader for what form holds.
+    """One row of the table, in world space.
 
-    at: surface → light for a sun, else a position. power: irradiance at normal incidence for a
-    sun, else radiant intensity along the axis (W/sr). kind is negative where the lamp itself
-    shows in the picture.
+    kind: OFF, SUN, POINT or AREA, negative if the camera sees the lamp itself. at: direction
+    surface → light for a sun, else the position. power: irradiance at normal incidence for a sun,
+    else radiant intensity along the axis (W/sr). form: see lamp_light in the shader.
     """
 
     kind: int = OFF
@@ -42,13 +43,13 @@ class Lamp:
 
 
 def scene_lamps(scene: bpy.types.Scene) -> list[Lamp]:
-    """Every lamp that shines in the render, brightest first."""
+    """Every lamp that is on in renders, brightest first."""
     rows = [_row(o) for o in _rendered(scene.collection) if o.type == "LIGHT"]
     return sorted((r for r in rows if max(r.power) > 0), key=lambda r: (-max(r.power), r.at))
 
 
 def _rendered(collection: bpy.types.Collection) -> set[bpy.types.Object]:
-    """The objects below a collection that are not hidden in renders, by themselves or with it."""
+    """All objects of a collection and its children that are not hidden in renders."""
     if collection.hide_render:
         return set()
     found = {o for o in collection.objects if not o.hide_render}
@@ -56,22 +57,27 @@ def _rendered(collection: bpy.types.Collection) -> set[bpy.types.Object]:
 
 
 def update_lamps(scene: bpy.types.Scene) -> int:
-    """Write the lamps into all Patina materials; returns how many inputs changed.
+    """Write the lamps into all Patina materials; returns the number of changed inputs.
 
-    A scene holds more than the shader can take: the brightest count, and a warning says so.
+    If the scene has more lamps than the shader supports, the brightest are used and a warning is
+    logged.
     """
     nodes = own_shaders()
     if not nodes:
         return 0
     lamps = scene_lamps(scene)
     if len(lamps) > osl_source.LAMPS:
-        log.warning("%d lamps: Patina shaders take the %d brightest", len(lamps), osl_source.LAMPS)
+        log.warning(
+            "The scene has %d lamps; Patina shaders use the %d brightest.",
+            len(lamps),
+            osl_source.LAMPS,
+        )
     rows = [*lamps, *[Lamp()] * osl_source.LAMPS][: osl_source.LAMPS]
     return sum(_write(node, rows) for node in nodes)
 
 
 def _write(node: bpy.types.Node, rows: list[Lamp]) -> int:
-    """Touch only what differs: every write makes Cycles build the shader anew."""
+    """Write only inputs that differ: every write makes Cycles compile the shader again."""
     sockets = {socket.identifier: socket for socket in node.inputs}
     changed = 0
     for i, lamp in enumerate(rows):
@@ -92,7 +98,7 @@ def _write(node: bpy.types.Node, rows: list[Lamp]) -> int:
 
 
 def _row(lamp_object: bpy.types.Object) -> Lamp:
-    """What Cycles makes of a lamp: the light's own units, turned into the table's."""
+    """A lamp as Cycles renders it, converted from Blender's units to those of the table."""
     lamp, world = lamp_object.data, lamp_object.matrix_world
     shown = -1 if lamp_object.visible_camera else 1
     rotation = world.to_3x3().normalized()
@@ -123,7 +129,7 @@ def _area(lamp, world, at, beam, watts, shown) -> Lamp:  # type: ignore[no-untyp
 
 
 def lamp_power(lamp: bpy.types.Light) -> Vector3:
-    """Strength × colour, linear RGB, with what newer versions add (exposure, temperature)."""
+    """Strength × colour, linear RGB, including exposure and temperature of newer versions."""
     strength = lamp.energy * 2.0 ** getattr(lamp, "exposure", 0.0)
     tint = (1.0, 1.0, 1.0)
     if getattr(lamp, "use_temperature", False):
@@ -133,7 +139,8 @@ def lamp_power(lamp: bpy.types.Light) -> Vector3:
 
 @persistent
 def _after_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Cheap while nothing happens to lamps; a write here changes materials only, so no loop."""
+    """Update the lamp inputs if a lamp changed. The update changes only materials, so it does not
+    trigger itself."""
     for update in depsgraph.updates:
         data = update.id
         if (

@@ -1,9 +1,9 @@
-"""The lobe stack as a node group of stock nodes: Cycles renders what core's LobeStack computes.
+"""The lobe stack as a group of standard nodes, which renders what LobeStack of core computes.
 
-A lobe is a Principled BSDF that is all metal: its Fresnel is Schlick's from the base colour f0/f90
-to white, and what weights it by f90 is the tint of a coat that reflects nothing (IOR 1), seen under
-the thickness 1/cosθ that Blender gives it and therefore raised to cosθ first. What lies below is
-mixed in by 1 − albedo, the formula of lobe_stack.albedo_fit node by node. EEVEE has the same nodes.
+A lobe is a metallic Principled BSDF. Its Fresnel term is Schlick's from the base colour f0/f90 to
+white. The tint of a coat that reflects nothing (IOR 1) weights it by f90; Blender applies the tint
+over the thickness 1/cosθ, so it is raised to the power cosθ first. The layers below are mixed in by
+1 − albedo, with the formula of lobe_stack.albedo_fit as nodes. The nodes work in Cycles and EEVEE.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...core.appearance.lobe_stack import ALBEDO_FIT, MOST_LOBES, Lobe, LobeStack
+from ...core.appearance.lobe_stack import ALBEDO_FIT, MAX_LOBES, Lobe, LobeStack
 from ..property_keys import LOBE_GROUP_LAYOUT
 
 NAME = "Patina Lobe Stack"
 LOBE_NAME = "Patina Lobe"
-LAYOUT = 1
+LAYOUT = 1  # version of the group's nodes
 COLOURS = ("", " Mid", " Edge")  # facing the viewer, midway, at the silhouette
 
 
 def add_lobe_stack(
     tree: bpy.types.NodeTree, stack: LobeStack, location: tuple[float, float] = (0, 0)
 ) -> bpy.types.Node:
-    """A node of the group in ``tree``, its inputs set to the stack; output 'BSDF'."""
+    """Add a node of the group to ``tree`` with the inputs of ``stack``; its output is 'BSDF'."""
     node = tree.nodes.new("ShaderNodeGroup")
     node.node_tree = stack_group()
     node.width, node.location = 240, location
@@ -35,7 +35,7 @@ def add_lobe_stack(
 
 
 def fill_lobe_stack(node: bpy.types.Node, stack: LobeStack) -> None:
-    """Set the inputs of the group's node; lobes that the stack has not get black."""
+    """Set the inputs of the group's node; lobes that the stack does not have are black."""
     for name, color in (
         ("", stack.diffuse),
         (" Mid", stack.diffuse_mid),
@@ -45,7 +45,7 @@ def fill_lobe_stack(node: bpy.types.Node, stack: LobeStack) -> None:
         node.inputs[f"Diffuse Color{name}"].default_value = _rgba(value)
     node.inputs["Diffuse Roughness"].default_value = float(stack.diffuse_roughness)
     black = Lobe(np.zeros(3), np.zeros(3), 0.5)
-    lobes = (*stack.lobes, *(black for _ in range(MOST_LOBES - len(stack.lobes))))
+    lobes = (*stack.lobes, *(black for _ in range(MAX_LOBES - len(stack.lobes))))
     for place, lobe in enumerate(lobes, 1):
         for name, color in (("", lobe.f0), (" Mid", lobe.f0_mid), (" Edge", lobe.f0_edge)):
             value = lobe.f0 if color is None else color
@@ -55,7 +55,7 @@ def fill_lobe_stack(node: bpy.types.Node, stack: LobeStack) -> None:
 
 
 def stack_group() -> bpy.types.NodeTree:
-    """The group of the whole stack; made once a .blend."""
+    """The node group of the whole stack, created once per .blend."""
     return _existing(NAME) or _make_stack()
 
 
@@ -78,7 +78,7 @@ def _make_stack() -> bpy.types.NodeTree:
     for name in COLOURS:
         _color(group, f"Diffuse Color{name}", 0.5)
     _fraction(group, "Diffuse Roughness", 0.0)
-    for place in range(1, MOST_LOBES + 1):
+    for place in range(1, MAX_LOBES + 1):
         for name in COLOURS:
             _color(group, f"Lobe {place} F0{name}", 0.0)
         _color(group, f"Lobe {place} F90", 0.0)
@@ -93,7 +93,7 @@ def _make_stack() -> bpy.types.NodeTree:
         Roughness=wiring.given("Diffuse Roughness"),
         Normal=normal,
     ).outputs[0]
-    for place in range(MOST_LOBES, 0, -1):
+    for place in range(MAX_LOBES, 0, -1):
         lobe = wiring.node("ShaderNodeGroup", tree=_existing(LOBE_NAME) or _make_lobe())
         for name in ("F0", "F0 Mid", "F0 Edge", "F90", "Roughness"):
             wiring.link(wiring.given(f"Lobe {place} {name}"), lobe.inputs[name])
@@ -151,7 +151,7 @@ def _make_lobe() -> bpy.types.NodeTree:
 def _blended(
     w: _Wiring, cosine: bpy.types.NodeSocket, colours: Sequence[bpy.types.NodeSocket]
 ) -> bpy.types.NodeSocket:
-    """lobe_stack.blended: the colour towards a viewer at this cosine."""
+    """lobe_stack.blended as nodes: the colour seen at this cosine of the view."""
     x = w.math("SUBTRACT", 1.0, cosine)
     y = w.math("MULTIPLY", x, x)
     rest = w.math("SUBTRACT", 1.0, y)
@@ -165,7 +165,7 @@ def _blended(
 
 
 def _albedo(w: _Wiring, x: bpy.types.NodeSocket, y: bpy.types.NodeSocket) -> tuple:
-    """What multiplies f0 and f90 in the directional albedo; x: cosθ, y: α."""
+    """The factors of f0 and f90 in the directional albedo; x: cosθ, y: α."""
     x2, y2 = w.math("MULTIPLY", x, x), w.math("MULTIPLY", y, y)
     terms = [
         x, y, w.math("MULTIPLY", x, y), x2, y2,
@@ -198,7 +198,7 @@ class _Wiring:
     def node(
         self, kind: str, tree: bpy.types.NodeTree | None = None, **links: bpy.types.NodeSocket
     ) -> bpy.types.Node:
-        """A node; links: what goes into its inputs, by their names with _ for a blank."""
+        """Add a node. links: input → source socket, with _ for a space in the input's name."""
         node = self.group.nodes.new(kind)
         node.location = (40 * self.count, -60 * (self.count % 12))
         self.count += 1
@@ -228,14 +228,14 @@ class _Wiring:
         return node.outputs["Value" if operation in ("DOT_PRODUCT", "LENGTH") else "Vector"]
 
     def normal(self) -> bpy.types.NodeSocket:
-        """The input Normal, or the surface's own where nothing is plugged in (length 0)."""
+        """The input Normal, or the surface normal if nothing is connected (length 0)."""
         given = self.given("Normal")
         absent = self.math("LESS_THAN", self.vector("LENGTH", given), 1e-3)
         own = self.node("ShaderNodeNewGeometry").outputs["Normal"]
         return self.vector("ADD", given, self.vector("SCALE", own, scale=absent))
 
     def cosine(self, normal: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
-        """Of the view against the normal, never quite 0."""
+        """Cosine between view and normal, at least 1e-4."""
         incoming = self.node("ShaderNodeNewGeometry").outputs["Incoming"]
         cosine = self.vector("DOT_PRODUCT", incoming, normal)
         return self.math("MINIMUM", self.math("MAXIMUM", cosine, 1e-4), 1.0)

@@ -1,4 +1,4 @@
-"""On a measured material: the samples and the interval that charts show, and the fit before it."""
+"""Data stored on a measured material for charts: samples, interval, and the previous fit."""
 
 from __future__ import annotations
 
@@ -24,34 +24,37 @@ from ..property_keys import (
 )
 from .trait_offsets import brdf_of, measured_brdf
 
-COLUMNS = 7  # of MeasuredPoints.rows
+COLUMNS = 7  # columns of MeasuredPoints.rows
 
 
 def keep_evidence(material: bpy.types.Material, fitted: MaterialResult) -> None:
-    """What the material was measured by, some hundred kilobytes: it stays with it in the .blend."""
+    """Store the samples and the interval on the material, some hundred kilobytes."""
     material[SAMPLE_POINTS] = _stored(fitted.points.rows())
     if isinstance(fitted.fit, MeasuredResult):
         material[INTERVAL_BAND] = _stored(fitted.fit.band.values)
 
 
 def keep_earlier(material: bpy.types.Material, old: bpy.types.Material) -> None:
-    """The fit that this one replaces, for comparison; where both say the same, the one before."""
+    """Store the coefficients of the replaced fit, for comparison. If both fits are equal, store
+    those of the fit before."""
     same = list(old[COEFFICIENTS]) == list(material[COEFFICIENTS])
     pairs = ((EARLIER_COEFFICIENTS, EARLIER_BASIS),) if same else ((COEFFICIENTS, BASIS_VERSION),)
-    for numbers, basis in pairs:
-        if numbers in old:
-            material[EARLIER_COEFFICIENTS] = list(old[numbers])
+    for coefficients, basis in pairs:
+        if coefficients in old:
+            material[EARLIER_COEFFICIENTS] = list(old[coefficients])
             material[EARLIER_BASIS] = old[basis]
 
 
 def has_earlier(material: bpy.types.Material) -> bool:
-    """Whether a fit before this one is known."""
+    """Whether the material stores an earlier fit."""
     return EARLIER_COEFFICIENTS in material
 
 
 def subject_of(material: bpy.types.Material, label: str = "") -> Subject:
-    """As measured, with its samples and its interval. Raises PatinaError where this computer lacks
-    its basis."""
+    """The material as measured, with its samples and interval, for charts.
+
+    Raises PatinaError if its basis is not on this computer.
+    """
     brdf = measured_brdf(material)
     if brdf is None:
         raise _without_basis(material.name)
@@ -66,9 +69,12 @@ def subject_of(material: bpy.types.Material, label: str = "") -> Subject:
 
 
 def earlier_subject(material: bpy.types.Material) -> Subject:
-    """The fit before. Raises PatinaError where there is none."""
+    """The earlier fit, for charts. Raises PatinaError if there is none, or if its basis is not on
+    this computer."""
     if not has_earlier(material):
-        raise PatinaError(f"{material.name} was fitted once only: no earlier fit to compare with")
+        raise PatinaError(
+            f"{material.name} was fitted only once; there is no earlier fit to compare with"
+        )
     brdf = brdf_of(material[EARLIER_BASIS], material[EARLIER_COEFFICIENTS])
     if brdf is None:
         raise _without_basis(material.name)
@@ -76,9 +82,7 @@ def earlier_subject(material: bpy.types.Material) -> Subject:
 
 
 def _without_basis(name: str) -> PatinaError:
-    return PatinaError(
-        f"the components that {name} was measured in are not on this computer: fit it again"
-    )
+    return PatinaError(f"the basis of {name} is not on this computer; fit the material again")
 
 
 def _stored(values: NDArray[np.floating]) -> array[float]:

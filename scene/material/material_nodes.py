@@ -1,8 +1,9 @@
-"""A BRDF as a Blender material: measured in Cycles, portable everywhere else.
+"""A BRDF as a Blender material: the measured shader for Cycles, portable ones for everything else.
 
-Three outputs: the OSL shader goes to one with target CYCLES, the lobe stack to one with target
-EEVEE, the Principled to one with target ALL that is the active one. Cycles renders the first (where
-OSL is missing, the lobe stack); EEVEE shows the second; glTF, USD and MaterialX export the third.
+The material has three outputs. The OSL shader is linked to one with target CYCLES, the lobe stack
+to one with target EEVEE, and the Principled to the active one with target ALL. Cycles renders the
+first (or the lobe stack, if OSL is missing), EEVEE shows the second, and glTF, USD and MaterialX
+export the third.
 """
 
 from __future__ import annotations
@@ -57,13 +58,13 @@ PRINCIPLED_SOCKETS = {
 
 
 def osl_missing() -> str | None:
-    """Why this Blender cannot run OSL, or None where it can."""
+    """Why this build of Blender cannot run OSL; None if it can."""
     try:
         import _cycles
     except ImportError:
-        return "this Blender has no Cycles"
+        return "this build of Blender has no Cycles"
     if not _cycles.with_osl:
-        return "this Blender was built without Open Shading Language"
+        return "this build of Blender has no Open Shading Language"
     return None
 
 
@@ -74,10 +75,11 @@ def create_material(
     files: ShaderFiles | None,
     lobes: LobeStackFit | None = None,
 ) -> bpy.types.Material:
-    """A material of every kind; without OSL only the portable ones, and the material says why.
+    """Create a material with all branches. Without OSL it has only the portable ones, and a custom
+    property states the reason.
 
-    files: the shader's EXRs by socket (osl_files.ensure_files); None without OSL. lobes: what
-    EEVEE shows; None: the Principled.
+    files: the shader's EXRs by socket (osl_files.ensure_files); None without OSL. lobes: the lobe
+    stack for EEVEE; if None, EEVEE shows the Principled.
     """
     material = bpy.data.materials.new(name)
     if material.node_tree is None:
@@ -106,21 +108,21 @@ def create_material(
     for socket, path in files.paths.items():
         material[PROPERTIES[socket]] = path.name
         pack(path)
-    # lamps evaluated in the shader leave it as emission; the mesh is no lamp to aim at
+    # the shader returns lamp light as emission; the mesh must not be sampled as a lamp
     material.cycles.emission_sampling = "NONE"
-    bpy.context.view_layer.update()  # lamps just made have no world matrix yet
+    bpy.context.view_layer.update()  # new lamps have no world matrix before an update
     update_lamps(bpy.context.scene)
     update_worlds(bpy.context.scene)
     return material
 
 
 class OslError(PatinaError):
-    """The shader did not compile; the message is for the user."""
+    """The shader did not compile. The message is for the user."""
 
 
 @dataclass(frozen=True)
 class CompiledText:
-    """OSL as a Text data-block and the byte code that Cycles runs."""
+    """OSL source as a Text data-block, and the byte code that Cycles runs."""
 
     text: bpy.types.Text
     bytecode: str
@@ -131,7 +133,10 @@ class CompiledText:
 
 
 def osl_text(basis: Basis, count: int) -> CompiledText:
-    """The shader with ``count`` coefficients as inputs, compiled; one Text serves all materials."""
+    """The compiled shader with ``count`` coefficients as inputs. All materials share one Text.
+
+    Raises OslError if it does not compile.
+    """
     source = osl_source.source(basis, count)
     name = f"patina_brdf_{count}.osl"
     text = bpy.data.texts.get(name)
@@ -148,7 +153,7 @@ def _compile(source: str) -> str:
         file, out = os.path.join(folder, "shader.osl"), os.path.join(folder, "shader.oso")
         Path(file).write_text(source, encoding="utf-8")
         if not _cycles.osl_compile(file, out):
-            raise OslError("the OSL shader did not compile; the console says why")
+            raise OslError("the OSL shader did not compile; see the console for the reason")
         return Path(out).read_text(encoding="utf-8")
 
 
@@ -172,7 +177,7 @@ def _lobe_branch(tree: bpy.types.NodeTree, fit: LobeStackFit) -> bpy.types.Node:
 def _output(
     tree: bpy.types.NodeTree, node: bpy.types.Node, target: str, label: str
 ) -> bpy.types.Node:
-    """An output beside the node, for renderers of one kind; not the active one."""
+    """Add an output node next to ``node`` for one kind of renderer; it is not the active one."""
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     output.label, output.target, output.is_active_output = label, target, False
     taken = sum(link.from_node == node for link in tree.links)
@@ -182,25 +187,25 @@ def _output(
 
 
 def show_solid(material: bpy.types.Material, principled: Principled) -> None:
-    """What Solid mode draws."""
+    """Set what Solid shading shows."""
     material.diffuse_color = (*(float(c) for c in np.clip(principled.base_color, 0, 1)), 1.0)
     material.metallic, material.roughness = principled.metallic, principled.roughness
 
 
 def show_principled(node: bpy.types.Node, fit: PrincipledFit) -> None:
-    """The fit in a Principled node, and how near it is."""
+    """Write the fit into a Principled node, with its error in the label."""
     node.label = f"Principled fit (error {100 * fit.error:.1f} %)"
     fill_principled(node, fit.principled)
 
 
 def show_lobes(node: bpy.types.Node, fit: LobeStackFit) -> None:
-    """The fit in a node of the lobe stack's group, and how near it is."""
+    """Write the fit into a node of the lobe stack's group, with its error in the label."""
     node.label = f"Lobe stack (error {100 * fit.error:.1f} %)"
     fill_lobe_stack(node, fit.stack)
 
 
 def fill_principled(node: bpy.types.Node, principled: Principled) -> None:
-    """Set a Principled node to the model that was fitted; single-scatter GGX, as fitted."""
+    """Set the inputs of a Principled node to the fitted model; single-scattering GGX, as fitted."""
     node.distribution = "GGX"
     for field, socket in PRINCIPLED_SOCKETS.items():
         value = getattr(principled, field)
@@ -222,8 +227,8 @@ def _osl_branch(
     node = tree.nodes.new("ShaderNodeScript")
     node.label, node.width = "Measured BRDF", 240
     node.parent, node.location = frame, (0, -40)
-    # set the code and the sockets ourselves: Blender does it only while the scene's engine is
-    # Cycles and a window's context is at hand
+    # code and sockets are set here because Blender sets them only if the scene's engine is Cycles
+    # and there is a window
     with _no_compiling():
         node.mode, node.script = "INTERNAL", compiled.text
     node.bytecode, node.bytecode_hash = compiled.bytecode, compiled.digest
@@ -245,7 +250,7 @@ def _osl_branch(
 
 @contextmanager
 def _no_compiling() -> Iterator[None]:
-    """Keep Cycles from compiling the script where it cannot: the bpy wheel finds no oslquery."""
+    """Keep Cycles from compiling the script if it cannot: the bpy wheel has no oslquery."""
     render = bpy.context.scene.render
     engine = render.engine
     if engine != "CYCLES" or importlib.util.find_spec("oslquery") is not None:
@@ -259,14 +264,16 @@ def _no_compiling() -> Iterator[None]:
 
 
 def ensure_sockets(node: bpy.types.Node, count: int) -> None:
-    """The inputs and the output of the shader, as Blender's own 'Update' would make them."""
+    """Create the inputs and the output of the shader, as Blender's 'Update' button would."""
     node.inputs.clear()
     node.outputs.clear()
     for item in osl_source.inputs(count):
         socket = node.inputs.new(SOCKET_TYPES[item.kind], item.label, identifier=item.name)
         value = item.default
         socket.default_value = (*value, 1.0) if item.kind == "color" else value
-        socket.hide = item.hidden  # written by scene/lamps or with the files, not by hand
+        socket.hide = (
+            item.hidden
+        )  # written by lamp_inputs, world_inputs or with the files, not by the user
         socket.hide_value = item.name == "shading_normal"
     node.outputs.new("NodeSocketShader", "BSDF", identifier="BSDF")
 

@@ -1,7 +1,7 @@
-"""What of a material's nodes a moved trait changes: written anew, and put back as it was.
+"""Write and restore the node inputs that depend on a material's traits.
 
-A material whose traits are moved keeps what it had when they were not, to be put back to the bit,
-also where the artist had turned an input by hand.
+A material with edited traits stores its inputs as they were before. Resetting the traits restores
+them exactly, including inputs that the user had changed.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ log = logging.getLogger(__name__)
 
 BODY, BODY_SCALE = "body", "body_scale"  # inputs of the OSL shader, linked where there are maps
 
-WRITTEN = (osl_source.SAMPLING, osl_source.ALPHAS, BODY)  # of the OSL shader, by set_sampling
+SAMPLING_INPUTS = (osl_source.SAMPLING, osl_source.ALPHAS, BODY)  # inputs that set_sampling writes
 
 
 def principled_node(material: bpy.types.Material) -> bpy.types.Node | None:
-    """What exporters see, where it still is the Principled."""
+    """The Principled node that exporters read; None if the user has linked another shader."""
     outputs = (n for n in _nodes(material, "OUTPUT_MATERIAL") if n.target == "ALL")
     links = [link for node in outputs for link in node.inputs["Surface"].links]
     found = (link.from_node for link in links)
@@ -39,7 +39,7 @@ def principled_node(material: bpy.types.Material) -> bpy.types.Node | None:
 
 
 def lobe_node(material: bpy.types.Material) -> bpy.types.Node | None:
-    """What EEVEE shows."""
+    """The node of the lobe stack, which EEVEE shows; None if there is none."""
     return next(
         (
             node
@@ -53,7 +53,10 @@ def lobe_node(material: bpy.types.Material) -> bpy.types.Node | None:
 
 
 def set_coefficients(material: bpy.types.Material, brdf: PrincipalBRDF) -> int:
-    """The shader's inputs; returns how many changed. Every write makes Cycles build it anew."""
+    """Write the coefficients into the shader's inputs; returns the number of changed inputs.
+
+    Inputs with equal values are not written: every write makes Cycles compile the shader again.
+    """
     changed = 0
     for node in osl_files.script_nodes(material):
         sockets = {socket.identifier: socket for socket in node.inputs}
@@ -73,8 +76,11 @@ def set_sampling(
     alphas: tuple[float, float, float],
     body: NDArray[np.floating],
 ) -> None:
-    """The table that half vectors are drawn from, the lobes' widths, and the body's level (3,) for
-    those of the shaders that wear maps."""
+    """Write the inputs for importance sampling into the shaders.
+
+    path: EXR of the table that half vectors are sampled from; alphas: widths of the GGX lobes;
+    body: (3,) level of the diffuse body, for shaders with maps.
+    """
     for node in osl_files.script_nodes(material):
         sockets = {socket.identifier: socket for socket in node.inputs}
         sockets[osl_source.SAMPLING].default_value = path.resolve().as_posix()
@@ -84,33 +90,33 @@ def set_sampling(
     material[osl_files.PROPERTIES[osl_source.SAMPLING]] = path.name
 
 
-def keep(material: bpy.types.Material) -> None:
-    """Remember what there is, unless something is remembered already."""
+def store_inputs(material: bpy.types.Material) -> None:
+    """Store the inputs as measured on the material, unless they are stored already."""
     if AS_MEASURED in material:
         return
     principled, lobes = principled_node(material), lobe_node(material)
-    told: dict[str, Any] = {
+    stored: dict[str, Any] = {
         "solid": [list(material.diffuse_color), material.metallic, material.roughness],
         "principled": None if principled is None else _inputs(principled),
         "lobes": None if lobes is None else _inputs(lobes),
-        "shaders": [_inputs(node, WRITTEN) for node in osl_files.script_nodes(material)],
+        "shaders": [_inputs(node, SAMPLING_INPUTS) for node in osl_files.script_nodes(material)],
     }
-    material[AS_MEASURED] = json.dumps(told)
+    material[AS_MEASURED] = json.dumps(stored)
     name = material.get(osl_files.PROPERTIES[osl_source.SAMPLING])
     if name:
         material[osl_files.MEASURED_SAMPLING_FILE] = name
 
 
-def put_back(material: bpy.types.Material) -> None:
-    """As it was before any trait was moved; the nodes that are gone stay gone."""
+def restore_inputs(material: bpy.types.Material) -> None:
+    """Restore the inputs as measured. Nodes that were removed are not restored."""
     if AS_MEASURED not in material:
         return
-    try:  # the .blend may come from anybody
-        _put_all(material, json.loads(material[AS_MEASURED]))
+    try:  # the .blend may come from an untrusted source
+        _restore_all(material, json.loads(material[AS_MEASURED]))
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         log.warning(
-            "%s: the property %s is damaged (%s), its values are put back in part; fit the "
-            "material again if it looks wrong",
+            "%s: the property %s is damaged (%s). Its values were restored only in part; if the "
+            "material looks wrong, fit it again.",
             material.name, AS_MEASURED, error,
         )  # fmt: skip
     name = material.get(osl_files.MEASURED_SAMPLING_FILE)
@@ -119,23 +125,23 @@ def put_back(material: bpy.types.Material) -> None:
         for node in osl_files.script_nodes(material):
             for socket in osl_files.file_sockets(node):
                 if socket.identifier == osl_source.SAMPLING:
-                    osl_files.read_again(socket, name)
+                    osl_files.restore_file(socket, name)
     material.pop(osl_files.MEASURED_SAMPLING_FILE, None)
     del material[AS_MEASURED]
 
 
-def _put_all(material: bpy.types.Material, told: dict[str, Any]) -> None:
-    """Raises ValueError, TypeError, KeyError or AttributeError where ``told`` is not what ``keep``
-    writes."""
-    color, material.metallic, material.roughness = told["solid"]
+def _restore_all(material: bpy.types.Material, stored: dict[str, Any]) -> None:
+    """Restore the stored inputs. Raises ValueError, TypeError, KeyError or AttributeError if
+    ``stored`` does not have the format that ``keep`` writes."""
+    color, material.metallic, material.roughness = stored["solid"]
     material.diffuse_color = color
     for node, inputs in (
-        (principled_node(material), told["principled"]),
-        (lobe_node(material), told["lobes"]),
-        *zip(osl_files.script_nodes(material), told["shaders"], strict=False),
+        (principled_node(material), stored["principled"]),
+        (lobe_node(material), stored["lobes"]),
+        *zip(osl_files.script_nodes(material), stored["shaders"], strict=False),
     ):
         if node is not None and inputs is not None:
-            _put_inputs(node, inputs)
+            _restore_inputs(node, inputs)
 
 
 def _nodes(material: bpy.types.Material, kind: str) -> Iterator[bpy.types.Node]:
@@ -144,7 +150,7 @@ def _nodes(material: bpy.types.Material, kind: str) -> Iterator[bpy.types.Node]:
 
 
 def _inputs(node: bpy.types.Node, only: Container[str] | None = None) -> dict[str, Any]:
-    """Label and inputs (only some of them); floats as JSON has them come back to the bit."""
+    """Label and inputs of a node (``only`` these inputs); JSON stores the floats exactly."""
     values = {
         socket.identifier: _plain(socket.default_value)
         for socket in node.inputs
@@ -157,12 +163,12 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, (str, int, float)) else list(value)
 
 
-def _put_inputs(node: bpy.types.Node, told: dict[str, Any]) -> None:
-    node.label = told["label"]
+def _restore_inputs(node: bpy.types.Node, stored: dict[str, Any]) -> None:
+    node.label = stored["label"]
     for socket in node.inputs:
-        value = told["values"].get(socket.identifier)
+        value = stored["values"].get(socket.identifier)
         if socket.identifier in osl_files.PROPERTIES and not is_own_name(_file_name(value)):
-            continue  # a path of a shader's file that Patina did not write
+            continue  # the path of a shader file that Patina did not write
         if value is not None and _plain(socket.default_value) != value:
             socket.default_value = value
 

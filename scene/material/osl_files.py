@@ -1,10 +1,11 @@
-"""The shader's EXRs: where they lie, and how they come back when the .blend has moved.
+"""The shader's EXRs: where they are stored, and how they are restored after the .blend has moved.
 
-OSL reads pictures by their path, so the files must exist on disk: beside a saved .blend, else in
-the extension's own folder. Packed copies travel inside the .blend (Image data-blocks that a fake
-user keeps) and are written out again on load where the path no longer leads to them.
+OSL reads textures by path, so the files must exist on disk: next to a saved .blend, else in the
+extension's own folder. Packed copies are stored in the .blend (Image data-blocks with a fake user)
+and are written again on load if the path no longer leads to a file.
 
-A .blend may come from anybody: its names and packed bytes are checked before anything is written.
+A .blend may come from an untrusted source: its file names and packed bytes are checked before
+anything is written.
 """
 
 from __future__ import annotations
@@ -38,13 +39,14 @@ PROPERTIES = {
     REMAINDER: REMAINDER_FILE,
     SAMPLING: SAMPLING_FILE,
 }
-"""Socket → property of the material that names its file."""
+"""Socket → custom property of the material with its file name."""
 OWN_PREFIXES = (osl_atlas.REMAINDER_PREFIX, osl_atlas.SAMPLING_PREFIX)
 
 
 @dataclass(frozen=True)
 class ShaderFiles:
-    """paths: socket → EXR; alphas: of the GGX lobes that Cycles samples."""
+    """Files of one shader. paths: socket → EXR; alphas: widths of the GGX lobes that Cycles
+    samples."""
 
     paths: dict[str, Path]
     alphas: tuple[float, float, float]
@@ -52,29 +54,33 @@ class ShaderFiles:
 
 @dataclass(frozen=True)
 class ShaderTables:
-    """parts: the split into closures; texels: the sampling table as its picture has it."""
+    """Tables of one shader. parts: the split into closures; texels: the sampling table as the
+    pixels of its EXR."""
 
     parts: ClosureSplit
     texels: NDArray[np.float32]
 
 
 def shader_tables(brdf: PrincipalBRDF) -> ShaderTables:
-    """A second's work. Knows nothing of Blender: other threads may ask."""
+    """Compute the tables of a BRDF, in about a second. Does not use Blender, so it may run in any
+    thread."""
     parts = split(brdf.evaluate)
     table = sampling_table.sampling_table(brdf.evaluate, parts)
     return ShaderTables(parts, sampling_table.texels(parts, table))
 
 
 def ensure_files(brdf: PrincipalBRDF, tables: ShaderTables | None = None) -> ShaderFiles:
-    """A BRDF's EXRs: on disk where this .blend expects them, and packed into it. tables: where they
-    were made before."""
-    return drained(ensuring_files(brdf, tables))
+    """Write a BRDF's EXRs where this .blend expects them, and pack them into it.
+
+    tables: the BRDF's tables, if they are computed already.
+    """
+    return drained(ensure_files_steps(brdf, tables))
 
 
-def ensuring_files(
+def ensure_files_steps(
     brdf: PrincipalBRDF, tables: ShaderTables | None = None
 ) -> Generator[None, None, ShaderFiles]:
-    """``ensure_files``, a file at a time."""
+    """``ensure_files`` as a generator, one file per step."""
     made = tables or shader_tables(brdf)
     basis = brdf.basis
     wanted = (
@@ -102,26 +108,26 @@ def _ensure(name: str, write: Callable[[Path], object]) -> Path:
 
 
 def file_sockets(node: bpy.types.Node) -> list[bpy.types.NodeSocket]:
-    """The inputs of a Patina shader that name a file."""
+    """The inputs of a Patina shader that hold a file path."""
     return [socket for socket in node.inputs if socket.identifier in PROPERTIES]
 
 
 def drop_unused() -> None:
-    """Forget the packed files of materials that are gone; files on disk stay."""
-    named = [m.get(key) for m in bpy.data.materials for key in _kept_names()]
+    """Remove packed files that no material uses; files on disk are kept."""
+    named = [m.get(key) for m in bpy.data.materials for key in _file_properties()]
     needed = {name for name in named if osl_atlas.is_own_name(name)}
     for image in [i for i in bpy.data.images if i.name.startswith(OWN_PREFIXES)]:
         if image.name not in needed and image.users <= int(image.use_fake_user):
             bpy.data.images.remove(image)
 
 
-def _kept_names() -> tuple[str, ...]:
-    """The properties of a material that name files."""
+def _file_properties() -> tuple[str, ...]:
+    """The custom properties of a material that hold file names."""
     return *PROPERTIES.values(), MEASURED_SAMPLING_FILE
 
 
 def pack(path: Path) -> bpy.types.Image:
-    """The file's bytes as a packed Image of its name; packed once."""
+    """Pack a file into the .blend as an Image of the same name, unless it is packed already."""
     image = bpy.data.images.get(path.name)
     if image is None:
         image = bpy.data.images.load(str(path))
@@ -136,27 +142,30 @@ def pack(path: Path) -> bpy.types.Image:
 
 
 def restore() -> list[str]:
-    """Point every Patina material at its files, writing packed ones out where they are missing.
+    """Point every Patina material to its files, and write missing ones from their packed copies.
 
     Returns the names of materials with a file that is neither on disk nor in the .blend.
     """
     missing = []
     for material in own_materials():
         found = [
-            read_again(socket, material.get(PROPERTIES[socket.identifier]))
+            restore_file(socket, material.get(PROPERTIES[socket.identifier]))
             for node in script_nodes(material)
             for socket in file_sockets(node)
         ]
         if not all(found):
             missing.append(material.name)
     for name in missing:
-        log.warning("%s: an EXR of its shader is gone; make the material again", name)
+        log.warning("%s: a shader EXR is missing; fit the material again.", name)
     return missing
 
 
-def read_again(socket: bpy.types.NodeSocket, name: object) -> bool:
-    """Lead a socket whose file is gone to the packed one of that name; True where it names a file
-    that is there, now or again. Names that are not Patina's own are refused."""
+def restore_file(socket: bpy.types.NodeSocket, name: object) -> bool:
+    """Restore the file of a socket from its packed copy, if it is missing.
+
+    Returns whether the socket's file exists afterwards. File names that are not Patina's are
+    rejected.
+    """
     if is_trusted_path(socket.default_value):
         return True
     if not name:
@@ -172,8 +181,8 @@ def read_again(socket: bpy.types.NodeSocket, name: object) -> bool:
 
 
 def is_trusted_path(path: str) -> bool:
-    """Whether a path from a .blend leads to one of Patina's EXRs. A network path is not even looked
-    at: on Windows that would send the user's credentials to the server it names."""
+    """Whether a path from a .blend is that of one of Patina's EXRs. Network paths are not accessed:
+    on Windows that would send the user's credentials to the server."""
     if path.startswith(("//", "\\\\")) or not osl_atlas.is_own_name(re.split(r"[\\/]", path)[-1]):
         return False
     return is_regular_file(Path(path))
@@ -181,14 +190,14 @@ def is_trusted_path(path: str) -> bool:
 
 def _warn_of_name(name: object) -> None:
     log.warning(
-        "the .blend names %.200r as a file of a Patina shader, which Patina never does: nothing is "
-        "written; if you trust the .blend, fit the material again",
+        "The .blend gives %.200r as a shader file, which is not a file name of Patina; nothing was "
+        "written. If you trust the .blend, fit the material again.",
         name,
     )
 
 
 def script_nodes(material: bpy.types.Material) -> list[bpy.types.Node]:
-    """The material's Patina shaders."""
+    """The script nodes of the material that run a Patina shader."""
     if material.node_tree is None:
         return []
     return [
@@ -204,15 +213,17 @@ def own_materials() -> list[bpy.types.Material]:
 
 
 def own_shaders() -> list[bpy.types.Node]:
-    """The shaders of all of them."""
+    """The Patina shaders of all materials of this .blend."""
     return [node for material in own_materials() for node in script_nodes(material)]
 
 
-def lead_to(
+def redirect_files(
     material: bpy.types.Material, folder: Path, moved: Callable[[Path], bool] = lambda file: True
 ) -> list[Path]:
-    """Make the material's shaders read those of their EXRs that are ``moved`` from the folder;
-    returns where they read them from until now."""
+    """Point the material's shaders to EXRs in ``folder``; returns the previous paths.
+
+    moved: called with each previous path; only files for which it returns True are redirected.
+    """
     sockets = [s for node in script_nodes(material) for s in file_sockets(node)]
     old = [Path(socket.default_value) for socket in sockets]
     for socket, file in zip(sockets, old, strict=True):
@@ -228,9 +239,9 @@ def _after_load(*_: object) -> None:
 
 @persistent
 def _after_save(*_: object) -> None:
-    """A first save gives the .blend a folder: the files follow it there."""
+    """Write the shader files next to the .blend after its first save."""
     for material in bpy.data.materials:
-        for key in _kept_names():
+        for key in _file_properties():
             name = material.get(key)
             if not name:
                 continue
@@ -244,10 +255,10 @@ HANDLERS = (("load_post", _after_load), ("save_post", _after_save))
 
 
 def register() -> None:
-    """Watch for loading and saving."""
+    """Add the handlers for loading and saving."""
     attach(HANDLERS)
 
 
 def unregister() -> None:
-    """Leave nothing behind."""
+    """Remove the handlers."""
     detach(HANDLERS)

@@ -1,8 +1,8 @@
-"""Write an EXR that a .blend carries to disk, without trusting the .blend.
+"""Write an EXR that is packed in a .blend to disk, without trusting the .blend.
 
-A .blend may come from anybody, and so may the folder that it lies in. Only files with Patina's own
-names are written, only bytes that begin as an EXR does, only into a folder that exists, and never
-through a symbolic link.
+A .blend and its folder may come from an untrusted source. Only files with Patina's own names are
+written, only bytes that begin like an EXR, only into an existing folder, and never through a
+symbolic link.
 """
 
 from __future__ import annotations
@@ -28,13 +28,16 @@ NEW_FILE = (
 
 
 def write_packed(image: bpy.types.Image | None, path: Path) -> bool:
-    """Write an image's packed bytes to a file, whole or not at all; False where it has none, or
-    where the name, the bytes or what lies at the path is refused (the log says why)."""
+    """Write an image's packed bytes to a file, completely or not at all.
+
+    Returns False if the image has no packed bytes, or if the name, the bytes or the present file
+    at the path is rejected (the reason is logged).
+    """
     if image is None or image.packed_file is None:
         return False
-    refusal = _refusal(image.packed_file, path)
-    if refusal:
-        log.warning("%.300r is not written: %s", str(path), refusal)
+    reason = _rejection(image.packed_file, path)
+    if reason:
+        log.warning("%.300r was not written: %s.", str(path), reason)
         return False
     partial = _partial(path)
     try:
@@ -50,27 +53,27 @@ def write_packed(image: bpy.types.Image | None, path: Path) -> bool:
 
 
 def is_regular_file(path: Path) -> bool:
-    """Whether a regular file lies there itself, not a symbolic link to one."""
+    """Whether the path is a regular file, not a symbolic link to one."""
     try:
         return stat.S_ISREG(path.lstat().st_mode)
     except (OSError, ValueError):  # ValueError: a path with a null character
         return False
 
 
-def _refusal(packed: bpy.types.PackedFile, path: Path) -> str:
-    """Why these bytes are not written there; "" where they are."""
+def _rejection(packed: bpy.types.PackedFile, path: Path) -> str:
+    """Why these bytes must not be written to the path; "" if they may."""
     if not is_own_name(path.name):
-        return "Patina makes no file of this name; if you trust the .blend, fit the material again"
+        return "it is not a file name of Patina; if you trust the .blend, fit the material again"
     for place in (path, _partial(path)):
         if os.path.lexists(place) and not is_regular_file(place):
-            return f"{place.name} is a symbolic link or no regular file; remove it, then reopen"
+            return f"{place.name} is a symbolic link or not a regular file; remove it, then reopen"
     if packed.size > MAX_FILE_BYTES:
         return (
-            f"the .blend packs {packed.size:,} bytes for it, expected at most {MAX_FILE_BYTES:,}; "
-            "fit the material again"
+            f"the packed file has {packed.size:,} bytes, expected at most {MAX_FILE_BYTES:,}; fit "
+            "the material again"
         )
     if bytes(packed.data[: len(EXR_MAGIC)]) != EXR_MAGIC:
-        return "what the .blend packs for it is not an EXR; fit the material again"
+        return "the packed file is not an EXR; fit the material again"
     return ""
 
 

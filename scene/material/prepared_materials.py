@@ -1,5 +1,5 @@
-"""What a fit's materials need that takes seconds to work out, made beside the job: Blender stands
-still only for what has to be done to its own data."""
+"""Compute previews and shader tables of fitted materials in the background. These take seconds;
+afterwards Blender blocks only while its own data is changed."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .material_nodes import osl_missing
 from .osl_files import ShaderTables, shader_tables
 from .preview import Picture, spheres
 
-SHARE = 0.98  # of the whole, before this
+JOB_FRACTION = 0.98  # share of the fit in the progress of a PreparedJob
 
 
 class Fitting(Protocol):
-    """A job that ends with a CaptureResult."""
+    """A job whose result is a CaptureResult."""
 
     result: CaptureResult | None
 
@@ -28,20 +28,21 @@ class Fitting(Protocol):
 
 @dataclass(frozen=True)
 class Prepared:
-    """spheres: of the preview and the icon; tables: of the OSL shader, None where it cannot run."""
+    """Data of one material. spheres: for preview and icon; tables: of the OSL shader, None if it
+    cannot run."""
 
     spheres: list[Picture]
     tables: ShaderTables | None
 
 
 def prepare(brdf: PrincipalBRDF, with_osl: bool) -> Prepared:
-    """Knows nothing of Blender: other threads may ask."""
-    _ = brdf.basis.version  # a sum over the components, which file names need: kept once it is made
+    """Compute the data of one material. Does not use Blender, so it may run in any thread."""
+    _ = brdf.basis.version  # computes and caches the checksum of the components for file names
     return Prepared(spheres(brdf), shader_tables(brdf) if with_osl else None)
 
 
 class PreparedJob(Job):
-    """``job`` and what its materials need; ``prepared``: one a material of its result."""
+    """Runs ``job``, then prepares its materials; ``prepared`` has one item per material."""
 
     def __init__(self, job: Fitting) -> None:
         super().__init__()
@@ -50,17 +51,17 @@ class PreparedJob(Job):
 
     @property
     def result(self) -> CaptureResult | None:
-        """Of the job."""
+        """The result of the job."""
         return self.job.result
 
     def run(self) -> Iterator[Step]:
-        """The job's steps, then a material at a time."""
+        """Yield the job's steps, then those of the preparation of each material."""
         for step in self.job.run():
-            yield Step(step.stage, SHARE * step.fraction)
+            yield Step(step.stage, JOB_FRACTION * step.fraction)
         if self.job.result is None:
             return
-        with_osl, said = osl_missing() is None, Step("previews and shaders", SHARE)
+        with_osl, step_shown = osl_missing() is None, Step("Previews and shaders", JOB_FRACTION)
         for material in self.job.result.materials:
             brdf = material.fit.brdf
-            made = yield from in_background(lambda brdf=brdf: prepare(brdf, with_osl), said)
+            made = yield from in_background(lambda brdf=brdf: prepare(brdf, with_osl), step_shown)
             self.prepared.append(made)

@@ -1,4 +1,4 @@
-"""The sphere by which a measured material is recognised."""
+"""Preview and icon of a measured material: a lit sphere."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from ...core.basis import PrincipalBRDF
 from ...core.views import display
 from ...core.views.sphere import lit_sphere
 
-SIZE, SMALL = 256, 32  # pixels across a preview, and an icon
+SIZE, SMALL = 256, 32  # width of a preview and of an icon, pixels
 
 Picture = tuple[NDArray[np.floating], NDArray[np.floating]]
 """Radiance (size, size, 3) and coverage (size, size) of a sphere."""
 
 
 def spheres(brdf: PrincipalBRDF) -> list[Picture]:
-    """Of a preview and of an icon. Knows nothing of Blender: other threads may ask."""
+    """Draw the spheres of preview and icon. Does not use Blender, so it may run in any thread."""
     return [lit_sphere(brdf.evaluate, size) for size in (SIZE, SMALL)]
 
 
 def show_sphere(material: bpy.types.Material, brdf: PrincipalBRDF) -> None:
-    """The lit sphere of the report as the material's preview, whatever renders it elsewhere."""
-    put_spheres(material, spheres(brdf))
+    """Set the material's preview and icon to the lit sphere that reports show."""
+    set_preview(material, spheres(brdf))
 
 
-def put_spheres(material: bpy.types.Material, pictures: Sequence[Picture]) -> None:
-    """Preview and icon, of any sizes."""
+def set_preview(material: bpy.types.Material, pictures: Sequence[Picture]) -> None:
+    """Set preview and icon of a material to pictures of any size."""
     preview = material.preview_ensure()
-    if preview is None:  # where Blender makes none
+    if preview is None:  # this Blender creates no previews
         return
     for (radiance, coverage), place in zip(pictures, ("image", "icon"), strict=True):
         size = len(coverage)

@@ -1,7 +1,7 @@
-"""How far an artist has moved the traits of a measured material, and the BRDF that results.
+"""Offsets that the user adds to the traits of a measured material, and the resulting BRDF.
 
-The measured coefficients on the material do not change (material_nodes.py); the sliders
-hold what is added to them.
+The measured coefficients on the material do not change (material_nodes.py); the sliders hold the
+offsets to them.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from ...core.appearance import trait_words
 from ...core.appearance.osl_atlas import TRAITS, traits
 from ...core.appearance.traits import (
-    Looked,
-    Movable,
-    MovableAlbedo,
+    ComponentLookup,
+    ShiftableAlbedo,
+    ShiftableBRDF,
     beyond_measured,
     excess,
-    moved,
+    shifted,
 )
 from ...core.basis import Basis, PrincipalBRDF
 from ...core.errors import PatinaError
@@ -33,25 +33,25 @@ from ...core.views.sphere import LitSphere
 from ..property_keys import BASIS_VERSION, COEFFICIENTS, MEASURED_NAME
 from .preview import SMALL, Picture
 
-QUICK = 128  # pixels across the sphere that follows a slider
+QUICK_SIZE = 128  # width of the preview that is drawn while a slider moves, pixels
 CHANNELS = ("red", "green", "blue")
 SLIDERS = tuple(
     f"trait_{i + 1}" for i in range(TRAITS)
-)  # of each PatinaShifts (scene/material/trait_properties.py)
+)  # properties of PatinaShifts (scene/material/trait_properties.py)
 
 
 def movable(material: bpy.types.Material) -> bool:
-    """True for a material that a fit made, in this file."""
+    """Whether the material was created by a fit and belongs to this file (not to a library)."""
     return MEASURED_NAME in material and COEFFICIENTS in material and material.library is None
 
 
 def sliders(material: bpy.types.Material) -> tuple[str, ...]:
-    """Those that the material has: no more than its fit has components."""
+    """The sliders of a material: no more than its fit has components."""
     return SLIDERS[: traits(len(material[COEFFICIENTS]) // 3)]
 
 
 def shifts(material: bpy.types.Material) -> NDArray[np.float64]:
-    """(3, sliders) of R, G and B: what all channels have in common and each one's own."""
+    """(3, sliders) offsets of R, G and B: the common offset of all channels plus each one's own."""
     groups, names = material.patina_traits, sliders(material)
     every = np.array([getattr(groups.every, name) for name in names])
     own = [[getattr(getattr(groups, channel), name) for name in names] for channel in CHANNELS]
@@ -59,7 +59,7 @@ def shifts(material: bpy.types.Material) -> NDArray[np.float64]:
 
 
 def state(material: bpy.types.Material) -> str:
-    """A short name of what the material is now: "" as measured."""
+    """A short hash of the material's present traits; "" as measured."""
     amounts = shifts(material)
     if not amounts.any():
         return ""
@@ -70,24 +70,25 @@ def state(material: bpy.types.Material) -> str:
 
 
 def measured_brdf(material: bpy.types.Material) -> PrincipalBRDF | None:
-    """As measured; None where this computer lacks the basis it is in."""
+    """The BRDF as measured; None if its basis is not on this computer."""
     return _brdf(material[BASIS_VERSION], _stored(material))
 
 
 def brdf_of(basis: str, coefficients: Sequence[float]) -> PrincipalBRDF | None:
-    """Of coefficients (3 · k,), R, then G, then B, in the basis of that version; None where this
-    computer lacks it."""
+    """The BRDF of coefficients (3 · k,), R, then G, then B, in the basis of that version; None if
+    the basis is not on this computer."""
     return _brdf(basis, np.array(coefficients, np.float64).tobytes())
 
 
-def moved_brdf(material: bpy.types.Material) -> PrincipalBRDF | None:
-    """As the sliders have it, measured where they are at 0."""
+def edited_brdf(material: bpy.types.Material) -> PrincipalBRDF | None:
+    """The BRDF with the offsets of the sliders; None if its basis is not on this computer."""
     brdf = measured_brdf(material)
-    return None if brdf is None else moved(brdf, shifts(material))
+    return None if brdf is None else shifted(brdf, shifts(material))
 
 
 def quick_spheres(material: bpy.types.Material) -> list[Picture]:
-    """The sphere and its icon as the sliders have it, soon; the basis must be here."""
+    """Small spheres of preview and icon with the offsets of the sliders, computed quickly. The
+    basis must be on this computer."""
     quick, amounts = _quick(material[BASIS_VERSION], _stored(material)), shifts(material)
     return [
         sphere.picture([part.at(amounts) for part in parts])
@@ -96,29 +97,34 @@ def quick_spheres(material: bpy.types.Material) -> list[Picture]:
 
 
 @dataclass(frozen=True)
-class Standing:
-    """excess: (largest albedo, radians of its view) where it exceeds 1. beyond: components that lie
-    where no material of the training set does."""
+class Plausibility:
+    """Plausibility of an edited material.
+
+    excess: (largest albedo, its view angle in radians) if the albedo exceeds 1, else None. beyond:
+    indices of the components outside the range of the training materials.
+    """
 
     excess: tuple[float, float] | None
     beyond: tuple[int, ...]
 
 
-def standing(material: bpy.types.Material) -> Standing:
-    """Whether the material is one that can be, as the sliders have it; the basis must be here."""
-    return _standing(material[BASIS_VERSION], _stored(material), shifts(material).tobytes())
+def plausibility(material: bpy.types.Material) -> Plausibility:
+    """Plausibility of the material with the offsets of the sliders. The basis must be on this
+    computer."""
+    return _plausibility(material[BASIS_VERSION], _stored(material), shifts(material).tobytes())
 
 
 @lru_cache(maxsize=4)
-def words_of(version: str) -> tuple[str, ...]:
-    """What each slider does, of a basis of that version; () where this computer lacks it."""
+def slider_labels(version: str) -> tuple[str, ...]:
+    """The effect of each slider in words, for the basis of that version; () if the basis is not on
+    this computer."""
     basis = _basis(version)
     return () if basis is None else tuple(trait_words.words(trait_words.effects(basis)))
 
 
-def forget() -> None:
-    """Let go of everything that was looked up."""
-    for cache in (words_of, _basis, _brdf, _looked, _quick, _standing):
+def clear_caches() -> None:
+    """Clear all caches."""
+    for cache in (slider_labels, _basis, _brdf, _looked, _quick, _plausibility):
         cache.cache_clear()
 
 
@@ -126,7 +132,7 @@ def _stored(material: bpy.types.Material) -> bytes:
     return np.array(material[COEFFICIENTS], np.float64).tobytes()
 
 
-@lru_cache(maxsize=4)  # panels ask at every redraw, also for what is not there
+@lru_cache(maxsize=4)  # panels look it up at every redraw, also if it does not exist
 def _basis(version: str) -> Basis | None:
     try:
         return basis_of_version(version, Path("material"))
@@ -144,29 +150,33 @@ def _brdf(version: str, coefficients: bytes) -> PrincipalBRDF | None:
 
 @dataclass(frozen=True)
 class _Quick:
-    """spheres: parts of the preview's sphere, and of the icon's."""
+    """Precomputed values of one material. spheres: parts of the spheres of preview and icon."""
 
-    spheres: tuple[tuple[Movable, ...], ...]
-    albedo: MovableAlbedo
+    spheres: tuple[tuple[ShiftableBRDF, ...], ...]
+    albedo: ShiftableAlbedo
 
 
 @lru_cache(maxsize=2)
-def _looked(version: str) -> tuple[tuple[LitSphere, tuple[Looked, ...]], ...]:
+def _looked(version: str) -> tuple[tuple[LitSphere, tuple[ComponentLookup, ...]], ...]:
     basis = _basis(version)
-    both = (LitSphere.of(QUICK), LitSphere.of(SMALL))
-    return tuple((s, tuple(Looked.of(basis, part.angles) for part in s.parts)) for s in both)
+    both = (LitSphere.of(QUICK_SIZE), LitSphere.of(SMALL))
+    return tuple(
+        (s, tuple(ComponentLookup.of(basis, part.angles) for part in s.parts)) for s in both
+    )
 
 
 @lru_cache(maxsize=4)
 def _quick(version: str, coefficients: bytes) -> _Quick:
     brdf = _brdf(version, coefficients)
-    spheres = tuple(tuple(Movable.of(brdf, p) for p in parts) for _, parts in _looked(version))
-    return _Quick(spheres, MovableAlbedo.of(brdf))
+    spheres = tuple(
+        tuple(ShiftableBRDF.of(brdf, p) for p in parts) for _, parts in _looked(version)
+    )
+    return _Quick(spheres, ShiftableAlbedo.of(brdf))
 
 
 @lru_cache(maxsize=64)
-def _standing(version: str, coefficients: bytes, amounts: bytes) -> Standing:
-    there = np.frombuffer(amounts, np.float64).reshape(3, -1)
-    albedo = _quick(version, coefficients).albedo.at(there)
-    beyond = beyond_measured(_brdf(version, coefficients), there)
-    return Standing(excess(albedo), tuple(beyond))
+def _plausibility(version: str, coefficients: bytes, amounts: bytes) -> Plausibility:
+    offsets = np.frombuffer(amounts, np.float64).reshape(3, -1)
+    albedo = _quick(version, coefficients).albedo.at(offsets)
+    beyond = beyond_measured(_brdf(version, coefficients), offsets)
+    return Plausibility(excess(albedo), tuple(beyond))

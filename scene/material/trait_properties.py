@@ -7,39 +7,39 @@ import bpy
 from ..session.handlers import register_property_factory
 from .measured_materials import measured_materials
 from .trait_offsets import SLIDERS, movable
-from .trait_update import follow
+from .trait_update import update_material
 
-FAR, SOFT = 10.0, 3.0  # deviations
+MAX_OFFSET, SOFT_MAX_OFFSET = 10.0, 3.0  # slider range, standard deviations
 CHANNEL_ITEMS = (
-    ("every", "All", "Move red, green and blue together: the hue mostly stays"),
-    ("red", "R", "Move red alone, on top of what all channels are moved by"),
-    ("green", "G", "Move green alone, on top of what all channels are moved by"),
-    ("blue", "B", "Move blue alone, on top of what all channels are moved by"),
+    ("every", "All", "Change red, green and blue together, which mostly keeps the hue"),
+    ("red", "R", "Change only red, in addition to the change of all channels"),
+    ("green", "G", "Change only green, in addition to the change of all channels"),
+    ("blue", "B", "Change only blue, in addition to the change of all channels"),
 )
 
 
 def _changed(shifts: PatinaShifts, context: bpy.types.Context) -> None:
-    follow(shifts.id_data)
+    update_material(shifts.id_data)
 
 
 def _slider(number: int) -> bpy.types.FloatProperty:
     return bpy.props.FloatProperty(
         name=f"Component {number}",
-        description=f"Added to the measured material's principal component {number}, in standard "
-        "deviations of the materials that the components were made from; 0: as measured",
-        soft_min=-SOFT,
-        soft_max=SOFT,
-        min=-FAR,
-        max=FAR,
+        description=f"Offset of principal component {number} from the measured value, in standard "
+        "deviations of the materials of the basis; 0 is as measured",
+        soft_min=-SOFT_MAX_OFFSET,
+        soft_max=SOFT_MAX_OFFSET,
+        min=-MAX_OFFSET,
+        max=MAX_OFFSET,
         step=10,
         precision=2,
-        options=set(),  # no keyframes: nothing would follow them
+        options=set(),  # not animatable: nothing would update the material
         update=_changed,
     )
 
 
 class PatinaShifts(bpy.types.PropertyGroup):
-    """What is added to each component; of one channel, or of all."""
+    """Offsets of the components, of one channel or common to all."""
 
     trait_1: _slider(1)  # type: ignore[valid-type]
     trait_2: _slider(2)  # type: ignore[valid-type]
@@ -52,11 +52,11 @@ class PatinaShifts(bpy.types.PropertyGroup):
 
 
 class PatinaTraits(bpy.types.PropertyGroup):
-    """Material.patina_traits. The sliders of all channels and of a single one add up."""
+    """Material.patina_traits. The offset of all channels and that of a single channel add up."""
 
     channels: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Channels",
-        description="Which of the material's color channels the sliders below move",
+        description="Color channels that the sliders below change",
         items=CHANNEL_ITEMS,
         options=set(),
     )
@@ -67,8 +67,8 @@ class PatinaTraits(bpy.types.PropertyGroup):
 
 
 def shown_material(context: bpy.types.Context) -> bpy.types.Material | None:
-    """The material whose sliders are shown: the active object's active one where it is measured,
-    else that of the scanned mesh, else the first that is."""
+    """The material whose sliders are shown: the active material of the active object if it is
+    measured, else that of the scanned mesh, else the first measured material."""
     for thing in (context.object, context.scene.patina.mesh):
         material = getattr(thing, "active_material", None)
         if material is not None and movable(material):
@@ -77,13 +77,13 @@ def shown_material(context: bpy.types.Context) -> bpy.types.Material | None:
 
 
 def reset(material: bpy.types.Material) -> None:
-    """Every slider to 0, and all as measured, at once."""
+    """Set every slider to 0 and update the material at once."""
     traits = material.patina_traits
     for name, *_ in CHANNEL_ITEMS:
         group = getattr(traits, name)
         for slider in SLIDERS:
-            group.property_unset(slider)  # calls no update: one is enough
-    follow(material, wholly=True)
+            group.property_unset(slider)  # calls no update function; one call below is enough
+    update_material(material, wholly=True)
 
 
 register, unregister = register_property_factory(

@@ -1,10 +1,11 @@
-"""A material follows its sliders: what is quick at once, the rest a moment after the last change.
+"""Update a material after its trait sliders change.
 
-At once: the coefficients of the OSL shader, and a small sphere. A moment later, worked out in a
-thread that touches nothing of Blender and taken over by a timer, piece by piece: the sphere in
-full, the table that Cycles draws directions from (it holds the material to what falls on it), the
-lobe stack for EEVEE, the Principled for exporters. What each piece shows is written on the
-material, so that whatever else changes the sliders (undo, a file from elsewhere) is followed too.
+The coefficients of the OSL shader and a small preview are updated at once. Shortly after the last
+change, a thread that does not use Blender computes the remaining pieces, and a timer applies them
+one by one: the full preview, the table that Cycles samples directions from (it also limits the
+albedo to 1), the lobe stack for EEVEE, and the Principled for exporters. A custom property of the
+material states which traits each piece shows, so that other changes of the sliders (undo, a file
+from another version) are detected too.
 """
 
 from __future__ import annotations
@@ -30,26 +31,26 @@ from ..session.handlers import attach, detach
 from ..session.running_job import redraw
 from . import material_nodes, osl_files
 from .measured_nodes import (
-    keep,
     lobe_node,
     principled_node,
-    put_back,
+    restore_inputs,
     set_coefficients,
     set_sampling,
+    store_inputs,
 )
-from .preview import put_spheres, show_sphere, spheres
-from .trait_offsets import forget, movable, moved_brdf, quick_spheres, state
+from .preview import set_preview, show_sphere, spheres
+from .trait_offsets import clear_caches, edited_brdf, movable, quick_spheres, state
 
 log = logging.getLogger(__name__)
 
-QUIET, POLL = 0.4, 0.1  # seconds after the last change, and between looks at the thread
-QUICKLY = "quickly"  # in place of a state: what is shown is a small sphere
+START_DELAY, POLL_INTERVAL = 0.4, 0.1  # seconds after the last change; between checks of the thread
+QUICKLY = "quickly"  # stored instead of a state: the preview is a small sphere
 SPHERE, SAMPLING, LOBES, PRINCIPLED = "sphere", "sampling", "lobes", "principled"
 
 
 @dataclass(frozen=True)
 class _Work:
-    """A piece of a state, under way."""
+    """A piece of a state that is being computed."""
 
     piece: str
     state: str
@@ -60,65 +61,69 @@ _pool: ThreadPoolExecutor | None = None
 _work: _Work | None = None
 _changed_at = 0.0
 _failed: set[tuple[str, str]] = set()  # (piece, state)
-_drawn: dict[str, str] = {}  # material → the state of the sphere it was last given
+_drawn: dict[str, str] = {}  # material → the state that its preview shows
 
 
-def follow(material: bpy.types.Material, wholly: bool = False) -> None:
-    """Show what the sliders say, as far as that is quick. wholly: the sphere in full at once."""
+def update_material(material: bpy.types.Material, wholly: bool = False) -> None:
+    """Update the quick pieces of a material to its sliders, and start the others.
+
+    wholly: also draw the full preview at once.
+    """
     global _changed_at
-    brdf = moved_brdf(material) if movable(material) else None
+    brdf = edited_brdf(material) if movable(material) else None
     if brdf is None:
         return
     now = state(material)
     if now:
-        keep(material)
+        store_inputs(material)
         set_coefficients(material, brdf)
     else:
-        put_back(material)
+        restore_inputs(material)
         set_coefficients(material, brdf)
         material.pop(SHOWN_TRAITS, None)
         osl_files.drop_unused()
     if wholly:
         show_sphere(material, brdf)
     else:
-        put_spheres(material, quick_spheres(material))
-    _say(material, SPHERE, now if wholly else QUICKLY)
+        set_preview(material, quick_spheres(material))
+    _store_shown(material, SPHERE, now if wholly else QUICKLY)
     _drawn[material.name] = now
     _changed_at = time.monotonic()
     _start()
 
 
-def behind(material: bpy.types.Material) -> list[str]:
-    """The pieces that do not show what the sliders say yet, in the order they will."""
+def outdated_pieces(material: bpy.types.Material) -> list[str]:
+    """The pieces that do not show the present sliders yet, in the order of their update."""
     shown, now = material.get(SHOWN_TRAITS, {}), state(material)
     return [p for p in _pieces(material) if shown.get(p, "") != now and (p, now) not in _failed]
 
 
-def settle() -> None:
-    """Every piece of every material, waiting for them: for scripts, where no timer runs."""
+def finish_updates() -> None:
+    """Update all pieces of all materials and wait for them. For scripts, where no timer runs."""
     while (todo := _next()) is not None:
         piece, now, work = todo
-        _take(piece, now, work)
+        _apply(piece, now, work)
 
 
 def _pieces(material: bpy.types.Material) -> list[str]:
-    there = [SPHERE]
+    pieces = [SPHERE]
     if osl_files.script_nodes(material):
-        there.append(SAMPLING)
+        pieces.append(SAMPLING)
     if lobe_node(material) is not None:
-        there.append(LOBES)
+        pieces.append(LOBES)
     if principled_node(material) is not None:
-        there.append(PRINCIPLED)
-    return there
+        pieces.append(PRINCIPLED)
+    return pieces
 
 
 def _next() -> tuple[str, str, Callable[[], Any]] | None:
-    """(piece, state, what works it out) of the first that is behind."""
+    """(piece, state, function that computes it) of the first outdated piece; None if there is
+    none."""
     for material in bpy.data.materials:
         if not movable(material):
             continue
-        late = behind(material)
-        brdf = moved_brdf(material) if late else None
+        late = outdated_pieces(material)
+        brdf = edited_brdf(material) if late else None
         if brdf is not None:
             return late[0], state(material), _WORK[late[0]](brdf)
     return None
@@ -138,27 +143,27 @@ _WORK: dict[str, Callable[[PrincipalBRDF], Callable[[], Any]]] = {
 }
 
 
-def _take(piece: str, now: str, result: Callable[[], Any]) -> None:
-    """Put a piece on every material that still is in the state it was made for."""
+def _apply(piece: str, now: str, result: Callable[[], Any]) -> None:
+    """Apply a piece to every material that still has the state it was computed for."""
     try:
         found = result()
-    except Exception:  # the sliders may ask for anything: the rest must go on
-        log.exception("the %s of a moved material cannot be made", piece)
+    except Exception:  # extreme sliders may fail; the other pieces must still be updated
+        log.exception("The %s of an edited material could not be computed.", piece)
         _failed.add((piece, now))
         return
     for material in bpy.data.materials:
-        if movable(material) and piece in behind(material) and state(material) == now:
-            _put(material, piece, found)
-            _say(material, piece, now)
+        if movable(material) and piece in outdated_pieces(material) and state(material) == now:
+            _write(material, piece, found)
+            _store_shown(material, piece, now)
     redraw()
 
 
-def _put(material: bpy.types.Material, piece: str, found: Any) -> None:
+def _write(material: bpy.types.Material, piece: str, found: Any) -> None:
     if piece == SPHERE:
-        put_spheres(material, found)
+        set_preview(material, found)
     elif piece == SAMPLING:
         name, texels, alphas, body = found
-        # not beside the .blend: it goes there when the file is saved, and most are never saved
+        # not next to the .blend: the file is written there on save, and most states are never saved
         path = Path(bpy.app.tempdir) / name
         if not path.is_file():
             osl_atlas.write_picture(path, texels)
@@ -172,25 +177,26 @@ def _put(material: bpy.types.Material, piece: str, found: Any) -> None:
         material_nodes.show_solid(material, found.principled)
 
 
-def _say(material: bpy.types.Material, piece: str, shows: str) -> None:
-    """Write down the state that a piece shows; a material as measured needs no such word."""
-    said = {**dict(material.get(SHOWN_TRAITS, {})), piece: shows}
-    if any(said.values()):
-        material[SHOWN_TRAITS] = said
+def _store_shown(material: bpy.types.Material, piece: str, shows: str) -> None:
+    """Store the state that a piece shows. A material as measured has no such property."""
+    shown = {**dict(material.get(SHOWN_TRAITS, {})), piece: shows}
+    if any(shown.values()):
+        material[SHOWN_TRAITS] = shown
     else:
         material.pop(SHOWN_TRAITS, None)
 
 
 def _start() -> None:
     if not bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.register(_tick, first_interval=QUIET)
+        bpy.app.timers.register(_tick, first_interval=START_DELAY)
 
 
 def _tick() -> float | None:
-    """Called by Blender: begin a piece, look whether it is done, take it over."""
+    """Timer callback: start a piece, check whether it is done, apply it. Returns the seconds until
+    the next call, None to stop."""
     global _pool, _work
     if _work is None:
-        wait = QUIET - (time.monotonic() - _changed_at)
+        wait = START_DELAY - (time.monotonic() - _changed_at)
         if wait > 0:
             return wait
         todo = _next()
@@ -199,14 +205,14 @@ def _tick() -> float | None:
         _pool = _pool or ThreadPoolExecutor(1, "patina")
         _work = _Work(todo[0], todo[1], _pool.submit(todo[2]))
     if not _work.future.done():
-        return POLL
+        return POLL_INTERVAL
     work, _work = _work, None
-    _take(work.piece, work.state, work.future.result)
+    _apply(work.piece, work.state, work.future.result)
     return 0.0
 
 
 def _drop() -> None:
-    """What is under way ends unheard."""
+    """Stop the thread and discard the piece in progress."""
     global _pool, _work
     if _pool is not None:
         _pool.shutdown(wait=False, cancel_futures=True)
@@ -222,31 +228,31 @@ def _before_load(*_: object) -> None:
 
 @persistent
 def _after_load(*_: object) -> None:
-    """A file that was saved before everything had followed."""
+    """Finish the update of a file that was saved before all pieces were updated."""
     for material in bpy.data.materials:
         if movable(material) and SHOWN_TRAITS in material:
             _drawn[material.name] = state(material)
-            if behind(material):
+            if outdated_pieces(material):
                 _start()
 
 
 @persistent
 def _after_undo(*_: object) -> None:
-    """Undo brings sliders and nodes back as they were when it last looked, without the update."""
+    """Update materials after undo, which restores sliders and nodes without the update function."""
     for material in bpy.data.materials:
         if not movable(material):
             continue
         if state(material) != _drawn.get(material.name, ""):
-            follow(material)
-        elif behind(material):
+            update_material(material)
+        elif outdated_pieces(material):
             _start()
 
 
 @persistent
 def _in_background(*_: object) -> None:
-    """Nobody waits at a window, and no timer runs there."""
+    """Without a window no timer runs: update all pieces now."""
     if bpy.app.background:
-        settle()
+        finish_updates()
 
 
 HANDLERS = (
@@ -260,16 +266,16 @@ HANDLERS = (
 
 
 def register() -> None:
-    """Follow undo, and files that are opened."""
+    """Add the handlers for undo, loading, saving and rendering."""
     attach(HANDLERS)
 
 
 def unregister() -> None:
-    """Leave nothing behind: no timer, no thread with work to come."""
+    """Remove handlers, timer and thread, and clear the caches."""
     detach(HANDLERS)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     _drop()
     _failed.clear()
     _drawn.clear()
-    forget()
+    clear_caches()

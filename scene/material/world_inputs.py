@@ -1,7 +1,8 @@
-"""Bright spots of the scene's world picture, as a table that Patina shaders draw directions from.
+"""A table of the bright areas of the scene's environment image, for importance sampling in Patina
+shaders.
 
-It changes how noisy a render is, never what it shows: a world that is no picture, or a .blend that
-is rendered without this extension, renders the same, with more samples needed.
+The table reduces noise and does not change the expected image. A world without an image, or a
+.blend rendered without this extension, renders the same but needs more samples.
 """
 
 from __future__ import annotations
@@ -24,19 +25,20 @@ from .osl_files import own_shaders
 
 log = logging.getLogger(__name__)
 
-SMALLEST = 4  # pixels along a side
+MIN_SIDE = 4  # pixels along each side of an environment image that gets a table
 
 
 @dataclass(frozen=True)
 class World:
-    """path: of the table, '' for none; rows: of the rotation from world space to the picture's."""
+    """The inputs of a shader. path: file of the table, "" for none; rows: of the rotation from
+    world space to image space."""
 
     path: str = ""
     rows: tuple[tuple[float, ...], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def scene_world(scene: bpy.types.Scene) -> World:
-    """The table of the scene's world, written where it is not there yet."""
+    """The table of the scene's world; its file is written if it does not exist yet."""
     found = _picture(scene.world)
     if found is None:
         return World()
@@ -44,7 +46,9 @@ def scene_world(scene: bpy.types.Scene) -> World:
     try:
         path = _table(image)
     except (PatinaError, OSError, RuntimeError) as error:
-        log.warning("%s: no table of the world's brightness (%s)", image.name, error)
+        log.warning(
+            "%s: the environment image cannot be sampled by brightness (%s).", image.name, error
+        )
         return World()
     if path is None:
         return World()
@@ -52,7 +56,7 @@ def scene_world(scene: bpy.types.Scene) -> World:
 
 
 def update_worlds(scene: bpy.types.Scene) -> int:
-    """Tell all Patina materials of the world; returns how many inputs changed."""
+    """Write the world into all Patina materials; returns the number of changed inputs."""
     nodes = own_shaders()
     if not nodes:
         return 0
@@ -72,7 +76,8 @@ def update_worlds(scene: bpy.types.Scene) -> int:
 
 
 def _picture(world: bpy.types.World | None) -> tuple[bpy.types.Image, Matrix] | None:
-    """The equirectangular picture that lights the world, and the rotation before it."""
+    """(equirectangular image that lights the world, rotation from world to image space), or
+    None."""
     tree = world.node_tree if world is not None else None
     if tree is None:
         return None
@@ -93,7 +98,8 @@ def _picture(world: bpy.types.World | None) -> tuple[bpy.types.Image, Matrix] | 
 
 
 def _rotation(node: bpy.types.Node) -> Matrix | None:
-    """From world space to the picture's; None where the coordinates are anything but rotated."""
+    """Rotation from world space to image space; None if the coordinates are transformed in another
+    way."""
     if not node.inputs["Vector"].is_linked:
         return Matrix.Identity(3)
     before = node.inputs["Vector"].links[0].from_node
@@ -114,14 +120,21 @@ def _rotation(node: bpy.types.Node) -> Matrix | None:
 
 
 def _table(image: bpy.types.Image) -> Path | None:
-    """The table's file of a picture, in Blender's temporary folder; None without bright spots."""
+    """The file of an image's table, in Blender's temporary folder; None without bright areas."""
     width, height = image.size
-    if min(width, height) < SMALLEST:
+    if min(width, height) < MIN_SIDE:
         return None
-    told = (image.name_full, image.filepath, width, height, image.is_dirty, image.library is None)
-    name = hashlib.sha256(repr(told).encode()).hexdigest()[:12]
+    identity = (
+        image.name_full,
+        image.filepath,
+        width,
+        height,
+        image.is_dirty,
+        image.library is None,
+    )
+    name = hashlib.sha256(repr(identity).encode()).hexdigest()[:12]
     path = Path(bpy.app.tempdir) / f"patina_world_{name}.exr"
-    even = path.with_suffix(".even")  # looked through before: it has no bright spot
+    even = path.with_suffix(".even")  # marks an image without bright areas
     if even.is_file():
         return None
     if not path.is_file():
@@ -143,7 +156,7 @@ def _after_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
 
 @persistent
 def _after_load(*_: object) -> None:
-    """The tables that a file was saved with are gone."""
+    """Write the tables again: those that the file was saved with were temporary."""
     for scene in bpy.data.scenes[:1]:
         update_worlds(scene)
 

@@ -1,1 +1,1 @@
-"""Masks and materials painted on the mesh and on photos."""
+"""Painting of materials and masks on the mesh and on photos."""

@@ -1,32 +1,32 @@
-"""A brush to paint with, where Blender has none: builds without its asset library have no brushes.
-Where there is one, it is the artist's own."""
+"""Provide a brush if Blender has none: builds without the asset library have no brushes. An
+existing brush of the user is kept."""
 
 from __future__ import annotations
 
 import bpy
 
-from .paint_kinds import take_up
+from .paint_kinds import update_brushes
 
 MODES = {
     "vertex_paint": ("VERTEX_PAINT", "VIEW_3D"),
     "image_paint": ("TEXTURE_PAINT", "IMAGE_EDITOR"),
 }
 SIZE = 25  # pixels
-SOON = 0.2  # seconds: an area that was just opened has no context yet
+CONTEXT_DELAY = 0.2  # seconds until an area that was just opened has a context
 
 _waiting: list[str] = []
 
 
-def ready_to_paint(context: bpy.types.Context, mode: str) -> None:
-    """The brush of "vertex_paint" or "image_paint" paints with the active paint; in a window a
-    brush is made where there is none."""
-    take_up(context)
+def prepare_brush(context: bpy.types.Context, mode: str) -> None:
+    """Set the brush of a mode ("vertex_paint" or "image_paint") to the active paint. In a window, a
+    brush is created if there is none."""
+    update_brushes(context)
     settings = getattr(context.tool_settings, mode)
     if bpy.app.background or settings is None or settings.brush is not None:
         return
     _waiting.append(mode)
     if not bpy.app.timers.is_registered(_make):
-        bpy.app.timers.register(_make, first_interval=SOON)
+        bpy.app.timers.register(_make, first_interval=CONTEXT_DELAY)
 
 
 def _make() -> None:
@@ -50,15 +50,15 @@ def _make() -> None:
                     relative_asset_identifier=f"Brush/{name}",
                 )
             break
-        take_up(bpy.context)
+        update_brushes(bpy.context)
 
 
 def register() -> None:
-    """Nothing, until somebody paints."""
+    """Nothing to register: brushes are created on first use."""
 
 
 def unregister() -> None:
-    """No brush is waited for any more."""
+    """Remove the timer and forget pending brushes."""
     _waiting.clear()
     if bpy.app.timers.is_registered(_make):
         bpy.app.timers.unregister(_make)

@@ -1,5 +1,5 @@
-"""Masks of photos as Blender images: seen, painted over, packed into the .blend, and read back by
-the next fit."""
+"""Masks of photos as Blender images. They can be painted on, are packed into the .blend, and are
+read by the next fit."""
 
 from __future__ import annotations
 
@@ -13,35 +13,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.capture import Capture
-from ...core.capture.model import LEFT_OUT, SHADOW_MASK
+from ...core.capture.model import EXCLUDED_MASKS, SHADOW_MASK
 from ...core.errors import PatinaError
 from ...core.photo.image import write_png
 from ..property_keys import CAPTURE, LIT_PHOTO_INDEX, MASK_KIND, MASK_PHOTO_INDEX, MASK_PHOTO_NAME
 from ..session.folders import blend_folder
 from ..session.handlers import register_handlers_factory
 
-WORDS = {"shadow": "Shadow", "highlight": "Highlight", "ignore": "Ignore"}
+KIND_LABELS = {"shadow": "Shadow", "highlight": "Highlight", "ignore": "Ignore"}
 
 
 def masks_folder(capture: Path) -> Path:
-    """For the masks of one capture: two captures may have the same names."""
+    """Folder for the masks of one capture; the path has a hash because names may be equal."""
     digest = hashlib.sha256(str(capture.resolve()).encode()).hexdigest()[:8]
     return blend_folder() / "masks" / f"{capture.name.split('.')[0]}-{digest}"
 
 
 def mask_images(capture: str) -> dict[tuple[int, str], bpy.types.Image]:
-    """(place of the photo, which of LEFT_OUT) → its mask, of those in this .blend."""
+    """(index of the photo, kind: one of EXCLUDED_MASKS) → its mask image in this .blend."""
     return {
         (int(image[MASK_PHOTO_INDEX]), str(image.get(MASK_KIND, SHADOW_MASK))): image
         for image in bpy.data.images
         if image.get(CAPTURE) == capture
         and isinstance(image.get(MASK_PHOTO_INDEX), int)
-        and image.get(MASK_KIND, SHADOW_MASK) in LEFT_OUT  # it becomes part of file names
+        and image.get(MASK_KIND, SHADOW_MASK)
+        in EXCLUDED_MASKS  # checked because it becomes part of file names
     }
 
 
 def shadow_images(capture: str) -> dict[int, bpy.types.Image]:
-    """Place of the photo → its shadow mask, of those in this .blend."""
+    """Index of the photo → its shadow mask in this .blend."""
     return {
         place: image for (place, kind), image in mask_images(capture).items() if kind == SHADOW_MASK
     }
@@ -50,14 +51,16 @@ def shadow_images(capture: str) -> dict[int, bpy.types.Image]:
 def show_shadow_masks(
     scene: bpy.types.Scene, capture: str, names: Sequence[str], files: Sequence[Path]
 ) -> None:
-    """Load the masks, one a photo (names: of the photos); an open image editor shows that of the
-    camera looked through."""
-    there = shadow_images(capture)
+    """Load one shadow mask per photo. An open Image Editor shows the mask of the scene's camera.
+
+    names: of the photos; files: of their masks.
+    """
+    masks = shadow_images(capture)
     for place, file in enumerate(files):
-        image = there.get(place)
+        image = masks.get(place)
         if image is None:
             image = bpy.data.images.load(str(file))
-            there[place] = image
+            masks[place] = image
         else:
             image.filepath = str(file)
             if image.packed_file is not None:
@@ -66,7 +69,7 @@ def show_shadow_masks(
         _mark(image, capture, place, names[place], SHADOW_MASK)
         image.pack()
     camera = scene.camera
-    shown = there.get(camera.get(LIT_PHOTO_INDEX, 0) if camera is not None else 0)
+    shown = masks.get(camera.get(LIT_PHOTO_INDEX, 0) if camera is not None else 0)
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "IMAGE_EDITOR":
@@ -74,18 +77,18 @@ def show_shadow_masks(
 
 
 def read_mask_image(image: bpy.types.Image) -> NDArray[np.bool_]:
-    """(h, w), the first row on top: where it is white."""
+    """(h, w) Boolean mask, first row at the top: True for white pixels."""
     return read_pixels(image)[..., 0] > 127
 
 
 def store_mask(
     capture: str, place: int, name: str, kind: str, grey: NDArray[np.uint8]
 ) -> bpy.types.Image:
-    """A mask (h, w) of one photo, packed; that which is there gets the new pixels."""
+    """Store a mask (h, w) of one photo as a packed image; an existing image is overwritten."""
     image = mask_images(capture).get((place, kind))
     height, width = grey.shape
     if image is None:
-        image = bpy.data.images.new(f"{WORDS[kind]}: {name}", width, height)
+        image = bpy.data.images.new(f"{KIND_LABELS[kind]}: {name}", width, height)
     elif tuple(image.size) != (width, height):
         image.scale(width, height)
     _mark(image, capture, place, name, kind)
@@ -95,7 +98,7 @@ def store_mask(
 
 
 def read_pixels(image: bpy.types.Image) -> NDArray[np.uint8]:
-    """(h, w, 3) of an 8-bit image, the first row on top."""
+    """(h, w, 3) pixels of an 8-bit image, first row at the top."""
     width, height = image.size
     pixels = np.empty(width * height * image.channels, np.float32)
     image.pixels.foreach_get(pixels)
@@ -105,7 +108,7 @@ def read_pixels(image: bpy.types.Image) -> NDArray[np.uint8]:
 
 
 def write_pixels(image: bpy.types.Image, pixels: NDArray[np.uint8]) -> None:
-    """(h, w, 3) into an 8-bit image of that size, the first row on top."""
+    """Write pixels (h, w, 3), first row at the top, into an 8-bit image of that size."""
     out = np.ones((*pixels.shape[:2], image.channels), np.float32)
     count = min(image.channels, 3)
     out[..., :count] = pixels[::-1, :, :count] / np.float32(255)
@@ -114,15 +117,17 @@ def write_pixels(image: bpy.types.Image, pixels: NDArray[np.uint8]) -> None:
 
 
 def with_mask_images(capture: Capture) -> Capture:
-    """The capture with the masks that are in this .blend beside its own (in their place, where a
-    photo has one of a kind). A photo whose place has changed since is known by its name. Raises
-    PatinaError where they cannot be written for the fit to read."""
-    there = mask_images(str(capture.file))
-    if not there:
+    """The capture with the masks of this .blend added; they replace masks of the same photo and
+    kind. A photo whose index has changed is found by its name.
+
+    Raises PatinaError if a mask cannot be written to a file for the fit.
+    """
+    images = mask_images(str(capture.file))
+    if not images:
         return capture
     names = [photo.file.name for photo in capture.photos]
     masks = [dict(photo.masks) for photo in capture.photos]
-    for (old, kind), image in there.items():
+    for (old, kind), image in images.items():
         place = old
         name = image.get(MASK_PHOTO_NAME)
         if name is not None and not (old < len(names) and names[old] == name):
@@ -147,10 +152,10 @@ def _mark(image: bpy.types.Image, capture: str, place: int, name: str, kind: str
 
 
 def _saved(image: bpy.types.Image, capture: Capture, place: int, kind: str) -> Path:
-    """A file with what the image shows now."""
+    """Write the image's present pixels to a file; returns its path."""
     if 0 in tuple(image.size):
         raise PatinaError(
-            f"the mask {image.name!r} has no pixels: remove the image, or make the masks anew"
+            f"the mask {image.name!r} has no pixels; remove the image, or recompute the masks"
         )
     folder = masks_folder(capture.file) / "painted"
     file = folder / f"{place + 1:03d}_{capture.photos[place].file.stem}_{kind}.png"
@@ -164,7 +169,7 @@ def _saved(image: bpy.types.Image, capture: Capture, place: int, kind: str) -> P
 
 @bpy.app.handlers.persistent
 def _pack(*_: object) -> None:
-    """What was painted since goes into the .blend."""
+    """Pack edited masks before the .blend is saved."""
     for image in bpy.data.images:
         if (
             MASK_PHOTO_INDEX in image

@@ -1,4 +1,4 @@
-"""Materials painted on the mesh with Blender's Vertex Paint, and taken from its face sets."""
+"""Materials painted on the mesh in Vertex Paint mode, and materials from face sets."""
 
 from __future__ import annotations
 
@@ -9,49 +9,54 @@ from numpy.typing import NDArray
 from ...core.masks.strokes import strokes
 from ..property_keys import SHOWN_SLOTS
 from ..scan.face_slots import face_attribute
-from .paint_kinds import paints, palette, wear, worn_slots
+from .paint_kinds import assign_slots, paints, palette, slots_of_faces
 
-COLOURS = "Patina Materials"  # colour attribute of the mesh
+COLOUR_ATTRIBUTE = "Patina Materials"  # colour attribute of the mesh that is painted on
 FACE_SETS = ".sculpt_face_set"
 
 
 def show_on_mesh(scene: bpy.types.Scene, mesh: bpy.types.Object) -> None:
-    """The materials' colours as the mesh's active colour attribute."""
+    """Write the materials' colours to the mesh's active colour attribute."""
     data = mesh.data
-    old = data.color_attributes.get(COLOURS)
-    if old is not None and (old.domain != "CORNER" or old.data_type != "BYTE_COLOR"):
-        data.color_attributes.remove(old)
-        old = None
-    if old is None:
-        old = data.color_attributes.new(COLOURS, "BYTE_COLOR", "CORNER")
+    layer = data.color_attributes.get(COLOUR_ATTRIBUTE)
+    if layer is not None and (layer.domain != "CORNER" or layer.data_type != "BYTE_COLOR"):
+        data.color_attributes.remove(layer)
+        layer = None
+    if layer is None:
+        layer = data.color_attributes.new(COLOUR_ATTRIBUTE, "BYTE_COLOR", "CORNER")
     colours = np.ones((len(data.loops), 4), np.float32)
-    slots = worn_slots(mesh)
+    slots = slots_of_faces(mesh)
     colours[:, :3] = _corner_colours(scene, mesh, slots) / np.float32(255)
-    old.data.foreach_set("color_srgb", colours.ravel())
+    layer.data.foreach_set("color_srgb", colours.ravel())
     face_attribute(data, SHOWN_SLOTS, "INT", slots)
-    data.color_attributes.active_color = old
+    data.color_attributes.active_color = layer
     data.update()
 
 
 def shown_on_mesh(mesh: bpy.types.Object) -> bool:
-    """Whether it has the materials' colours, true or not any more."""
-    return mesh.type == "MESH" and COLOURS in mesh.data.color_attributes
+    """Whether the mesh has the colour attribute of the materials, up to date or not."""
+    return mesh.type == "MESH" and COLOUR_ATTRIBUTE in mesh.data.color_attributes
 
 
-def take_from_mesh(scene: bpy.types.Scene, mesh: bpy.types.Object) -> int:
-    """What was painted on the mesh since its colours were shown, as the faces' slots; how many
-    faces that is. A face wears what most of its corners were given."""
-    there, shown = mesh.data.color_attributes.get(COLOURS), mesh.data.attributes.get(SHOWN_SLOTS)
-    if there is None or there.domain != "CORNER" or shown is None or shown.domain != "FACE":
+def apply_mesh_strokes(scene: bpy.types.Scene, mesh: bpy.types.Object) -> int:
+    """Apply strokes on the mesh to the faces' material slots; returns the number of changed faces.
+
+    A face gets the material that more than half of its corners were painted with.
+    """
+    layer, shown = (
+        mesh.data.color_attributes.get(COLOUR_ATTRIBUTE),
+        mesh.data.attributes.get(SHOWN_SLOTS),
+    )
+    if layer is None or layer.domain != "CORNER" or shown is None or shown.domain != "FACE":
         return 0
-    was = np.empty(len(mesh.data.polygons), np.int32)
-    shown.data.foreach_get("value", was)
+    previous = np.empty(len(mesh.data.polygons), np.int32)
+    shown.data.foreach_get("value", previous)
     colours = np.empty((len(mesh.data.loops), 4), np.float32)
-    there.data.foreach_get("color_srgb", colours.ravel())
+    layer.data.foreach_get("color_srgb", colours.ravel())
     kinds = paints(scene)
     materials = [paint for paint in kinds if paint.kind == "material"]
-    now = np.round(255 * np.clip(colours[None, :, :3], 0, 1)).astype(np.uint8)
-    found = strokes(_corner_colours(scene, mesh, was)[None], now, palette(materials))[0]
+    painted = np.round(255 * np.clip(colours[None, :, :3], 0, 1)).astype(np.uint8)
+    found = strokes(_corner_colours(scene, mesh, previous)[None], painted, palette(materials))[0]
     if not (found >= 0).any():
         return 0
     face = _corner_faces(mesh)
@@ -61,15 +66,15 @@ def take_from_mesh(scene: bpy.types.Scene, mesh: bpy.types.Object) -> int:
     votes = np.bincount(face[given] * count + found[given], minlength=size[0] * count).reshape(size)
     corners = np.bincount(face, minlength=size[0])
     new = 2 * votes.max(axis=1) > corners
-    slots = worn_slots(mesh)
+    slots = slots_of_faces(mesh)
     changed = new & (votes.argmax(axis=1) != slots)
-    wear(mesh, np.where(new, votes.argmax(axis=1), slots))
+    assign_slots(mesh, np.where(new, votes.argmax(axis=1), slots))
     show_on_mesh(scene, mesh)
     return int(changed.sum())
 
 
 def slots_of_face_sets(mesh: bpy.types.Object) -> NDArray[np.int32] | None:
-    """(faces,) number of the face set of each, from 0 on without gaps; None where there is one."""
+    """(faces,) index of each face's face set, from 0 without gaps; None if there is only one."""
     sets = mesh.data.attributes.get(FACE_SETS)
     if sets is None or sets.domain != "FACE":
         return None
@@ -80,7 +85,7 @@ def slots_of_face_sets(mesh: bpy.types.Object) -> NDArray[np.int32] | None:
 
 
 def _corner_faces(mesh: bpy.types.Object) -> NDArray[np.int64]:
-    """(corners,) the face of each."""
+    """(corners,) index of each corner's face."""
     total = np.empty(len(mesh.data.polygons), np.int32)
     mesh.data.polygons.foreach_get("loop_total", total)
     return np.repeat(np.arange(len(total), dtype=np.int64), total)
@@ -89,7 +94,7 @@ def _corner_faces(mesh: bpy.types.Object) -> NDArray[np.int64]:
 def _corner_colours(
     scene: bpy.types.Scene, mesh: bpy.types.Object, slots: NDArray[np.int32]
 ) -> NDArray[np.uint8]:
-    """(corners, 3) of what each corner's face wears, slots (faces,)."""
+    """(corners, 3) 8-bit sRGB colour of each corner's material; slots: (faces,)."""
     materials = [paint for paint in paints(scene) if paint.kind == "material"]
     colours = palette(materials) if materials else np.full((1, 3), 128, np.uint8)
     return colours[np.minimum(slots, len(colours) - 1)[_corner_faces(mesh)]]

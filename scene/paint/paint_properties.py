@@ -1,4 +1,4 @@
-"""What is painted with, and how it is shown."""
+"""Scene.patina_paint: the active paint and the opacity of canvases."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import bpy
 from ...core.errors import PatinaError
 from ..session.handlers import register_property_factory
 from ..session.scene_properties import capture_path
-from .canvas import take_strokes
+from .canvas import apply_photo_strokes
 
 
-def _draw_anew(state: PatinaPaint, context: bpy.types.Context) -> None:
+def _redraw(state: PatinaPaint, context: bpy.types.Context) -> None:
     scene = state.id_data
     try:
-        take_strokes(scene, capture_path(scene))  # and draws
-    except PatinaError:  # a slider cannot say so: the next button does
+        apply_photo_strokes(scene, capture_path(scene))  # draws the canvases, too
+    except PatinaError:  # a slider cannot report errors; the next operator does
         return
 
 
@@ -22,16 +22,16 @@ class PatinaPaint(bpy.types.PropertyGroup):
     """Scene.patina_paint."""
 
     active: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Paint", description="What the brushes paint", min=0
+        name="Paint", description="Material or mask that the brushes paint", min=0
     )
     opacity: bpy.props.FloatProperty(  # type: ignore[valid-type]
         name="Opacity",
-        description="How much of the colours is seen over the photo that is painted on",
+        description="Opacity of the colours over the photo that you paint on",
         subtype="FACTOR",
         min=0.1,
         max=1.0,
         default=0.5,
-        update=_draw_anew,
+        update=_redraw,
     )
 
 

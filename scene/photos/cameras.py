@@ -1,4 +1,4 @@
-"""The scan's cameras in Blender, each at its pixel, its photos behind it."""
+"""The scan's cameras as Blender cameras, with their photos as background images."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from ...core.scan import Camera
 from ..property_keys import CAMERA_LABEL, RESOLUTION
 
-SENSOR_WIDTH = 36.0
+SENSOR_WIDTH = 36.0  # mm
 OPENCV_TO_BLENDER = np.diag([1.0, -1.0, -1.0, 1.0])  # y down, z forward → y up, z backward
 
 
 def camera_matrix(camera: Camera, origin: NDArray[np.float64]) -> mathutils.Matrix:
-    """The matrix_world of a camera whose scan lies shifted by −origin."""
+    """matrix_world of a camera, for a scan that is shifted by −origin."""
     to_world = np.eye(4)
     to_world[:3, :3] = camera.pose.rotation.T
     to_world[:3, 3] = camera.pose.centre - origin
@@ -30,18 +30,19 @@ def create_camera(
     distance: float,
     collection: bpy.types.Collection,
 ) -> bpy.types.Object:
-    """A Blender camera that sees each point at the same pixel as the scan's.
+    """Create a Blender camera that projects each point to the same pixel as the scan's camera.
 
-    A lens with distortion or oblong pixels becomes the pinhole nearest to it (Camera.rectified);
-    its photo must be resampled accordingly. distance: camera to object, sets clipping.
+    A lens with distortion or non-square pixels is replaced by a similar pinhole (Camera.rectified);
+    its photo must be resampled accordingly. distance: from camera to object, in scan units; sets
+    the clipping range.
     """
-    seen = camera if camera.pinhole else camera.rectified()
-    lens = seen.lens
-    width, height = seen.width, seen.height
+    pinhole = camera if camera.pinhole else camera.rectified()
+    lens = pinhole.lens
+    width, height = pinhole.width, pinhole.height
     data = bpy.data.cameras.new(camera.label)
     data.sensor_fit = "HORIZONTAL"
     data.sensor_width = SENSOR_WIDTH
-    if seen.orthographic:
+    if pinhole.orthographic:
         data.type = "ORTHO"
         data.ortho_scale = width / lens.focal_length_x
     else:
@@ -59,7 +60,7 @@ def create_camera(
 
 
 def put_photo_behind(camera: bpy.types.Object, photo: Path, visible: bool = True) -> None:
-    """Show a photo of the camera's own size and lens behind everything the camera sees."""
+    """Add a photo, of the camera's resolution and lens, as its background image."""
     image = bpy.data.images.load(str(photo), check_existing=True)
     background = camera.data.background_images.new()
     background.image = image
@@ -71,7 +72,7 @@ def put_photo_behind(camera: bpy.types.Object, photo: Path, visible: bool = True
 
 
 def look_through(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
-    """Make a camera the scene's, with the frame of its photo."""
+    """Make a camera the scene's camera, and set the render resolution to that of its photo."""
     scene.camera = camera
     width, height = camera.get(RESOLUTION, (0, 0))
     if width and height:

@@ -1,4 +1,4 @@
-"""What the artist has changed on a capture's lamps, and the capture as they stand now."""
+"""Detect the user's edits of a capture's lamps, and apply them to the capture."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from ...core.capture import Capture, LightEntry
 from ...core.errors import PatinaError
 from ..property_keys import CAPTURE, INTENSITY_KNOWN, LAMP_KIND, LIGHT_NAME, ORIGIN
 from . import lamp_placement
-from .lamp_placement import DISTANT, FROM_CAMERA, MOUNTED, NEAR, Stand
+from .lamp_placement import DISTANT, FROM_CAMERA, MOUNTED, NEAR, Placement
 
 Array = NDArray[np.float64]
 
-# less than this is the rounding of Blender's float32
-TURNED = 1e-4  # radians
-PLACED = 4e-6  # of the largest coordinate
-RELATIVE = 1e-5  # of a strength or a size
+# smaller changes are rounding errors of Blender's float32
+MIN_ROTATION = 1e-4  # radians
+MIN_TRANSLATION = 4e-6  # relative to the largest coordinate
+MIN_RELATIVE_CHANGE = 1e-5  # of a strength or a size
 LAMP_TYPE = {DISTANT: "SUN", NEAR: "POINT", MOUNTED: "POINT"}
 
 
 @dataclass(frozen=True)
-class ByHand:
-    """What of a lamp is no longer as it was made. now: how it stands, in the mesh's frame."""
+class LampEdits:
+    """Edits of a lamp since its import. now: its present placement, in the mesh's frame."""
 
-    now: Stand
+    now: Placement
     moved: bool
     strength: bool
     softness: bool
@@ -39,8 +39,8 @@ class ByHand:
 
 
 def lamp_of(scene: bpy.types.Scene, capture: str, light: str) -> bpy.types.Object | None:
-    """The lamp of a capture's light in a scene; of copies the one with the light's own name, else
-    the first by name."""
+    """The lamp of a capture's light in a scene, or None. Of several copies, the one with the name
+    of the light, else the first by name."""
     found = [
         o
         for o in scene.objects
@@ -49,34 +49,38 @@ def lamp_of(scene: bpy.types.Scene, capture: str, light: str) -> bpy.types.Objec
     return min(found, key=lambda o: (o.name != light, o.name), default=None)
 
 
-def by_hand(scene: bpy.types.Scene, lamp: bpy.types.Object) -> ByHand | None:
-    """What the artist has changed; None where the lamp is no longer what was made of the light.
+def lamp_edits(scene: bpy.types.Scene, lamp: bpy.types.Object) -> LampEdits | None:
+    """The user's edits of a lamp; None if the lamp no longer has the type that was imported.
 
-    A lamp that is where it was, in the world or as the mesh sees it (the artist may turn or scale
-    the whole scan upright with its lamps), has not been moved.
+    A lamp that kept its place in the world, or relative to the mesh, does not count as moved: the
+    user may rotate or scale the whole scan together with its lamps.
     """
-    made, kind = lamp_placement.made_stand(lamp), lamp.get(LAMP_KIND)
+    made, kind = lamp_placement.imported_placement(lamp), lamp.get(LAMP_KIND)
     if made is None or LAMP_TYPE.get(kind) != lamp.data.type:
         return None
-    now = lamp_placement.stand(lamp, scene)
-    if not all(np.isfinite(now.numbers)) or np.linalg.norm(now.axis) < 0.5:  # scaled to nothing
+    now = lamp_placement.placement_of(lamp, scene)
+    if not all(np.isfinite(now.values)) or np.linalg.norm(now.axis) < 0.5:  # scaled to nothing
         return None
-    moved = _apart(kind, now, made)
+    moved = _differs(kind, now, made)
     if kind != MOUNTED:
         seen = now.within(_mesh_frame(scene, lamp.get(CAPTURE)))
-        moved = moved and _apart(kind, seen, made)
+        moved = moved and _differs(kind, seen, made)
         now = seen
-    strength = np.abs(now.strength - made.strength).max() > RELATIVE * made.strength.max()
-    softness = abs(now.softness - made.softness) > RELATIVE * max(now.softness, made.softness)
-    return ByHand(now, moved, bool(strength and lamp.get(INTENSITY_KNOWN)), bool(softness))
+    strength = (
+        np.abs(now.strength - made.strength).max() > MIN_RELATIVE_CHANGE * made.strength.max()
+    )
+    softness = abs(now.softness - made.softness) > MIN_RELATIVE_CHANGE * max(
+        now.softness, made.softness
+    )
+    return LampEdits(now, moved, bool(strength and lamp.get(INTENSITY_KNOWN)), bool(softness))
 
 
 def changed_lights(
     capture: Capture, scene: bpy.types.Scene
 ) -> Iterator[tuple[LightEntry, bpy.types.Object]]:
-    """(entry as its lamp stands, lamp) of the lights that the artist has changed.
+    """(entry with the lamp's present values, lamp) of each light that the user has edited.
 
-    Raises PatinaError where a lamp no longer shines.
+    Raises PatinaError if an edited lamp emits no light.
     """
     file = str(capture.file)
     origin = np.zeros(3)
@@ -86,7 +90,7 @@ def changed_lights(
         lamp = lamp_of(scene, file, entry.name)
         if lamp is None or lamp.get(LAMP_KIND) != _kind(entry):
             continue
-        hand = by_hand(scene, lamp)
+        hand = lamp_edits(scene, lamp)
         if hand:
             changed = _entry(entry, lamp, hand, origin)
             if changed is not entry:
@@ -94,11 +98,12 @@ def changed_lights(
 
 
 def with_dragged_lamps(capture: Capture, scene: bpy.types.Scene) -> tuple[Capture, list[str]]:
-    """(the capture with its lights as the artist has left their lamps, names of those changed).
+    """(the capture with the lights as edited by the user, names of the edited lights).
 
-    A dragged lamp overrides the sphere, the sun or the numbers of the capture file, its strength
-    (where the capture's is known at all) the irradiance or the white target; the lights of lamps
-    that nobody has touched stay as read. Raises PatinaError where a lamp no longer shines.
+    A moved lamp overrides the sphere, the sun or the coordinates of the capture file. Its strength
+    overrides the irradiance or the white target, if the capture defines the strength. Lights whose
+    lamps were not edited keep the values of the file. Raises PatinaError if an edited lamp emits no
+    light.
     """
     changed = {entry.name: entry for entry, _ in changed_lights(capture, scene)}
     entries = tuple(changed.get(entry.name, entry) for entry in capture.lights)
@@ -106,18 +111,19 @@ def with_dragged_lamps(capture: Capture, scene: bpy.types.Scene) -> tuple[Captur
 
 
 def accept(capture: Capture, scene: bpy.types.Scene) -> None:
-    """What the lamps are now is what the capture's file says: nothing counts as changed."""
+    """Record the present state of the lamps as that of the capture file, so that none counts as
+    edited."""
     for entry in capture.lights:
         lamp = lamp_of(scene, str(capture.file), entry.name)
-        hand = None if lamp is None else by_hand(scene, lamp)
+        hand = None if lamp is None else lamp_edits(scene, lamp)
         if hand:
-            lamp[lamp_placement.LAMP_AS_IMPORTED] = hand.now.numbers
+            lamp[lamp_placement.LAMP_AS_IMPORTED] = hand.now.values
 
 
-def _apart(kind: str, now: Stand, made: Stand) -> bool:
-    if kind == DISTANT:  # a sun may be moved about: only its direction counts
-        return bool(np.linalg.norm(now.axis - made.axis) > TURNED)
-    rounding = PLACED * max(np.abs(now.place).max(), np.abs(made.place).max())
+def _differs(kind: str, now: Placement, made: Placement) -> bool:
+    if kind == DISTANT:  # the position of a sun is arbitrary: only its direction counts
+        return bool(np.linalg.norm(now.axis - made.axis) > MIN_ROTATION)
+    rounding = MIN_TRANSLATION * max(np.abs(now.place).max(), np.abs(made.place).max())
     return bool(np.linalg.norm(now.place - made.place) > rounding)
 
 
@@ -127,7 +133,7 @@ def _kind(entry: LightEntry) -> str:
     return NEAR if entry.mounted is None else MOUNTED
 
 
-def _entry(entry: LightEntry, lamp: bpy.types.Object, hand: ByHand, origin: Array) -> LightEntry:
+def _entry(entry: LightEntry, lamp: bpy.types.Object, hand: LampEdits, origin: Array) -> LightEntry:
     new: dict[str, Any] = {}
     if hand.moved and entry.mounted is not None:
         new["mounted"] = hand.now.place * FROM_CAMERA
@@ -135,22 +141,23 @@ def _entry(entry: LightEntry, lamp: bpy.types.Object, hand: ByHand, origin: Arra
         new["position"] = hand.now.place + origin
     elif hand.moved:
         new.update(direction=hand.now.axis, sphere=None, sun=None)
-        if entry.sun is not None and entry.angle is None:  # the sun's own
+        if entry.sun is not None and entry.angle is None:  # the angle of the sun itself
             new["angle"] = hand.now.softness
     if hand.softness:
         new["angle" if entry.distant else "radius"] = hand.now.softness
     if hand.strength and entry.strength_given:
         if not (hand.now.strength > 0).all():
             raise PatinaError(
-                f"light {entry.name!r}: its lamp {lamp.name!r} gives no light in one of red, green "
-                "and blue; give it a strength and a colour, or undo"
+                f"light {entry.name!r}: its lamp {lamp.name!r} emits no light in at least one of "
+                "red, green and blue; set a strength and a colour above 0, or undo the edit"
             )
         new.update(strength=hand.now.strength, white=None)
     return replace(entry, **new) if new else entry
 
 
 def _mesh_frame(scene: bpy.types.Scene, capture: str | None) -> Array:
-    """(4, 4) the mesh's matrix_world, the identity where it is gone or scaled to nothing."""
+    """(4, 4) matrix_world of the capture's mesh; the identity if it was deleted or its scale is
+    0."""
     for collection in _collections(scene, capture):
         for thing in collection.objects:
             if thing.type == "MESH":

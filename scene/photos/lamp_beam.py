@@ -1,19 +1,19 @@
-"""A flash's beam as a lamp's node tree, for Cycles (EEVEE takes no notice of it)."""
+"""The beam profile of a flash as a lamp's node tree, for Cycles (EEVEE ignores it)."""
 
 from __future__ import annotations
 
 import bpy
 
-# the lamp's −Z axis in the world, of its rotation as a quaternion (w, x, y, z)
+# the lamp's −Z axis in world space, from its rotation as a quaternion (w, x, y, z)
 AXIS = ("-2*(x*z + w*y)", "-2*(y*z - w*x)", "2*(x*x + y*y) - 1")
 
 
-def narrow(lamp: bpy.types.Object, beam: float) -> None:
-    """Let a point lamp shine with 2^−(ϑ/beam)² of its strength at the angle ϑ from its −Z axis.
+def add_beam_nodes(lamp: bpy.types.Object, beam: float) -> None:
+    """Scale the strength of a point lamp by 2^−(ϑ/beam)² at the angle ϑ from its −Z axis.
 
-    beam: radians; see core/light/near.py. Exact in Cycles, at every sample. The axis comes from
-    drivers: a Vector Transform node does nothing in the lamps of Blender 4.3, and a lamp's normal
-    is its surface's where it has a size.
+    beam: radians; see core/light/near.py. Cycles evaluates the factor exactly at every sample. The
+    axis comes from drivers, because a Vector Transform node has no effect in lamps of Blender 4.3,
+    and the normal of a lamp with a size is that of its surface.
     """
     data = lamp.data
     data.use_nodes = True
@@ -27,24 +27,24 @@ def narrow(lamp: bpy.types.Object, beam: float) -> None:
     for part, expression in enumerate(AXIS):
         _drive(along.inputs[1], part, lamp, expression)
     cosine = along.outputs["Value"]
-    angle = _maths(tree, "ARCCOSINE", cosine)
-    share = _maths(tree, "DIVIDE", angle, beam)
-    square = _maths(tree, "MULTIPLY", share, share)
-    minus = _maths(tree, "MULTIPLY", square, -1.0)
-    gain = _maths(tree, "POWER", 2.0, minus)
+    angle = _math_node(tree, "ARCCOSINE", cosine)
+    share = _math_node(tree, "DIVIDE", angle, beam)
+    square = _math_node(tree, "MULTIPLY", share, share)
+    minus = _math_node(tree, "MULTIPLY", square, -1.0)
+    gain = _math_node(tree, "POWER", 2.0, minus)
     emission = tree.nodes.new("ShaderNodeEmission")
     tree.links.new(gain, emission.inputs["Strength"])
     output = tree.nodes.new("ShaderNodeOutputLight")
     tree.links.new(emission.outputs[0], output.inputs["Surface"])
-    for place, node in enumerate(tree.nodes):
-        node.location = (180.0 * place, 0.0)
+    for index, node in enumerate(tree.nodes):
+        node.location = (180.0 * index, 0.0)
 
 
 def _drive(
     socket: bpy.types.NodeSocket, part: int, lamp: bpy.types.Object, expression: str
 ) -> None:
-    """One number of a vector from the lamp's rotation in the world; so simple an expression needs
-    no permission to run scripts."""
+    """Drive one component of a vector socket by the lamp's rotation in world space. An expression
+    this simple needs no permission to run scripts."""
     driver = socket.driver_add("default_value", part).driver
     driver.type = "SCRIPTED"
     for name in "wxyz":
@@ -56,7 +56,7 @@ def _drive(
     driver.expression = expression
 
 
-def _maths(
+def _math_node(
     tree: bpy.types.NodeTree,
     operation: str,
     *operands: bpy.types.NodeSocket | float,

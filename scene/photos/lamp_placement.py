@@ -1,4 +1,4 @@
-"""How a capture's lamp stands in Blender, and how it stood when it was made."""
+"""Placement of a capture's lamp in Blender, at present and when it was imported."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from ..property_keys import CAMERA_LABEL, CAPTURE, HOLDING_CAMERA, LAMP_AS_IMPOR
 
 Array = NDArray[np.float64]
 
-# custom properties of a lamp
-
-DISTANT, NEAR, MOUNTED = "distant", "near", "mounted"
+DISTANT, NEAR, MOUNTED = "distant", "near", "mounted"  # values of LAMP_KIND
 FROM_CAMERA = np.array([1.0, -1.0, -1.0])  # right, down, forward ↔ Blender's camera axes
 
 
 @dataclass(frozen=True)
-class Stand:
-    """place: (3,) in Blender's world, of a flash in its camera's axes there (right, up, backward).
-    axis: (3,) unit, surface → light of a sun. strength: (3,) irradiance of a sun, intensity of a
-    lamp. softness: a sun's angle (radians), a lamp's radius."""
+class Placement:
+    """Placement and strength of a lamp.
+
+    place: (3,) position in world space; for a flash in the axes of its camera (right, up,
+    backward). axis: (3,) unit direction surface → light of a sun. strength: (3,) irradiance of a
+    sun, intensity of a lamp. softness: angle of a sun (radians), radius of a lamp.
+    """
 
     place: Array
     axis: Array
@@ -32,51 +33,54 @@ class Stand:
     softness: float
 
     @property
-    def numbers(self) -> list[float]:
-        """As kept in a custom property."""
+    def values(self) -> list[float]:
+        """The ten values that a custom property stores."""
         return [*self.place, *self.axis, *self.strength, self.softness]
 
-    def within(self, frame: Array) -> Stand:
-        """The same seen from a frame, a (4, 4) matrix_world."""
+    def within(self, frame: Array) -> Placement:
+        """The same placement in another frame, given as a (4, 4) matrix_world."""
         inverse = np.linalg.inv(frame)
         axis = inverse[:3, :3] @ self.axis
         place = inverse[:3, :3] @ self.place + inverse[:3, 3]
-        return Stand(place, axis / np.linalg.norm(axis), self.strength, self.softness)
+        return Placement(place, axis / np.linalg.norm(axis), self.strength, self.softness)
 
 
-def mark_as_made(lamp: bpy.types.Object, scene: bpy.types.Scene | None = None) -> None:
-    """What the lamp is now is what the capture says. scene: where the capture's cameras are."""
-    lamp[LAMP_AS_IMPORTED] = stand(lamp, scene).numbers
+def mark_as_imported(lamp: bpy.types.Object, scene: bpy.types.Scene | None = None) -> None:
+    """Record the present state of a lamp as that of its import.
+
+    scene: the one with the capture's cameras.
+    """
+    lamp[LAMP_AS_IMPORTED] = placement_of(lamp, scene).values
 
 
-def made_stand(lamp: bpy.types.Object) -> Stand | None:
-    """How the lamp stood when it was made; None where the lamp is not one of ours."""
-    numbers = np.array(lamp.get(LAMP_AS_IMPORTED, ()), np.float64)
-    if numbers.shape != (10,):
+def imported_placement(lamp: bpy.types.Object) -> Placement | None:
+    """The placement of the lamp at its import; None if Patina did not create the lamp."""
+    values = np.array(lamp.get(LAMP_AS_IMPORTED, ()), np.float64)
+    if values.shape != (10,):
         return None
-    return Stand(numbers[:3], numbers[3:6], numbers[6:9], float(numbers[9]))
+    return Placement(values[:3], values[3:6], values[6:9], float(values[9]))
 
 
-def stand(lamp: bpy.types.Object, scene: bpy.types.Scene | None) -> Stand:
-    """How the lamp stands now."""
+def placement_of(lamp: bpy.types.Object, scene: bpy.types.Scene | None) -> Placement:
+    """The present placement of the lamp."""
     world = world_matrix(lamp)
     axis = world[:3, 2] / max(float(np.linalg.norm(world[:3, 2])), 1e-30)
     data, power = lamp.data, np.array(lamp_power(lamp.data))
     place = offset_of(lamp, scene) if lamp.get(LAMP_KIND) == MOUNTED else world[:3, 3]
     if data.type == "SUN":
-        return Stand(place, axis, power, data.angle)
-    return Stand(place, axis, power / (4 * math.pi), data.shadow_soft_size)
+        return Placement(place, axis, power, data.angle)
+    return Placement(place, axis, power / (4 * math.pi), data.shadow_soft_size)
 
 
 def offset_of(lamp: bpy.types.Object, scene: bpy.types.Scene | None) -> Array:
-    """(3,) where a flash is in the axes of the camera that it is on (right, up, backward)."""
+    """(3,) position of a flash in the axes of its camera (right, up, backward)."""
     holder = _holder(lamp, scene)
     own = np.array(lamp.location, np.float64) + np.array(lamp.delta_location)
-    if holder is None:  # on none yet, or its camera was deleted
+    if holder is None:  # on no camera yet, or its camera was deleted
         return own
     plain = lamp.parent == holder and np.array_equal(lamp.matrix_parent_inverse, np.eye(4))
     if plain and not lamp.constraints:
-        return own  # without the rounding of two matrices
+        return own  # avoids the rounding errors of two matrices
     seen = np.linalg.inv(world_matrix(holder)) @ world_matrix(lamp)
     return seen[:3, 3]
 
@@ -98,8 +102,8 @@ def _holder(lamp: bpy.types.Object, scene: bpy.types.Scene | None) -> bpy.types.
 
 
 def world_matrix(thing: bpy.types.Object) -> Array:
-    """(4, 4) matrix_world as the properties say now: Blender's own lags until the next update, and
-    for what lies in an excluded collection."""
+    """(4, 4) matrix_world from the present properties. Blender's own is outdated until the next
+    update, and for objects in an excluded collection."""
     own = np.array(thing.matrix_basis, np.float64)
     if any(not c.mute for c in thing.constraints):
         return np.array(thing.matrix_world, np.float64)

@@ -1,4 +1,4 @@
-"""The lit photos of a scene as a list: which camera, which light, and what is shown of them."""
+"""The list of lit photos of a scene: camera, light and display settings (Scene.patina_photos)."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ from .exposed_photo import exposed
 
 
 class PatinaPhoto(bpy.types.PropertyGroup):
-    """A lit photo; ``name`` is its file's. Several may share a camera, each under its own light."""
+    """A lit photo; ``name`` is its file name. Several photos may share a camera, each with its own
+    light."""
 
-    place: bpy.props.IntProperty(name="Place", description="In the capture")  # type: ignore[valid-type]
+    place: bpy.props.IntProperty(name="Place", description="Index of the photo in the capture")  # type: ignore[valid-type]
     camera: bpy.props.PointerProperty(  # type: ignore[valid-type]
-        name="Camera", description="Where it was taken from", type=bpy.types.Object
+        name="Camera", description="Camera that took the photo", type=bpy.types.Object
     )
     image: bpy.props.PointerProperty(  # type: ignore[valid-type]
-        name="Photo", description="As it is shown behind the mesh", type=bpy.types.Image
+        name="Photo", description="Image that is shown behind the mesh", type=bpy.types.Image
     )
-    light: bpy.props.StringProperty(name="Light", description="Which lamp was on")  # type: ignore[valid-type]
+    light: bpy.props.StringProperty(name="Light", description="Lamp that was on")  # type: ignore[valid-type]
     exposure: bpy.props.FloatProperty(  # type: ignore[valid-type]
         name="Exposure",
-        description="What the capture says that the photo's pixels are divided by; 0: the file's "
-        "own data say it",
+        description="Exposure from the capture file, by which pixel values are divided; 0 to use "
+        "the metadata of the photo",
     )
 
 
@@ -54,14 +55,14 @@ class PatinaPhotos(bpy.types.PropertyGroup):
     photos: bpy.props.CollectionProperty(type=PatinaPhoto)  # type: ignore[valid-type]
     active: bpy.props.IntProperty(  # type: ignore[valid-type]
         name="Lit Photo",
-        description="Look through the camera of this photo, its lamp switched on",
+        description="Look through the camera of this photo, with its lamp switched on",
         min=0,
         update=_look,
     )
     mesh_over: bpy.props.FloatProperty(  # type: ignore[valid-type]
         name="Mesh over Photo",
-        description="How much of the mesh is seen over the photo behind it: 0 shows the photo "
-        "alone, 1 the mesh alone where it is",
+        description="Opacity of the mesh over the photo: 0 shows only the photo, 1 shows the mesh "
+        "in front of the photo",
         subtype="FACTOR",
         min=0.0,
         max=1.0,
@@ -69,9 +70,9 @@ class PatinaPhotos(bpy.types.PropertyGroup):
         update=_mix,
     )
     view_exposure: bpy.props.FloatProperty(  # type: ignore[valid-type]
-        name="Exposure for Looking",
-        description="How much brighter the photo behind the mesh is shown, in stops; nothing that "
-        "is measured sees it",
+        name="View Exposure",
+        description="Exposure of the photo behind the mesh, in stops, for display only; it does "
+        "not affect the fit",
         min=-10.0,
         max=10.0,
         soft_min=-5.0,
@@ -85,7 +86,7 @@ class PatinaPhotos(bpy.types.PropertyGroup):
 
 @dataclass(frozen=True)
 class LitPhoto:
-    """One line of the list to be."""
+    """One entry of the list."""
 
     camera: bpy.types.Object
     image: bpy.types.Image
@@ -93,7 +94,7 @@ class LitPhoto:
 
 
 def list_photos(scene: bpy.types.Scene, photos: Sequence[LitPhoto]) -> None:
-    """Fill the list, in the capture's order; the first photo is looked at."""
+    """Fill the list in the order of the capture, and look at the first photo."""
     state = scene.patina_photos
     state.photos.clear()
     for place, photo in enumerate(photos):
@@ -102,21 +103,21 @@ def list_photos(scene: bpy.types.Scene, photos: Sequence[LitPhoto]) -> None:
         line.camera, line.image, line.light = photo.camera, photo.image, photo.entry.light
         line.exposure = photo.entry.exposures[0] if photo.entry.exposures else 0.0
         _with_thumbnail(photo.image)
-    state.active = 0  # which looks at it
+    state.active = 0  # its update function looks at the photo
 
 
 def lit_photos(scene: bpy.types.Scene) -> list[PatinaPhoto]:
-    """Those whose camera is still in the scene."""
+    """The lit photos whose camera is still in the scene."""
     return [photo for photo in scene.patina_photos.photos if has_camera(scene, photo)]
 
 
 def has_camera(scene: bpy.types.Scene, photo: PatinaPhoto) -> bool:
-    """Whether it can be looked at."""
+    """Whether the camera of a photo is in the scene."""
     return photo.camera is not None and photo.camera.name in scene.objects
 
 
 def looked_at(scene: bpy.types.Scene) -> PatinaPhoto | None:
-    """The photo that is looked at, None where the scene's camera is no photo's."""
+    """The active photo; None if the scene's camera is not that of the photo."""
     photos, line = scene.patina_photos.photos, scene.patina_photos.active
     if not 0 <= line < len(photos) or scene.camera is None:
         return None
@@ -124,7 +125,7 @@ def looked_at(scene: bpy.types.Scene) -> PatinaPhoto | None:
 
 
 def look_at(scene: bpy.types.Scene, photo: PatinaPhoto) -> None:
-    """Through its camera, the photo behind the mesh, its lamp alone switched on."""
+    """Look through the camera of a photo, with the photo behind the mesh and only its lamp on."""
     camera = photo.camera
     if not has_camera(scene, photo):
         return
@@ -136,14 +137,14 @@ def look_at(scene: bpy.types.Scene, photo: PatinaPhoto) -> None:
 
 
 def _put_behind(photo: PatinaPhoto, state: PatinaPhotos) -> None:
-    """Behind its camera's view, as bright as is asked for."""
+    """Show the photo in its camera's view with the view exposure."""
     behind = photo.camera.data.background_images
     if len(behind) and photo.image is not None:
         behind[-1].image = exposed(photo.image, state.view_exposure)
 
 
 def _blend(scene: bpy.types.Scene) -> None:
-    """The photo of the scene's camera before or behind the mesh, as much as is asked for."""
+    """Blend the photo of the scene's camera with the mesh by the factor ``mesh_over``."""
     camera = scene.camera
     if camera is None or camera.type != "CAMERA" or not len(camera.data.background_images):
         return
@@ -153,19 +154,19 @@ def _blend(scene: bpy.types.Scene) -> None:
 
 
 def mark_lit(camera: bpy.types.Object, name: str, place: int, light: str) -> None:
-    """Say on a camera which lit photo is behind it."""
+    """Store on a camera which lit photo is behind it."""
     camera[LIT_PHOTO], camera[LIT_PHOTO_INDEX], camera[LIGHT_NAME] = name, place, light
 
 
 def _with_thumbnail(image: bpy.types.Image | None) -> None:
-    """A list shows what is there: Blender draws it in the background."""
+    """Request a thumbnail for the list; Blender renders it in the background."""
     if image is not None and not bpy.app.background:
         image.preview_ensure()
 
 
 @bpy.app.handlers.persistent
 def _fill_old_files(*_: object) -> None:
-    """Files of versions that had no list: their cameras say which photo is behind each."""
+    """Fill the list for files of versions without it, from the custom properties of the cameras."""
     for scene in bpy.data.scenes:
         state, capture = scene.patina_photos, capture_path(scene)
         if len(state.photos) or not capture:

@@ -1,4 +1,4 @@
-"""Photos that a Blender camera can stand in front of: those of a distorted lens are resampled."""
+"""Photos that fit a Blender camera: those of a distorted lens are resampled."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ...core.scan import Camera
 
 
 def photo_for(camera: Camera, photo: Path, folder: Path) -> Path:
-    """The photo itself where the lens is a pinhole, else its rectified copy in ``folder``."""
+    """The photo itself if its lens is a pinhole, else a rectified copy in ``folder``."""
     if camera.pinhole:
         return photo
     folder.mkdir(parents=True, exist_ok=True)
-    # cameras of a rig keep photos of the same names in folders of their own
+    # cameras of a rig may store photos of the same name in different folders
     place = hashlib.sha256(str(photo.resolve().parent).encode()).hexdigest()[:6]
     pixels = rectify(read_encoded(photo), camera, camera.rectified())
     if photo.suffix.lower() in (".exr", ".hdr"):

@@ -1,4 +1,5 @@
-"""A fit's result into the open .blend: materials on the mesh, the description kept."""
+"""Apply the result of a fit to the open .blend: create and assign the materials, store the
+description."""
 
 from __future__ import annotations
 
@@ -16,13 +17,13 @@ from ..material.lobe_group import stack_group
 from ..material.material_evidence import keep_earlier, keep_evidence
 from ..material.measured_materials import measured_materials
 from ..material.prepared_materials import Prepared, prepare
-from ..material.preview import put_spheres
+from ..material.preview import set_preview
 from ..property_keys import CAPTURE, MEASURED_DATE, MEASURED_NAME, NO_OSL_REASON
 from ..session.scene_properties import store_result
 from . import meshes
-from .face_slots import drop_stand_ins
+from .face_slots import remove_placeholders
 
-NUMBERED = re.compile(r"\.\d{3}$")  # as Blender keeps names apart
+NUMBER_SUFFIX = re.compile(r"\.\d{3}$")  # Blender appends it to make names unique
 
 
 def apply_result(
@@ -31,19 +32,21 @@ def apply_result(
     stages: Sequence[Stage],
     prepared: Sequence[Prepared] = (),
 ) -> list[str]:
-    """Make the materials, put them on the scanned mesh where it is in the scene, and keep the
-    description. Returns notes for the user. A material of an earlier fit is replaced. prepared: of
-    each material, where it was made before."""
-    return drained(applying(scene, result, stages, prepared))
+    """Create the materials, assign them to the scanned mesh, and store the description.
+
+    Materials of an earlier fit are replaced. prepared: data of each material, if it is computed
+    already. Returns notes for the user.
+    """
+    return drained(apply_result_steps(scene, result, stages, prepared))
 
 
-def applying(
+def apply_result_steps(
     scene: bpy.types.Scene,
     result: CaptureResult,
     stages: Sequence[Stage],
     prepared: Sequence[Prepared] = (),
 ) -> Generator[None, None, list[str]]:
-    """``apply_result``, a piece at a time."""
+    """``apply_result`` as a generator, one piece per step."""
     with_osl = material_nodes.osl_missing() is None
     capture = str(result.capture.file)
     notes: list[str] = []
@@ -55,8 +58,8 @@ def applying(
         yield
         files = None
         if with_osl:
-            files = yield from osl_files.ensuring_files(brdf, own.tables)
-        stack_group()  # once a file, a tenth of a second
+            files = yield from osl_files.ensure_files_steps(brdf, own.tables)
+        stack_group()  # created once per .blend, in a tenth of a second
         yield
         new = material_nodes.create_material(
             fitted.name, brdf, fitted.principled, files, fitted.lobes
@@ -64,7 +67,7 @@ def applying(
         new[MEASURED_NAME], new[CAPTURE] = fitted.name, capture
         yield
         new[MEASURED_DATE] = date.today().isoformat()
-        put_spheres(new, own.spheres)
+        set_preview(new, own.spheres)
         keep_evidence(new, fitted)
         if old is not None:
             keep_earlier(new, old)
@@ -74,21 +77,26 @@ def applying(
             new.name = name
         if NO_OSL_REASON in new:
             notes.append(
-                f"{fitted.name}: only the Principled fit is wired, because {new[NO_OSL_REASON]}"
+                f"{fitted.name}: renders show the portable material instead of the measured BRDF, "
+                f"because {new[NO_OSL_REASON]}."
             )
         made.append(new)
         yield
     osl_files.drop_unused()
     mesh = scene.patina.mesh
     if mesh is None or mesh.type != "MESH" or mesh.name not in scene.objects:
-        notes.append("the scanned mesh is not in this scene: materials were made, not assigned")
+        notes.append(
+            "The scanned mesh is not in this scene; the materials were created but not assigned."
+        )
     elif not meshes.assign_materials(mesh, made, result.face_material):
-        notes.append(f"{mesh.name} no longer has the scan's faces: all wear the first material")
+        notes.append(
+            f"{mesh.name} no longer has the faces of the scan; all faces got the first material."
+        )
     yield
-    drop_stand_ins(capture)
-    for material in made:  # what had its name made way; another name is the artist's
+    remove_placeholders(capture)
+    for material in made:  # the name is free now; other names were set by the user
         name = material[MEASURED_NAME]
-        if NUMBERED.sub("", material.name) == name and name not in bpy.data.materials:
+        if NUMBER_SUFFIX.sub("", material.name) == name and name not in bpy.data.materials:
             material.name = name
     store_result(capture, describe(result, stages, notes))
     return notes

@@ -9,18 +9,18 @@ from numpy.typing import NDArray
 from ...core.scan import Mesh
 
 UV_LAYER, COLOURS = "UVMap", "Col"
-# names of faces' attributes that mean something to Blender itself
+# names of face attributes that Blender itself uses
 RESERVED = {"material_index", "position", "sharp_face", "sharp_edge", "id", UV_LAYER, COLOURS}
 
 
 def create_mesh_object(
     name: str, mesh: Mesh, origin: NDArray[np.float64], collection: bpy.types.Collection
 ) -> bpy.types.Object:
-    """A smooth-shaded object with the scan's triangles, shifted by −origin.
+    """Create a smooth-shaded object with the scan's triangles, shifted by −origin.
 
-    What the scan has of them becomes: the UV layer "UVMap", the colour attribute "Col", an integer
-    attribute of the faces for each of its face attributes ("scan_NAME" where Blender has its own
-    meaning for a name).
+    If the scan has them, the object gets the UV layer "UVMap", the colour attribute "Col", and an
+    integer face attribute for each face attribute of the scan ("scan_NAME" for names that Blender
+    uses itself).
     """
     data = bpy.data.meshes.new(name)
     count = len(mesh.faces)
@@ -53,7 +53,7 @@ def _add_attributes(data: bpy.types.Mesh, mesh: Mesh) -> None:
 
 
 def _add_colours(data: bpy.types.Mesh, colours: NDArray[np.uint8]) -> None:
-    """8-bit sRGB (v, 3) as the vertices' colour attribute."""
+    """Add 8-bit sRGB colours (v, 3) as a colour attribute of the vertices."""
     attribute = data.color_attributes.new(COLOURS, "BYTE_COLOR", "POINT")
     srgb = np.concatenate([colours / 255.0, np.ones((len(colours), 1))], axis=1)
     attribute.data.foreach_set("color_srgb", srgb.astype(np.float32).ravel())
@@ -65,7 +65,7 @@ def create_points_object(
     colours: NDArray[np.uint8],
     collection: bpy.types.Collection,
 ) -> bpy.types.Object:
-    """Sparse points (n, 3) as vertices with a colour attribute "Col"."""
+    """Create an object with sparse points (n, 3) as vertices and a colour attribute "Col"."""
     data = bpy.data.meshes.new(name)
     data.vertices.add(len(positions))
     data.vertices.foreach_set("co", positions.astype(np.float32).ravel())
@@ -81,16 +81,19 @@ def assign_materials(
     materials: list[bpy.types.Material],
     face_material: NDArray[np.int32],
 ) -> bool:
-    """Give every face the material of its number; the object's own materials are replaced. False
-    where the object no longer has the scan's faces: all of it then wears the first material."""
-    if target.data.is_editmode:  # its faces belong to the edit session until that ends
+    """Assign a material to every face; the object's own materials are replaced.
+
+    face_material: (faces,) index into ``materials``. Returns False if the object no longer has the
+    scan's faces; all faces then have the first material.
+    """
+    if target.data.is_editmode:  # faces cannot be changed in Edit Mode
         with bpy.context.temp_override(active_object=target, object=target):
             bpy.ops.object.mode_set(mode="OBJECT")
     target.data.materials.clear()
     for material in materials:
         target.data.materials.append(material)
-    same = len(target.data.polygons) == len(face_material)
-    if same:
+    matches = len(target.data.polygons) == len(face_material)
+    if matches:
         target.data.polygons.foreach_set("material_index", face_material.astype(np.int32))
         target.data.update()
-    return same or len(materials) < 2
+    return matches or len(materials) < 2

@@ -1,4 +1,4 @@
-"""A capture as a Blender collection: mesh, cameras with their photos, lights."""
+"""A capture as a Blender collection: mesh, cameras with their photos, and lights."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from ..photos.lamps import create_lamp
 from ..photos.photo_list import LitPhoto, list_photos, mark_lit
 from ..property_keys import CAPTURE, ORIGIN, RESOLUTION
 from . import meshes
-from .face_slots import wear_again
+from .face_slots import reassign_slots
 from .origin import frame_origin
 
 log = logging.getLogger(__name__)
@@ -32,7 +32,7 @@ PICTURES = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".exr")
 
 @dataclass(frozen=True)
 class ScanCollection:
-    """What was made. cameras: label → object; lights: name → object."""
+    """The objects of an imported capture. cameras: label → object; lamps: name → object."""
 
     collection: bpy.types.Collection
     mesh: bpy.types.Object
@@ -43,39 +43,40 @@ class ScanCollection:
 def create_scan_collection(
     scene: bpy.types.Scene, capture: Capture, scan: Scan, found: Lights, rectified: Path
 ) -> ScanCollection:
-    """Everything of a capture, linked into ``scene``; call only when all of it has been parsed.
+    """Create the objects of a capture in ``scene``. Call it only after all files were read.
 
-    rectified: folder for resampled photos of distorted lenses.
+    rectified: folder for resampled photos of distorted lenses. Raises PatinaError if a lit photo
+    cannot be read.
     """
     name = capture.file.name.removesuffix(".toml").removesuffix(".capture")
-    # photos first: one that cannot be read must leave nothing behind
+    # photos first: an error must occur before anything is created
     own = _own_photos(scan.cameras, scan.images, rectified)
     lit = []
     for place, photo in enumerate(capture.photos):
         camera = capture_data.camera_of(capture, scan, place)
         lit.append((camera, rectified_photo.photo_for(camera, photo.file, rectified), photo))
-    top, camera_room, light_room = _rooms(scene, name, ("cameras", "lights"))
+    top, camera_collection, light_collection = _collections(scene, name, ("cameras", "lights"))
     top[CAPTURE] = str(capture.file)
     used = scan.mesh.vertices[np.unique(scan.mesh.faces)]
     origin = frame_origin(used)
     centre = 0.5 * (used.min(axis=0) + used.max(axis=0)) - origin
     top[ORIGIN] = origin.tolist()
     mesh = meshes.create_mesh_object(name, scan.mesh, origin, top)
-    wear_again(mesh, str(capture.file))
-    made = _cameras(scan.cameras, own, origin, centre, camera_room)
+    reassign_slots(mesh, str(capture.file))
+    made = _cameras(scan.cameras, own, origin, centre, camera_collection)
     listed = []
     for place, (camera, shown, photo) in enumerate(lit):
         stood = made[camera.label]
-        # a scaled copy of what was calibrated is rendered at its own size
+        # photos that are scaled copies of the calibrated ones are rendered at their own size
         stood[RESOLUTION] = (camera.width, camera.height)
         image = bpy.data.images.load(str(shown), check_existing=True)
-        if CAPTURE not in stood:  # of several photos from one place the list shows one at a time
+        if CAPTURE not in stood:  # of several photos by one camera, the first is shown
             cameras.put_photo_behind(stood, shown)
             mark_lit(stood, photo.file.name, place, photo.light)
         stood[CAPTURE] = str(capture.file)
         listed.append(LitPhoto(stood, image, photo))
     lamps = {
-        light.name: create_lamp(light, origin, centre, scan.mesh.size, light_room)
+        light.name: create_lamp(light, origin, centre, scan.mesh.size, light_collection)
         for light in found.by_name.values()
     }
     for lamp in lamps.values():
@@ -84,8 +85,8 @@ def create_scan_collection(
     return ScanCollection(top, mesh, made, lamps)
 
 
-def already_there(scene: bpy.types.Scene, capture: Path) -> bpy.types.Collection | None:
-    """The collection an earlier import of this capture made, where its mesh is still in it."""
+def find_earlier_import(scene: bpy.types.Scene, capture: Path) -> bpy.types.Collection | None:
+    """The collection of an earlier import of this capture, if it still contains the mesh."""
     for collection in scene.collection.children_recursive:
         if collection.get(CAPTURE) == str(capture.resolve()) and any(
             o.type == "MESH" for o in collection.objects
@@ -101,29 +102,29 @@ def create_reconstruction(
     images: Path | None,
     rectified: Path,
 ) -> None:
-    """A reconstruction without a mesh: its cameras and its sparse points."""
+    """Create the cameras and sparse points of a reconstruction without a mesh."""
     own = _own_photos(found.cameras, images, rectified)
-    top, camera_room = _rooms(scene, name, ("cameras",))
+    top, camera_collection = _collections(scene, name, ("cameras",))
     centres = np.array([c.pose.centre for c in found.cameras])
     positions = found.points if len(found.points) else centres
     origin = frame_origin(positions)
     centre = np.median(positions, axis=0) - origin
     if len(found.points):
         meshes.create_points_object(f"{name} points", found.points - origin, found.colours, top)
-    made = _cameras(found.cameras, own, origin, centre, camera_room)
+    made = _cameras(found.cameras, own, origin, centre, camera_collection)
     cameras.look_through(scene, next(iter(made.values())))
 
 
-def _rooms(
+def _collections(
     scene: bpy.types.Scene, name: str, parts: Sequence[str]
 ) -> tuple[bpy.types.Collection, ...]:
-    """A collection and one inside it for every part."""
+    """Create a collection and a child collection for every part."""
     top = bpy.data.collections.new(f"Patina {name}")
     scene.collection.children.link(top)
-    rooms = [bpy.data.collections.new(f"{name} {part}") for part in parts]
-    for room in rooms:
-        top.children.link(room)
-    return (top, *rooms)
+    children = [bpy.data.collections.new(f"{name} {part}") for part in parts]
+    for child in children:
+        top.children.link(child)
+    return (top, *children)
 
 
 def _cameras(
@@ -131,22 +132,22 @@ def _cameras(
     own: dict[str, Path],
     origin: NDArray[np.float64],
     centre: NDArray[np.float64],
-    room: bpy.types.Collection,
+    collection: bpy.types.Collection,
 ) -> dict[str, bpy.types.Object]:
     made = {}
     for camera in found:
         distance = float(np.linalg.norm(camera.pose.centre - origin - centre))
-        made[camera.label] = cameras.create_camera(camera, origin, distance, room)
+        made[camera.label] = cameras.create_camera(camera, origin, distance, collection)
         if camera.label in own:
             cameras.put_photo_behind(made[camera.label], own[camera.label])
     return made
 
 
 def _own_photos(found: Sequence[Camera], images: Path | None, rectified: Path) -> dict[str, Path]:
-    """The scan's own photos, where it is known where they lie: label → file to show."""
-    there = ((camera, _own_photo(images, camera.label)) for camera in found)
+    """Camera label → photo to show, for photos of the scan that are in the folder ``images``."""
+    pairs = ((camera, _own_photo(images, camera.label)) for camera in found)
     shown = {}
-    for camera, photo in there:
+    for camera, photo in pairs:
         if photo is None:
             continue
         try:
@@ -154,12 +155,12 @@ def _own_photos(found: Sequence[Camera], images: Path | None, rectified: Path) -
                 camera.resized(*image_size(photo)), photo, rectified
             )
         except PatinaError as error:
-            log.warning("the photo of camera %s is not shown: %s", camera.label, error)
+            log.warning("The photo of camera %s cannot be shown: %s", camera.label, error)
     return shown
 
 
 def _own_photo(images: Path | None, label: str) -> Path | None:
-    """The scan's own photo of a camera, where it is known where the photos lie."""
+    """The photo of one camera of the scan in the folder ``images``; None if it is not there."""
     if images is None:
         return None
     names = [label, *(f"{label}{suffix}" for suffix in PICTURES)]

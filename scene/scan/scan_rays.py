@@ -1,4 +1,4 @@
-"""The scan of the capture in the scene, ready for rays, while Blender runs."""
+"""The scene's scan with an acceleration structure for rays, kept while Blender runs."""
 
 from __future__ import annotations
 
@@ -9,46 +9,52 @@ from ...core.capture import Capture, read_capture
 from ...core.errors import InputError
 from ...core.geometry import RayScene
 from ...core.inputs import capture_data
-from ...core.masks.carry import SeenFaces
+from ...core.masks.carry import VisibleFaces
 from ...core.scan import Scan
-from ..session.session_state import Kept
+from ..session.session_state import KeptValue
 
-KEPT = 4  # photos of which it is known what they show: of 24 megapixels 200 MB each
+MAX_PHOTOS = 4  # photos whose visible faces are cached; 200 MB each at 24 megapixels
 
 
 @dataclass(frozen=True)
 class ScanRays:
-    """Of one capture file as it was at ``changed``. seen: what each photo shows, by place, as far
-    as it was asked for."""
+    """The scan of one capture file.
+
+    changed: modification time of the file, seconds; seen: index of a photo → the faces it shows, a
+    cache.
+    """
 
     capture: Capture
     scan: Scan
     rays: RayScene
     changed: float
-    seen: dict[int, SeenFaces]
+    seen: dict[int, VisibleFaces]
 
-    def faces_of(self, place: int) -> SeenFaces:
-        """Which faces a photo shows where."""
+    def faces_of(self, place: int) -> VisibleFaces:
+        """The face that each pixel of a photo shows; place: index of the photo."""
         if place not in self.seen:
-            while len(self.seen) >= KEPT:
+            while len(self.seen) >= MAX_PHOTOS:
                 self.seen.pop(next(iter(self.seen)))
             camera = capture_data.camera_of(self.capture, self.scan, place)
-            self.seen[place] = SeenFaces.of(self.rays, camera)
+            self.seen[place] = VisibleFaces.of(self.rays, camera)
         return self.seen[place]
 
 
-_last: Kept[ScanRays] = Kept()
+_last: KeptValue[ScanRays] = KeptValue()
 
 
 def scan_rays(path: str) -> ScanRays:
-    """Of a capture file; the last one is kept. Raises InputError."""
+    """The scan of a capture file; the last one is cached. Raises InputError if a file cannot be
+    read."""
     file = Path(path)
     if not file.is_file():
-        raise InputError("is gone; import the capture again from where it is now", file=file)
-    changed, last = file.stat().st_mtime, _last.thing
+        raise InputError(
+            "the file does not exist; import the capture again from its present place", file=file
+        )
+    changed, last = file.stat().st_mtime, _last.value
     if last is None or last.capture.file != file or last.changed != changed:
         capture = read_capture(file)
         scan = capture_data.open_scan(capture)
         last = ScanRays(capture, scan, RayScene.build(scan.mesh), changed, {})
-        _last.thing = last
+        _last.value = last
     return last

@@ -1,1 +1,1 @@
-"""State, folders, preferences and handlers of one Blender session."""
+"""State, folders, preferences and handlers of a Blender session."""

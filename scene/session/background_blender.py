@@ -1,5 +1,5 @@
-"""A headless command in a second Blender without a window: what opens a .blend of its own must not
-close the artist's."""
+"""Run a headless command in a second Blender process without a window, because a command that opens
+a .blend must not close the user's file."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ import bpy
 from ...core.concurrency.job import Step
 from ...core.errors import PatinaError
 
-HEADLESS = Path(__file__).parents[1] / "headless.py"
-PACKAGE = __package__.rpartition(".")[0]
-MOMENT = 0.05  # seconds between looks at it
-PATIENCE = 10.0  # seconds in which it is to end when it is told so
+HEADLESS = Path(__file__).parents[2] / "headless.py"
+PACKAGE = __package__.rsplit(".", 2)[0]
+POLL_INTERVAL = 0.05  # seconds between checks of the process
+TERMINATION_TIMEOUT = 10.0  # seconds between asking the process to end and killing it
 PROGRESS = re.compile(r"^\[\s*(\d+) %\] (.*)$")
-OURS = "patina: "  # before a mistake in one line
-NO_WINDOW = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # Windows opens a console else
+ERROR_PREFIX = "patina: "  # of a one-line error message of the command
+NO_WINDOW = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # otherwise Windows opens a console
 
 
 def command(words: Sequence[str]) -> list[str]:
-    """How to call a headless command with this Blender, or with the Python that bpy is a module
-    of."""
+    """The command line of a headless command, for this Blender or for the Python that has bpy as a
+    module."""
     binary = bpy.app.binary_path
     if not binary:
         return [sys.executable, str(HEADLESS), *words]
@@ -42,11 +42,15 @@ def command(words: Sequence[str]) -> list[str]:
 def in_background(
     words: Sequence[str], environment: Mapping[str, str] | None = None
 ) -> Generator[Step, None, None]:
-    """Run a command, yielding how far it is; dropped, it is ended and leaves nothing. environment:
-    variables beside this Blender's own. Raises PatinaError with what the command said."""
+    """Run a command and yield its progress. Closing the generator ends the process and removes its
+    files.
+
+    words: the command and its arguments; environment: variables added to those of this process.
+    Raises PatinaError with the message of the command if it fails.
+    """
     with tempfile.TemporaryDirectory(prefix="patina-", ignore_cleanup_errors=True) as folder:
-        said = Path(folder) / "said.txt"
-        with said.open("wb") as out:
+        messages = Path(folder) / "said.txt"
+        with messages.open("wb") as out:
             process = subprocess.Popen(
                 command(words),
                 stdin=subprocess.DEVNULL,
@@ -56,13 +60,13 @@ def in_background(
                 creationflags=NO_WINDOW,
             )
         try:
-            yield Step("starting another Blender", 0.0)
-            while _runs(process, MOMENT):
-                yield _progress(_lines(said))
+            yield Step("Starting a second Blender", 0.0)
+            while _runs(process, POLL_INTERVAL):
+                yield _progress(_lines(messages))
         finally:
             _end(process)
         if process.returncode != 0:
-            raise PatinaError(_mistake(_lines(said), process.returncode))
+            raise PatinaError(_error_message(_lines(messages), process.returncode))
 
 
 def _runs(process: subprocess.Popen[bytes], seconds: float) -> bool:
@@ -75,27 +79,27 @@ def _runs(process: subprocess.Popen[bytes], seconds: float) -> bool:
 
 def _end(process: subprocess.Popen[bytes]) -> None:
     if process.poll() is None:
-        process.terminate()  # the command takes its half-written files away
-        if _runs(process, PATIENCE):
+        process.terminate()  # the command removes its incomplete files
+        if _runs(process, TERMINATION_TIMEOUT):
             process.kill()
             process.wait()
 
 
-def _lines(said: Path) -> list[str]:
-    return said.read_text("utf-8", "replace").splitlines()
+def _lines(messages: Path) -> list[str]:
+    return messages.read_text("utf-8", "replace").splitlines()
 
 
 def _progress(lines: list[str]) -> Step:
     found = next((match for line in reversed(lines) if (match := PROGRESS.match(line))), None)
     if found is None:
-        return Step("starting another Blender", 0.0)
+        return Step("Starting a second Blender", 0.0)
     return Step(found[2], int(found[1]) / 100)
 
 
-def _mistake(lines: list[str], code: int) -> str:
-    """What went wrong, in the command's own words where it has any."""
-    told = next((line for line in reversed(lines) if line.startswith(OURS)), None)
-    if told is not None:
-        return told.removeprefix(OURS)
-    last = next((line for line in reversed(lines) if line.strip()), "it said nothing")
-    return f"a second Blender was started to write it, and failed (exit code {code}: {last})"
+def _error_message(lines: list[str], code: int) -> str:
+    """The error message of the command, or a general one if it printed none."""
+    reported = next((line for line in reversed(lines) if line.startswith(ERROR_PREFIX)), None)
+    if reported is not None:
+        return reported.removeprefix(ERROR_PREFIX)
+    last = next((line for line in reversed(lines) if line.strip()), "no output")
+    return f"the second Blender that writes the files failed (exit code {code}: {last})"

@@ -1,4 +1,4 @@
-"""Where files that belong to a .blend lie: beside it, or with the user while it is unsaved."""
+"""Folders of files that belong to a .blend: next to it, or in a user folder while it is unsaved."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from .preferences import PACKAGE, preferences
 
 
 def blend_folder() -> Path:
-    """Beside the .blend where that can be written, else the extension's own folder."""
+    """The folder of the .blend if it can be written to, else the extension's own folder."""
     if bpy.data.filepath:
-        beside = Path(bpy.data.filepath).parent
-        if os.access(beside, os.W_OK):
-            return beside
+        folder = Path(bpy.data.filepath).parent
+        if os.access(folder, os.W_OK):
+            return folder
     return own_folder()
 
 
 def own_folder() -> Path:
-    """The preferred one, else the extension's folder of the user's, which survives updates of the
-    extension."""
+    """The folder set in the preferences, else the extension's user folder, which survives updates
+    of the extension. It is created if necessary."""
     preferred = preferences().cache_folder
     if preferred:
         folder = cache_folder() / "files"
@@ -38,12 +38,14 @@ def own_folder() -> Path:
 
 
 def cache_folder() -> Path:
-    """For what takes long to compute and belongs to no .blend: bases of the artist's own files."""
+    """Folder for bases of the user's own MERL files, which take long to compute and belong to no
+    .blend."""
     preferred = preferences().cache_folder
     return Path(bpy.path.abspath(preferred)) if preferred else user_cache()
 
 
 def rectified_folder(capture: Path) -> Path:
-    """For the resampled photos of one capture: photos of two captures may have the same names."""
+    """Folder for the resampled photos of one capture; the path has a hash because names may be
+    equal."""
     digest = hashlib.sha256(str(capture.resolve()).encode()).hexdigest()[:8]
     return blend_folder() / "rectified" / f"{capture.name.split('.')[0]}-{digest}"

@@ -1,4 +1,4 @@
-"""Register and unregister what several modules add to Blender: handlers and pointer properties."""
+"""Factories of register and unregister functions for handlers and pointer properties."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 import bpy
 
 Handlers = Iterable[tuple[str, Callable[..., None]]]
-"""Names of lists in bpy.app.handlers, and what each is to call."""
+"""(name of a list in bpy.app.handlers, function to add to it) for each handler."""
 Registration = tuple[Callable[[], None], Callable[[], None]]
 """A module's functions (register, unregister)."""
 
@@ -25,15 +25,15 @@ def detach(handlers: Handlers) -> None:
 
 
 def register_handlers_factory(handlers: Handlers) -> Registration:
-    """(register, unregister) of a module that has handlers and nothing else to register."""
+    """(register, unregister) of a module that registers only handlers."""
     return lambda: attach(handlers), lambda: detach(handlers)
 
 
 def register_property_factory(
     owner: type[bpy.types.ID], name: str, *classes: type[bpy.types.PropertyGroup]
 ) -> Registration:
-    """(register, unregister) of property groups, the last of which every ``owner`` gets as its
-    pointer property ``name``."""
+    """(register, unregister) of property groups; the last one becomes the pointer property ``name``
+    of ``owner``."""
     register_classes, unregister_classes = bpy.utils.register_classes_factory(classes)
 
     def register() -> None:

@@ -1,5 +1,4 @@
-"""An Image Editor to look and to paint in: the one that is open, or a half of the largest 3D
-viewport."""
+"""Show images in an Image Editor: an open one, or a new one in half of the largest 3D viewport."""
 
 from __future__ import annotations
 
@@ -7,13 +6,13 @@ import bpy
 
 
 def show_canvas(context: bpy.types.Context, image: bpy.types.Image) -> None:
-    """Show an image to paint on. Where there is no window, nothing has to be shown."""
+    """Show an image in Paint mode. Without a window nothing happens."""
     _show(context, image, "PAINT")
 
 
 def show_image(context: bpy.types.Context, image: bpy.types.Image) -> None:
-    """Show an image to look at: where it is the first there, one pixel of it to one of the screen's
-    if it fits."""
+    """Show an image in View mode. If the editor showed another image before, the zoom is set to one
+    image pixel per screen pixel, or to fit if the image is larger."""
     area, new = _show(context, image, "VIEW")
     if area is None or not new:
         return
@@ -25,7 +24,7 @@ def show_image(context: bpy.types.Context, image: bpy.types.Image) -> None:
 
 
 def width_to_show(context: bpy.types.Context) -> int | None:
-    """Pixels across the editor that an image will be shown in; None without a window."""
+    """Width in pixels of the editor that will show an image; None without a window."""
     area, split = _place(context)
     if area is None:
         return None
@@ -33,7 +32,7 @@ def width_to_show(context: bpy.types.Context) -> int | None:
 
 
 def _place(context: bpy.types.Context) -> tuple[bpy.types.Area | None, bool]:
-    """(the editor, False), or (the viewport that is to be split, True)."""
+    """(the editor, False), or (the viewport to split, True); (None, …) if there is neither."""
     screen = context.screen
     if screen is None or bpy.app.background:
         return None, False
@@ -47,7 +46,7 @@ def _place(context: bpy.types.Context) -> tuple[bpy.types.Area | None, bool]:
 def _show(
     context: bpy.types.Context, image: bpy.types.Image, mode: str
 ) -> tuple[bpy.types.Area | None, bool]:
-    """(the editor, whether it showed something else before)."""
+    """Show the image; returns (the editor, whether it showed something else before)."""
     area, split = _place(context)
     if area is None:
         return None, False

@@ -1,26 +1,27 @@
-"""The last fit, while Blender runs: its report needs photos and rays, which no .blend holds."""
+"""The last fit, kept while Blender runs. Its report needs photos and rays, which are not stored in
+the .blend."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from ...core.jobs import CaptureResult
-from .session_state import Kept
+from .session_state import KeptValue
 
-_last: Kept[CaptureResult] = Kept()
+_last: KeptValue[CaptureResult] = KeptValue()
 
 
 def keep_fit(result: CaptureResult | None) -> None:
-    """Instead of the one before; None: none."""
-    _last.thing = result
+    """Keep a fit in place of the previous one; None to discard it."""
+    _last.value = result
 
 
 def kept_fit(capture: str, described: dict[str, Any] | None) -> CaptureResult | None:
-    """The last fit, if it is the one of that capture file that ``described`` (the content of
-    result.json) tells of: after an undo it is another."""
-    last = _last.thing
+    """The last fit, if it belongs to that capture file and has the coefficients of ``described``,
+    the content of result.json; else None. They differ after an undo."""
+    last = _last.value
     if last is None or described is None or str(last.capture.file) != capture:
         return None
-    told = [material["coefficients"] for material in described.get("materials", [])]
-    mine = [material.fit.brdf.coefficients.tolist() for material in last.materials]
-    return last if told == mine else None
+    stored = [material["coefficients"] for material in described.get("materials", [])]
+    own = [material.fit.brdf.coefficients.tolist() for material in last.materials]
+    return last if stored == own else None

@@ -1,5 +1,4 @@
-"""Lengths as panels tell them: in scan units, or in metres where the preferences say what a scan
-unit is."""
+"""Lengths in panels: in scan units, or in metric units if the preferences define the scan unit."""
 
 from __future__ import annotations
 
@@ -9,12 +8,12 @@ import bpy
 
 from .preferences import preferences
 
-METRES = {"METRES": 1.0, "CENTIMETRES": 0.01, "MILLIMETRES": 0.001}  # in a scan unit
-TOLD = re.compile(r"(\d+(?:\.\d+)?(?:e[+-]?\d+)?) scan units?\b")
+METRES = {"METRES": 1.0, "CENTIMETRES": 0.01, "MILLIMETRES": 0.001}  # per scan unit
+LENGTH_IN_SCAN_UNITS = re.compile(r"(\d+(?:\.\d+)?(?:e[+-]?\d+)?) scan units?\b")
 
 
 def length(units: float) -> str:
-    """units: scan units."""
+    """A length as text; units: the length in scan units."""
     metres = METRES.get(preferences().unit)
     if metres is None:
         return f"{units:.3g} scan units"
@@ -22,7 +21,7 @@ def length(units: float) -> str:
 
 
 def with_lengths(sentence: str) -> str:
-    """A sentence of core's, which knows scan units only."""
+    """A sentence of core, which uses scan units, with its lengths in the preferred unit."""
     if preferences().unit not in METRES:
         return sentence
-    return TOLD.sub(lambda found: length(float(found[1])), sentence)
+    return LENGTH_IN_SCAN_UNITS.sub(lambda found: length(float(found[1])), sentence)

@@ -1,4 +1,4 @@
-"""What the artist prefers, as Blender's preferences keep it; the usual where nobody can prefer."""
+"""The extension's preferences as a plain dataclass, with defaults if there are none."""
 
 from __future__ import annotations
 
@@ -8,15 +8,18 @@ import bpy
 
 from ...core.samples import Margins
 
-PACKAGE = __package__.rpartition(".")[0]
+PACKAGE = __package__.rsplit(".", 2)[0]
 NO_UNIT = "NONE"
 
 
 @dataclass(frozen=True)
 class Preferences:
-    """merl_folder: of the artist's own MERL files, "" none. cache_folder: "" the usual one.
-    cache_size: MB. silhouette, shadow, mask: pixels, cosine: as core.samples.Margins, for captures
-    that do not say. unit: of the scans' lengths, NO_UNIT unknown."""
+    """The preferences.
+
+    merl_folder: of the user's own MERL files, "" for none. cache_folder: "" for the default one.
+    cache_size: MB. silhouette, shadow, mask (pixels) and cosine: values of core.samples.Margins for
+    captures that do not set them. unit: length of a scan unit, NO_UNIT if unknown.
+    """
 
     merl_folder: str = ""
     cache_folder: str = ""
@@ -29,16 +32,17 @@ class Preferences:
 
     @property
     def margins(self) -> Margins:
-        """What is too close to trust."""
+        """The margins for captures that do not set them."""
         return Margins(self.silhouette, self.shadow, self.mask, self.cosine)
 
 
 def preferences() -> Preferences:
-    """As they are now. A checkout is no add-on that Blender knows: the usual ones."""
+    """The present preferences; the defaults if the extension is run from a checkout, which Blender
+    does not know as an add-on."""
     addon = bpy.context.preferences.addons.get(PACKAGE)
-    told = addon.preferences if addon is not None else None
-    if told is None:
+    stored = addon.preferences if addon is not None else None
+    if stored is None:
         return Preferences()
-    found = {field.name: getattr(told, field.name) for field in fields(Preferences)}
-    found["cosine"] = round(found["cosine"], 6)  # Blender's numbers are of single precision
+    found = {field.name: getattr(stored, field.name) for field in fields(Preferences)}
+    found["cosine"] = round(found["cosine"], 6)  # Blender stores single precision
     return Preferences(**found)

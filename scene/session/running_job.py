@@ -1,4 +1,4 @@
-"""The job that is running now, if any: not part of the .blend, which may be saved meanwhile."""
+"""The running job, if any. It is not stored in the .blend, which may be saved meanwhile."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ import bpy
 
 @dataclass(frozen=True)
 class Running:
-    """scene: the name of the scene it works for; panel: the stage that shows it; stage: of the job;
-    fraction of the whole job done; left: seconds that it will still take, None unknown."""
+    """State of the running job.
+
+    scene: name of its scene; panel: the stage that shows the progress; stage: step of the job;
+    fraction: done, 0–1; left: remaining seconds, None if unknown.
+    """
 
     scene: str
     panel: str
@@ -19,8 +22,8 @@ class Running:
     left: float | None = None
 
     @property
-    def said(self) -> str:
-        """For the progress bar."""
+    def text(self) -> str:
+        """Text of the progress bar."""
         return self.stage if self.left is None else f"{self.stage}, {_time(self.left)} left"
 
 
@@ -28,20 +31,20 @@ _now: Running | None = None
 
 
 def running(scene: bpy.types.Scene) -> Running | None:
-    """What runs for this scene."""
+    """The job that runs for this scene, or None."""
     return _now if _now is not None and _now.scene == scene.name else None
 
 
-def tell(state: Running | None) -> None:
-    """Set or clear what runs, and have the sidebar of every 3D viewport show it: what stands in the
-    viewport has not changed, and drawing that may take longer than a step of the job."""
+def set_running(state: Running | None) -> None:
+    """Set or clear the running job, and redraw the sidebars of all 3D viewports. The viewports
+    themselves are not redrawn, which could take longer than a step of the job."""
     global _now
     _now = state
     redraw()
 
 
 def redraw() -> None:
-    """Every 3D viewport, with its sidebar."""
+    """Redraw the sidebar of every 3D viewport."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":

@@ -1,4 +1,4 @@
-"""What Patina remembers in a .blend, on the scene."""
+"""Patina's data in a .blend: scene properties, and results in text data-blocks."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ RESULT, DIAGNOSIS = "Patina result", "Patina diagnosis"  # names of texts
 
 
 class PatinaCause(bpy.types.PropertyGroup):
-    """A cause that a check named; ``name`` is the word of the vocabulary."""
+    """A cause that a check found; ``name`` is its identifier."""
 
     use: bpy.props.BoolProperty(  # type: ignore[valid-type]
-        name="Take into Account",
-        description="Rid the samples of this before the materials are fitted to them",
+        name="Include in Model",
+        description="Correct the samples for this effect before the materials are fitted",
         default=True,
     )
 
@@ -30,26 +30,29 @@ class PatinaScene(bpy.types.PropertyGroup):
 
     capture: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Capture",
-        description="The capture file: which scan, which lit photos, which light (*.capture.toml)",
+        description="Capture file with scan, lit photos and lights (*.capture.toml)",
         subtype="FILE_PATH",
     )
     mesh: bpy.props.PointerProperty(  # type: ignore[valid-type]
         name="Scanned Mesh",
-        description="The mesh that the measured materials are put on",
+        description="Mesh that the measured materials are assigned to",
         type=bpy.types.Object,
         poll=lambda self, candidate: candidate.type == "MESH",
     )
     use_slots: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Fit These Materials",
-        description="Fit one material to each material slot of the scanned mesh, instead of those "
-        "of the capture file",
+        description="Fit one material for each material slot of the scanned mesh, instead of the "
+        "materials of the capture file",
     )
     causes: bpy.props.CollectionProperty(type=PatinaCause)  # type: ignore[valid-type]
 
 
 def store_result(capture: str, description: dict[str, Any], kind: str = RESULT) -> None:
-    """Keep what a fit (or a check) found in the .blend, as result.json (diagnosis.json) has it: one
-    text data-block a capture and kind."""
+    """Store the result of a fit or a check in the .blend, as one text data-block per capture and
+    kind.
+
+    description: the content of result.json or diagnosis.json; kind: RESULT or DIAGNOSIS.
+    """
     text = _text(capture, kind) or bpy.data.texts.new(kind)
     text[CAPTURE] = capture
     text.clear()
@@ -58,30 +61,30 @@ def store_result(capture: str, description: dict[str, Any], kind: str = RESULT) 
 
 
 def stored_result(capture: str, kind: str = RESULT) -> dict[str, Any] | None:
-    """What the last fit (or check) of that capture in this .blend found, or None. Not to be
-    changed: who asks again is given the same."""
+    """The stored result of the last fit or check of a capture, or None. The object is cached and
+    must not be changed."""
     text = _text(capture, kind)
     return None if text is None else _parsed(text.as_string())
 
 
-@lru_cache(maxsize=8)  # panels ask at every redraw
+@lru_cache(maxsize=8)  # panels read it at every redraw
 def _parsed(text: str) -> dict[str, Any] | None:
     try:
         found = json.loads(text)
-    except ValueError:  # the artist typed into it
+    except ValueError:  # the user has edited the text
         return None
     return found if isinstance(found, dict) else None
 
 
 def capture_path(scene: bpy.types.Scene) -> str:
-    """The scene's capture file as an absolute path, "" where there is none."""
-    told = scene.patina.capture
-    return str(Path(bpy.path.abspath(told)).resolve()) if told else ""
+    """Absolute path of the scene's capture file, "" if there is none."""
+    path = scene.patina.capture
+    return str(Path(bpy.path.abspath(path)).resolve()) if path else ""
 
 
 def _text(capture: str, kind: str) -> bpy.types.Text | None:
-    mine = (t for t in bpy.data.texts if t.get(CAPTURE) == capture)
-    return next((t for t in mine if t.name.startswith(kind)), None)
+    own = (t for t in bpy.data.texts if t.get(CAPTURE) == capture)
+    return next((t for t in own if t.name.startswith(kind)), None)
 
 
 register, unregister = register_property_factory(

@@ -1,4 +1,4 @@
-"""What is kept while Blender runs, and let go when another file is opened: no .blend holds it."""
+"""Values that are kept in memory until another file is opened, and not stored in the .blend."""
 
 from __future__ import annotations
 
@@ -9,37 +9,37 @@ import bpy
 from .handlers import attach, detach
 
 T = TypeVar("T")
-_all: list[Kept[Any]] = []
+_all: list[KeptValue[Any]] = []
 
 
-class Kept(Generic[T]):
-    """One thing or none."""
+class KeptValue(Generic[T]):
+    """Holds one value or None."""
 
     def __init__(self) -> None:
-        self.thing: T | None = None
+        self.value: T | None = None
         _all.append(self)
 
     def forget(self) -> None:
-        """Let it go."""
-        self.thing = None
+        """Discard the value."""
+        self.value = None
 
 
 @bpy.app.handlers.persistent
 def _forget(*_: object) -> None:
-    """Another file is opened."""
-    for one in _all:
-        one.forget()
+    """Discard all values before another file is loaded."""
+    for kept in _all:
+        kept.forget()
 
 
 HANDLERS = (("load_pre", _forget),)
 
 
 def register() -> None:
-    """Watch for another file."""
+    """Add the handler for loading files."""
     attach(HANDLERS)
 
 
 def unregister() -> None:
-    """No more, and forget everything."""
+    """Remove the handler and discard all values."""
     detach(HANDLERS)
     _forget()

@@ -1,1 +1,1 @@
-"""Charts, photo comparisons and evidence shown in Blender's editors."""
+"""Charts, photo comparisons and evidence of causes in Blender's editors."""

@@ -1,4 +1,4 @@
-"""The stages of the work: what each has, what it lacks, and what to press next."""
+"""The stages of the workflow: what is present, what is missing, and the next operator."""
 
 from __future__ import annotations
 
@@ -17,9 +17,12 @@ from ..session.scene_properties import DIAGNOSIS, capture_path, stored_result
 
 @dataclass(frozen=True)
 class Stage:
-    """has: what is there, a line each; missing: what is to be done, None where nothing is; press:
-    the operator that does it; again: what its button says where it is done; optional: whether the
-    next stage does not wait for it."""
+    """State of one stage.
+
+    has: lines on what is present; missing: what remains to be done, None if nothing; press: the
+    operator for it; again: label of its button when the stage is done, "" for no button; optional:
+    whether later stages can start without it.
+    """
 
     has: tuple[str, ...] = ()
     missing: str | None = None
@@ -29,12 +32,12 @@ class Stage:
 
     @property
     def done(self) -> bool:
-        """Whether nothing is left to do."""
+        """Whether nothing remains to be done."""
         return self.missing is None
 
 
 def stages(scene: bpy.types.Scene) -> dict[str, Stage]:
-    """By name, in the order of the work."""
+    """The stages by name, in workflow order."""
     capture, mesh = capture_path(scene), scene.patina.mesh
     there = mesh is not None and mesh.name in scene.objects
     result, diagnosis = stored_result(capture), stored_result(capture, DIAGNOSIS)
@@ -49,8 +52,8 @@ def stages(scene: bpy.types.Scene) -> dict[str, Stage]:
 
 
 def next_stage(found: dict[str, Stage]) -> str | None:
-    """The first that is not done and that the rest waits for; where none is, the last of those that
-    nothing waits for."""
+    """The first required stage that is not done; if there is none, the last optional one; None if
+    all are done."""
     waiting = [name for name, stage in found.items() if not stage.done]
     needed = [name for name in waiting if not found[name].optional]
     return next(iter(needed or waiting[::-1]), None)
@@ -67,9 +70,9 @@ def _scan(mesh: bpy.types.Object | None) -> Stage:
 
 def _photos(lit: list[PatinaPhoto]) -> Stage:
     if not lit:
-        return Stage(missing="No lit photos yet: a capture names them")
+        return Stage(missing="No lit photos yet; import a capture, which lists them")
     lights = {photo.light for photo in lit}
-    return Stage((f"{_many(len(lit), 'lit photo')}, {_many(len(lights), 'light')}",))
+    return Stage((f"{_count(len(lit), 'lit photo')}, {_count(len(lights), 'light')}",))
 
 
 def _masks(
@@ -80,40 +83,40 @@ def _masks(
     mesh, has = scene.patina.mesh, []
     if mesh is not None and mesh.type == "MESH" and scene.patina.use_slots:
         names = [shown_name(s.material) for s in mesh.material_slots if s.material]
-        has.append(f"{_many(len(names), 'material')} on the mesh: {', '.join(names)}")
+        has.append(f"{_count(len(names), 'material')} on the mesh: {', '.join(names)}")
     elif result is not None:
         names = [material["name"] for material in result.get("materials", [])]
-        has.append(f"{_many(len(names), 'material')}: {', '.join(names)}")
+        has.append(f"{_count(len(names), 'material')}: {', '.join(names)}")
     masks = shadow_images(capture)
     if masks:
-        has.append(_many(len(masks), "shadow mask"))
+        has.append(_count(len(masks), "shadow mask"))
         return Stage(tuple(has))
-    said = "No shadow masks: shadows are then found from the mesh alone"
-    return Stage(tuple(has), said, "patina.shadow_masks", optional=True)
+    missing = "No shadow masks; shadows are computed from the mesh only"
+    return Stage(tuple(has), missing, "patina.shadow_masks", optional=True)
 
 
 def _fit(result: dict | None) -> Stage:  # type: ignore[type-arg]
     if result is None:
         return Stage(missing="Not measured yet", press="patina.fit")
-    has = f"{_many(len(result.get('materials', [])), 'material')} measured"
-    return Stage((has,), press="patina.fit", again="Fit Anew")
+    has = f"{_count(len(result.get('materials', [])), 'material')} measured"
+    return Stage((has,), press="patina.fit", again="Fit Again")
 
 
 def _check(diagnosis: dict | None) -> Stage:  # type: ignore[type-arg]
     if diagnosis is None:
-        said = "Not checked yet: is the light, the camera, the mesh what the capture says?"
-        return Stage((), said, "patina.check", optional=True)
-    named = [cause.replace("_", " ") for cause in diagnosis["named"] if cause != "none"]
-    has = f"Found: {', '.join(named)}" if named else "Nothing that can be named"
-    return Stage((has,), press="patina.check", again="Check Anew")
+        missing = "Not checked yet: do lights, cameras and mesh agree with the photos?"
+        return Stage((), missing, "patina.check", optional=True)
+    causes = [cause.replace("_", " ") for cause in diagnosis["named"] if cause != "none"]
+    has = f"Found: {', '.join(causes)}" if causes else "No known cause found"
+    return Stage((has,), press="patina.check", again="Check Again")
 
 
 def _material(capture: str) -> Stage:
     found = measured_of(capture)
     if not found:
-        return Stage(missing="Nothing measured yet")
-    return Stage((_many(len(found), "measured material"),))
+        return Stage(missing="No measured materials yet")
+    return Stage((_count(len(found), "measured material"),))
 
 
-def _many(count: int, what: str) -> str:
+def _count(count: int, what: str) -> str:
     return f"{count} {what}{'' if count == 1 else 's'}"

@@ -110,9 +110,9 @@ def test_every_light_is_read_back() -> None:
     scan = a_scan(2)
     photos = sorted((scan / "lit").iterdir())
     for lamp, way in (
-        (new.LampWords.flash((0.1, -0.2, 0.0)), "mounted"),
-        (new.LampWords.sun(), "sun"),
-        (new.LampWords.distant((0, 0, 1)), "direction"),
+        (new.LampText.flash((0.1, -0.2, 0.0)), "mounted"),
+        (new.LampText.sun(), "sun"),
+        (new.LampText.distant((0, 0, 1)), "direction"),
     ):
         out = new.free_name(scan, "again")
         new.write_new_capture(out, scan / "sparse", scan / "mesh.ply", photos, lamp)
@@ -174,8 +174,8 @@ def test_photos_of_an_open_capture_become_another_one() -> None:
     told["files"] = files("other.exr")
     assert "other.exr" in refused(bpy.ops.patina.drop_photos, **told)
     state = extension("scene.session.running_job")
-    state.tell(state.Running(bpy.context.scene.name, "fit", "sampling", 0.5))
+    state.set_running(state.Running(bpy.context.scene.name, "fit", "sampling", 0.5))
     try:
         assert not bpy.ops.patina.drop_photos.poll()
     finally:
-        state.tell(None)
+        state.set_running(None)

@@ -161,7 +161,7 @@ def test_a_folder_with_other_files_is_left_alone() -> None:
     mine = path.parent / "surface.binary"
     mine.write_bytes(b"mine")
     told = {"directory": str(path.parent.parent), "folder": "ball", "formats": {"binary"}}
-    assert "no earlier export" in refused(**told) and mine.read_bytes() == b"mine"
+    assert "not from an earlier export" in refused(**told) and mine.read_bytes() == b"mine"
     told["folder"] = ""
     for _ in range(2):  # again: replaced
         assert bpy.ops.patina.export(**told) == {"FINISHED"}

@@ -164,7 +164,7 @@ def test_a_damaged_property_does_not_stop_the_handlers() -> None:
     for told in ("{", "5", "[]", '{"solid": 5}', '{"solid": [1, "x", {}]}', "[" * 5000):
         material["patina_as_measured"] = told
         material["patina_measured_sampling"] = "../../evil.pth"
-        parts.put_back(material)
+        parts.restore_inputs(material)
         assert "patina_as_measured" not in material
         assert material.get("patina_sampling") != "../../evil.pth"
 
@@ -177,7 +177,7 @@ def test_values_put_back_lead_to_no_other_file() -> None:
     shader = {"label": "as measured", "values": {"sampling": "/etc/passwd"}}
     kept = {"solid": [[1, 0, 0, 1], 0, 1], "principled": None, "lobes": None, "shaders": [shader]}
     material["patina_as_measured"] = json.dumps(kept)
-    parts.put_back(material)
+    parts.restore_inputs(material)
     (node,) = files.script_nodes(material)
     sockets = {s.identifier: s for s in node.inputs}
     assert node.label == "as measured" and tuple(material.diffuse_color) == (1, 0, 0, 1)

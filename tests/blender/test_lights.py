@@ -108,7 +108,7 @@ def test_lights_are_saved_and_come_back() -> None:
     try:
         bpy.ops.patina.save_lights(filepath=str(out))
     except RuntimeError as error:
-        assert "there already" in str(error)
+        assert "the file exists already" in str(error)
     else:
         raise AssertionError("a file was replaced unasked")
     bpy.ops.patina.save_lights(filepath=str(path), check_existing=False)  # into its own file
@@ -129,7 +129,7 @@ def test_a_dark_lamp_is_one_message() -> None:
     try:
         bpy.ops.patina.fit()
     except RuntimeError as error:
-        assert "gives no light" in str(error) and "Traceback" not in str(error)
+        assert "emits no light" in str(error) and "Traceback" not in str(error)
     else:
         raise AssertionError("a lamp without light was fitted with")
 
@@ -167,7 +167,7 @@ def test_the_panel_says_what_was_done_by_hand() -> None:
     assert drawn() == ["Lamp: lamp"]
     lamp("lamp").location.x += 1
     lamp("lamp").data.energy *= 2
-    assert drawn() == ["Lamp: lamp", "Moved, strength by hand", "patina.save_lights"]
+    assert drawn() == ["Lamp: lamp", "Position, strength edited", "patina.save_lights"]
     bpy.ops.patina.next_photo(step=-1)
     assert drawn() == ["Flash: flash"]
     lights = [
@@ -180,4 +180,4 @@ def test_the_panel_says_what_was_done_by_hand() -> None:
     )
     assert drawn() == ["Flash: flash", "Refined: right 0.432 scan units"]
     bpy.data.objects.remove(lamp("flash"))
-    assert drawn() == ["flash: its lamp is gone"]
+    assert drawn() == ["flash: lamp not in scene"]

@@ -119,10 +119,10 @@ def test_the_cache_folder_takes_what_has_no_place() -> None:
 def fill(place: Path) -> list[Path]:
     """Files of every kind, oldest first, 1 MB each; the last two are none of the cache's."""
     names = (
-        "files/patina_components_1.exr",
+        "files/patina_components_0123456789ab.exr",
         "files/rectified/ball-1/photo.exr",
         "merl_basis_1.npz",
-        "files/patina_brdf_1.exr",
+        "files/patina_brdf_0123456789ab.exr",
         "files/masks/ball-1/painted.png",
         "files/mine.exr",
     )

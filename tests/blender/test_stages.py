@@ -134,13 +134,13 @@ def test_a_deleted_camera_is_passed_over() -> None:
 
 def test_time_left_is_told_in_round_numbers() -> None:
     state = extension("scene.session.running_job")
-    for seconds, said in (
+    for seconds, text in (
         (None, "x"),
         (3, "x, 5 s left"),
         (43, "x, 45 s left"),
         (200, "x, 3 min left"),
     ):
-        assert state.Running("s", "fit", "x", 0.5, seconds).said == said
+        assert state.Running("s", "fit", "x", 0.5, seconds).text == text
 
 
 def test_a_measured_material_is_an_asset_that_knows_where_it_is_from() -> None:
@@ -158,7 +158,7 @@ def test_a_measured_material_is_an_asset_that_knows_where_it_is_from() -> None:
     assert bpy.ops.patina.mark_assets() == {"FINISHED"}
     data = material.asset_data
     assert {"Patina", "measured", "surface", "ball"} == {tag.name for tag in data.tags}
-    assert "3 lit photos" in data.description and "unseen photos" in data.description
+    assert "3 lit photos" in data.description and "held-out photos" in data.description
     told = material["patina_provenance"]
     assert told["date"].endswith(material["patina_date"]) and "ball.capture.toml" in told["scan"]
     bpy.ops.patina.mark_assets()  # again: the same

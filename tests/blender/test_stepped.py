@@ -68,7 +68,7 @@ def test_esc_leaves_the_file_as_it_was() -> None:
 def test_no_event_passes_while_a_result_is_taken_over() -> None:
     assert bpy.ops.patina.import_demo() == {"FINISHED"}
     operator = of("masks", "PATINA_OT_propose_materials")
-    while operator._taking is None:
+    while operator._applying is None:
         time.sleep(operator.TICK)
         assert operator.modal(bpy.context, TIMER) == {"RUNNING_MODAL"}
     assert operator.modal(bpy.context, ESC) == {"RUNNING_MODAL"}

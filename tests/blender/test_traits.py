@@ -97,15 +97,15 @@ def test_the_sphere_and_the_shader_follow_at_once() -> None:
         np.testing.assert_allclose(coefficients(material), expected, rtol=1e-6)
         assert not np.allclose(as_fitted, expected, atol=step / 4)
     moved = extension("scene.material.trait_offsets")
-    np.testing.assert_allclose(moved.moved_brdf(material).coefficients[:, :8], expected)
+    np.testing.assert_allclose(moved.edited_brdf(material).coefficients[:, :8], expected)
     small = preview(material)
-    assert small.shape[0] == moved.QUICK
-    blocks = first.reshape(moved.QUICK, 2, moved.QUICK, 2, 4).mean(axis=(1, 3))
+    assert small.shape[0] == moved.QUICK_SIZE
+    blocks = first.reshape(moved.QUICK_SIZE, 2, moved.QUICK_SIZE, 2, 4).mean(axis=(1, 3))
     assert np.abs(small - blocks).max() > 0.2
     with Plainer() as follow:
-        follow.settle()
-        assert not follow.behind(material)
-    large = preview(material).reshape(moved.QUICK, 2, moved.QUICK, 2, 4).mean(axis=(1, 3))
+        follow.finish_updates()
+        assert not follow.outdated_pieces(material)
+    large = preview(material).reshape(moved.QUICK_SIZE, 2, moved.QUICK_SIZE, 2, 4).mean(axis=(1, 3))
     assert np.abs(small - large).mean() < 0.01, "the sphere in full is the same sphere"
 
 
@@ -129,15 +129,15 @@ def test_reset_brings_back_what_was_measured_to_the_bit() -> None:
         for name, value in (("trait_1", 1.5), ("trait_4", -2.0)):
             setattr(material.patina_traits.every, name, value)
         material.patina_traits.blue.trait_3 = 0.7
-        follow.settle()
-        assert not follow.behind(material)
+        follow.finish_updates()
+        assert not follow.outdated_pieces(material)
         after = look(material)
         assert after["coefficients"] == before["coefficients"]
         for name in ("principled", "lobes", "solid"):
             assert after[name] != before[name], name
         images = {image.name for image in bpy.data.images}
         material.patina_traits.every.trait_2 = 1.0
-        follow.settle()
+        follow.finish_updates()
         assert len({image.name for image in bpy.data.images} - images) <= 1
     assert bpy.ops.patina.reset_traits() == {"FINISHED"}
     assert not extension("scene.material.trait_offsets").shifts(material).any()
@@ -146,7 +146,7 @@ def test_reset_brings_back_what_was_measured_to_the_bit() -> None:
     assert not {"patina_traits_shown", "patina_as_measured", "patina_measured_sampling"} & {
         *material.keys()
     }
-    assert not extension("scene.material.trait_update").behind(material)
+    assert not extension("scene.material.trait_update").outdated_pieces(material)
 
 
 def test_a_slider_back_at_0_is_as_measured_too() -> None:
@@ -154,10 +154,10 @@ def test_a_slider_back_at_0_is_as_measured_too() -> None:
     before, sphere = look(material), preview(material)
     with Plainer() as follow:
         material.patina_traits.every.trait_1 = 1.0
-        follow.settle()
+        follow.finish_updates()
         material.patina_traits.every.trait_1 = 0.0
         assert look(material) == before
-        follow.settle()
+        follow.finish_updates()
         np.testing.assert_array_equal(preview(material), sphere)
 
 
@@ -171,18 +171,18 @@ def test_undo_and_redo_agree_with_the_sliders() -> None:
     with Plainer() as follow:
         material.patina_traits.every.trait_1 = 1.0
         bpy.ops.ed.undo_push(message="slider")  # before the rest has followed, as Blender does
-        follow.settle()
+        follow.finish_updates()
         moved, shown = look(material), preview(material)
         bpy.ops.ed.undo()
         material = bpy.data.materials[name]
         assert material.patina_traits.every.trait_1 == 0.0
         assert look(material) == before
-        follow.settle()
+        follow.finish_updates()
         np.testing.assert_array_equal(preview(material), sphere)
         bpy.ops.ed.redo()
         material = bpy.data.materials[name]
         assert material.patina_traits.every.trait_1 == 1.0
-        follow.settle()
+        follow.finish_updates()
         assert look(material) == moved
         np.testing.assert_array_equal(preview(material), shown)
         bpy.ops.patina.reset_traits()
@@ -195,12 +195,12 @@ def test_sliders_and_look_are_saved_and_a_new_fit_has_none() -> None:
     with Plainer() as follow:
         material.patina_traits.every.trait_1 = 0.75
         bpy.ops.wm.save_as_mainfile(filepath=str(blend))  # in the background: settles
-        assert not follow.behind(material)
+        assert not follow.outdated_pieces(material)
         moved, sphere = look(material), preview(material)
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     material = bpy.data.materials["surface"]
     assert material.patina_traits.every.trait_1 == 0.75
-    assert look(material) == moved and not follow.behind(material)
+    assert look(material) == moved and not follow.outdated_pieces(material)
     np.testing.assert_allclose(preview(material), sphere, atol=1 / 255)
     bpy.ops.patina.reset_traits()
     again = look(material)
@@ -222,7 +222,7 @@ def test_the_timer_follows_and_goes() -> None:
         end = time.monotonic() + 120
         while (wait := follow._tick()) is not None and time.monotonic() < end:
             time.sleep(wait)
-        assert not follow.behind(material)
+        assert not follow.outdated_pieces(material)
         material.patina_traits.every.trait_3 = 2.0
         while follow._work is None:
             time.sleep(follow._tick())
@@ -241,12 +241,12 @@ def test_the_timer_follows_and_goes() -> None:
 def test_the_panel_says_what_cannot_be() -> None:
     material = measured()
     box, moved = extension("panels.traits_box"), extension("scene.material.trait_offsets")
-    words = moved.words_of(material["patina_basis"])
+    words = moved.slider_labels(material["patina_basis"])
     assert len(words) == 8 and all(words)
     assert not box.notes(material)
     material.patina_traits.every.trait_2 = -4.0
     said = " ".join(line for line, _ in box.notes(material))
-    assert "times the light" in said and "Component 2" in said and "EEVEE" in said
+    assert "the albedo is" in said and "component 2" in said and "EEVEE" in said
     assert extension("scene.material.trait_properties").shown_material(bpy.context) == material
     del material["patina_basis"], material["patina_coefficients"]
     assert extension("scene.material.trait_properties").shown_material(bpy.context) is None
@@ -287,12 +287,12 @@ def test_the_panel_draws_a_slider_a_component_with_what_it_does() -> None:
     assert "1 Stronger, sharper highlight" in layout.drawn and "surface" in layout.drawn
     assert sum(line[:1].isdigit() for line in layout.drawn) == 8
     assert layout.drawn[-1] == "patina.reset_traits"
-    word = extension("panels.traits_box").standing_word
+    word = extension("panels.traits_box").status_label
     assert word(material, False) == "Measured"
     material.patina_traits.green.trait_2 = -0.5
     assert word(material, False) == "Changed"
     bpy.ops.patina.mark_assets()
-    assert "changed by hand" in material.asset_data.description
+    assert "traits edited after the fit" in material.asset_data.description
 
 
 def test_a_material_whose_basis_is_not_here_stays_as_it_is() -> None:
@@ -301,5 +301,5 @@ def test_a_material_whose_basis_is_not_here_stays_as_it_is() -> None:
     material["patina_basis"] = "0123456789ab"
     material.patina_traits.every.trait_1 = 1.0
     assert look(material) == before and not bpy.ops.patina.reset_traits.poll()
-    extension("scene.material.trait_update").settle()
+    extension("scene.material.trait_update").finish_updates()
     assert look(material) == before

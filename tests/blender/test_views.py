@@ -29,7 +29,7 @@ def fitted() -> bpy.types.Material:
 
 def in_memory() -> bool:
     """Whether the fit itself is still there."""
-    return extension("scene.session.last_fit")._last.thing is not None
+    return extension("scene.session.last_fit")._last.value is not None
 
 
 def pixels(image: bpy.types.Image) -> np.ndarray:
@@ -54,7 +54,7 @@ def test_the_material_keeps_what_it_was_measured_by() -> None:
         subject = extension("scene.material.material_evidence").subject_of(
             bpy.data.materials["surface"]
         )
-    job = extension("scene.session.last_fit")._last.thing
+    job = extension("scene.session.last_fit")._last.value
     kept_points, points = job.materials[0].points, subject.points
     assert np.array_equal(points.rho, kept_points.rho)
     low, high = subject.interval(points.angles)
@@ -72,7 +72,7 @@ def test_every_chart_is_shown_and_survives_a_reload() -> None:
         assert pictures[kind][..., :3].std() > 0.02, kind
     views = bpy.context.scene.patina_views
     assert views.shown == "interval"
-    best = extension("core.views.charts").most_measured(
+    best = extension("core.views.charts").best_sampled_theta_d(
         extension("scene.material.material_evidence").subject_of(bpy.data.materials["surface"])
     )
     assert abs(np.degrees(views.theta_d) - best) < 0.01, "the highlight where most samples are"
@@ -105,7 +105,7 @@ def test_fits_are_compared() -> None:
     try:
         bpy.ops.patina.show_chart(kind="ratio")
     except RuntimeError as error:
-        assert "fitted once" in str(error)
+        assert "fitted only once" in str(error)
     else:
         raise AssertionError("a ratio to nothing")
     charted.keep_earlier(material, material.copy())

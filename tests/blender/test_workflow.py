@@ -303,7 +303,7 @@ def test_a_capture_comes_in_once_and_again_when_deleted() -> None:
     try:
         bpy.ops.patina.import_capture(filepath=str(path))
     except RuntimeError as error:
-        assert "in the scene already" in str(error)
+        assert "already in the scene" in str(error)
     else:
         raise AssertionError("the same capture came in twice")
     assert counts() == before
@@ -357,9 +357,9 @@ def test_fit_without_its_mesh_says_so() -> None:
 
 def test_a_running_fit_is_not_saved() -> None:
     state, path = extension("scene.session.running_job"), folder() / "running.blend"
-    state.tell(state.Running(bpy.context.scene.name, "fit", "sampling the photos", 0.5))
+    state.set_running(state.Running(bpy.context.scene.name, "fit", "sampling the photos", 0.5))
     assert state.running(bpy.context.scene) is not None
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    state.tell(None)
+    state.set_running(None)
     bpy.ops.wm.open_mainfile(filepath=str(path))
     assert state.running(bpy.context.scene) is None

@@ -261,7 +261,7 @@ class TestMerlFolder:
             cached_basis(folder, expected={**good, "b.binary": "0"}, cache=tmp_path)
         short = tmp_path / "c.binary"
         short.write_bytes((folder / "c.binary").read_bytes()[:-8])
-        with pytest.raises(InputError, match=r"c\.binary.*not whole"):
+        with pytest.raises(InputError, match=r"c\.binary.*incomplete"):
             cached_basis(tmp_path, expected={"c.binary": good["c.binary"]}, cache=tmp_path)
 
     def test_the_hundred_sums_ship(self, shared: Path) -> None:

@@ -16,9 +16,9 @@ from patina.core.diagnose.effects.area_light import AreaLight
 from patina.core.diagnose.effects.vignetting import Vignetting
 from patina.core.diagnose.forward.material_brdfs import MaterialBRDFs
 from patina.core.diagnose.solver.model import Model
-from patina.core.fit.held_out import HeldOut
+from patina.core.fit.held_out import HeldOutErrors
 from patina.core.jobs import highlight_deconvolution_passes
-from patina.core.jobs.highlight_deconvolution_passes import fitted_sharply
+from patina.core.jobs.highlight_deconvolution_passes import fit_with_deconvolution
 from tests.core.test_corrected import rows_of, table_of
 from tests.make_lit_ball import GLOSSY, changed, lit_ball
 
@@ -47,8 +47,8 @@ def test_what_a_wide_lamp_shows_is_predicted_of_every_photo(wide):
     rows = rows_of(found.table, lit_ball(7, GLOSSY))
     np.testing.assert_allclose(found.table.radiance, shown[rows], rtol=2e-3, atol=1e-6)
     for photo in np.unique(found.table.photo):
-        judged = found.blur.left_out(found.table, int(photo), brdf)
-        assert judged.missed < 1e-5 * judged.size
+        judged = found.blur.predict_held_out(found.table, int(photo), brdf)
+        assert judged.squared_error < 1e-5 * judged.size
         held = found.table.select(found.table.photo == photo)
         assert judged.size == pytest.approx(np.sum((held.response * held.radiance) ** 2), rel=1e-4)
 
@@ -93,7 +93,7 @@ def _brdf(context) -> PrincipalBRDF:
         ([0.10, 0.10, 0.10], 1, True),  # unless somebody asked for it
         ([0.10, 0.07, 0.069], 1, False),  # a second pass sharpens noise
         ([0.10, 0.07, 0.05, 0.06], 2, False),
-        ([0.10, 0.08, 0.06, 0.05, 0.04], highlight_deconvolution_passes.PASSES, False),
+        ([0.10, 0.08, 0.06, 0.05, 0.04], highlight_deconvolution_passes.MAX_PASSES, False),
         ([None, None], 1, False),  # of one photo nothing is unseen
     ],
 )
@@ -104,7 +104,7 @@ def test_passes_end_where_unseen_photos_gain_no_more(errors, taken, exactly):
         def sharpened(self, table, brdf):
             return f"{table} sharper than {brdf}"
 
-        def left_out(self, table, photo, brdf):
+        def predict_held_out(self, table, photo, brdf):
             raise AssertionError("nothing is fitted here")
 
     def again(table, judge, start, share):
@@ -112,10 +112,12 @@ def test_passes_end_where_unseen_photos_gain_no_more(errors, taken, exactly):
         error = errors[len(tables)]
         tables.append(table)
         yield Step("", start + share)
-        held = None if error is None else HeldOut(error, error, {0: error, 1: 2 * error})
+        held = None if error is None else HeldOutErrors(error, error, {0: error, 1: 2 * error})
         return SimpleNamespace(held_out=held, fit=SimpleNamespace(brdf=len(tables) - 1))
 
-    steps = fitted_sharply(CorrectedSamples("samples", {}, Blur()), again, 0.2, 0.5, exactly)
+    steps = fit_with_deconvolution(
+        CorrectedSamples("samples", {}, Blur()), again, 0.2, 0.5, exactly
+    )
     fractions = []
     while True:
         try:

@@ -44,10 +44,10 @@ WRONG = {
     "distant with intensity": (["direction = [0, 0, 1]", "intensity = [1, 1, 1]"], "expected irra"),
     "beam of a lamp": (["position = [0, 0, 1]", "beam = 30"], "unknown key 'beam'"),
     "radius of a sun": (["direction = [0, 0, 1]", "radius = 2"], "unknown key 'radius'"),
-    "no zone": (['sun = {time = "2018-06-01T12:00:00"}'], "has no zone"),
-    "no such day": (['sun = {time = "2018-06-31T12:00:00+09:00"}'], "is no date"),
-    "half a place": (["sun = {latitude = 3.0}"], "belong together"),
-    "up without north": (["sun = {up = [0, 0, 1]}"], "belong together"),
+    "no zone": (['sun = {time = "2018-06-01T12:00:00"}'], "has no time zone"),
+    "no such day": (['sun = {time = "2018-06-31T12:00:00+09:00"}'], "is not a date"),
+    "half a place": (["sun = {latitude = 3.0}"], "only one of latitude and longitude"),
+    "up without north": (["sun = {up = [0, 0, 1]}"], "only one of north and up"),
     "sphere without camera": (['sphere = {photo = "lit_1.exr"}'], "'camera' is missing"),
     "half an outline": (
         ['sphere = {photo = "lit_1.exr", camera = "view_01", radius = 4}'], "center and radius",
@@ -60,7 +60,8 @@ WRONG = {
     ),
     "white twice": (
         ["direction = [0, 0, 1]", "irradiance = [1, 1, 1]",
-         'white = {photo = "lit_1.exr", mask = "lit_1.exr", reflectance = 0.9}'], "leave one",
+         'white = {photo = "lit_1.exr", mask = "lit_1.exr", reflectance = 0.9}'],
+        "given more than once",
     ),
     "white of a flash": (
         ["mounted = [0, 0, 0]",
@@ -189,15 +190,15 @@ def test_a_white_target_is_read_with_the_photos_curve(ball: Path) -> None:
     assert light.irradiance == pytest.approx(np.full(3, np.pi * 0.5 / 0.9), rel=1e-3)
     assert not any("sRGB" in note for note in found.notes)
     photo = read_photo(folder / "white.png", "linear")
-    assert not any("assumed" in note or "taken as sRGB" in note for note in photo.info.notes)
-    assert any("taken as sRGB" in note for note in read_photo(folder / "white.png").info.notes)
+    assert not any("assumed" in note or "read as sRGB" in note for note in photo.info.notes)
+    assert any("read as sRGB" in note for note in read_photo(folder / "white.png").info.notes)
 
 
 def test_strengths_for_all_lights_or_none(ball: Path) -> None:
     path = ball
     text = path.read_text().replace("irradiance = [3.0, 3.0, 3.0]\n", "", 1)
     path.write_text(text)
-    with pytest.raises(InputError, match=r"light 1\.irradiance.*all or none"):
+    with pytest.raises(InputError, match=r"light 1\.irradiance.*for all lights or for none"):
         read_capture(path)
 
 
@@ -206,7 +207,9 @@ def test_exposures_that_only_some_photos_state(ball: Path) -> None:
     pixels = np.full((90, 120, 3), 128, np.uint8)
     write_jpeg(folder / "one.jpg", pixels, exposure=1 / 60)
     path.write_text(path.read_text().replace('"lit_2.exr"', '"one.jpg"'))
-    with pytest.raises(InputError, match=r"photo 1\.exposure.*lit_1.exr does not say how"):
+    with pytest.raises(
+        InputError, match=r"photo 1\.exposure.*lit_1.exr has no exposure in its EXIF"
+    ):
         LitPhotos.open(read_capture(path))
 
 

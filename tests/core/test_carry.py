@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from patina.core.geometry import RayScene, view_surface
-from patina.core.masks.carry import NONE, SeenFaces, carried
+from patina.core.masks.carry import NONE, VisibleFaces, updated_labels
 from patina.core.scan import Camera, Mesh, Pose
 
 SIZE = 120
@@ -36,12 +36,12 @@ def test_there_and_back(level: int) -> None:
     camera, mesh = _camera(), _ball(level)
     _looks_at(camera)
     rays = RayScene.build(mesh)
-    seen = SeenFaces.of(rays, camera)
+    seen = VisibleFaces.of(rays, camera)
     truth = (mesh.vertices[mesh.faces].mean(axis=1)[:, 0] > 0.1).astype(np.int32)
     image = seen.image(truth)
     assert set(np.unique(image)) == {NONE, 0, 1}
     nobody = np.full(len(truth), 7, np.int32)
-    found = carried(nobody, seen.votes(image, 2, len(truth)))
+    found = updated_labels(nobody, seen.votes(image, 2, len(truth)))
     met = found != 7
     assert (found[met] == truth[met]).mean() > (0.999 if level == 2 else 0.97)
     middle = mesh.vertices[mesh.faces].mean(axis=1)
@@ -52,9 +52,9 @@ def test_there_and_back(level: int) -> None:
 
 def test_a_stroke_does_not_go_through_the_object() -> None:
     camera, mesh = _camera(), _ball(5)
-    seen = SeenFaces.of(RayScene.build(mesh), camera)
+    seen = VisibleFaces.of(RayScene.build(mesh), camera)
     everywhere = np.zeros((SIZE, SIZE), np.int32)
-    found = carried(
+    found = updated_labels(
         np.full(len(mesh.faces), 3, np.int32), seen.votes(everywhere, 1, len(mesh.faces))
     )
     behind = mesh.vertices[mesh.faces].mean(axis=1)[:, 2] < 0
@@ -65,11 +65,11 @@ def test_a_stroke_does_not_go_through_the_object() -> None:
 def test_what_is_not_painted_stays() -> None:
     camera, mesh = _camera(), _ball(4)
     rays = RayScene.build(mesh)
-    seen = SeenFaces.of(rays, camera)
+    seen = VisibleFaces.of(rays, camera)
     labels = np.arange(len(mesh.faces), dtype=np.int32) % 5
     stroke = np.full((SIZE, SIZE), NONE)
     stroke[:, : SIZE // 2] = 1
-    found = carried(labels, seen.votes(stroke, 2, len(labels)))
+    found = updated_labels(labels, seen.votes(stroke, 2, len(labels)))
     view = view_surface(rays, camera)
     right = np.unique(view.face[view.pixel % SIZE >= SIZE // 2 + 3])
     left = np.unique(view.face[view.pixel % SIZE < SIZE // 2 - 3])
@@ -81,16 +81,16 @@ def test_what_is_not_painted_stays() -> None:
 def test_photos_vote_together() -> None:
     """Two photos disagree about a face: what most of its pixels say is taken."""
     votes = np.array([[5, 3, 0], [3, 5, 1], [0, 0, 9], [2, 0, 3], [2, 0, 2]])
-    assert carried(np.full(5, 4), votes).tolist() == [0, 1, 4, 4, 0]
+    assert updated_labels(np.full(5, 4), votes).tolist() == [0, 1, 4, 4, 0]
 
 
 def test_photos_from_both_sides_meet_all_faces() -> None:
     mesh = _ball(5)
     rays = RayScene.build(mesh)
     votes = sum(
-        SeenFaces.of(rays, _camera(side)).votes(np.zeros((SIZE, SIZE), int), 1, len(mesh.faces))
+        VisibleFaces.of(rays, _camera(side)).votes(np.zeros((SIZE, SIZE), int), 1, len(mesh.faces))
         for side in (1.0, -1.0)
     )
-    found = carried(np.full(len(mesh.faces), 3), votes)
+    found = updated_labels(np.full(len(mesh.faces), 3), votes)
     level = np.abs(mesh.vertices[mesh.faces].mean(axis=1)[:, 2])
     assert (found[level > 0.35] == 0).all()

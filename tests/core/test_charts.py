@@ -12,7 +12,7 @@ import pytest
 from patina.core.angles import Angles, half_difference
 from patina.core.errors import PatinaError
 from patina.core.samples import MeasuredPoints, SampleTable
-from patina.core.views.charts import CHARTS, View, chart, most_measured
+from patina.core.views.charts import CHARTS, View, best_sampled_theta_d, chart
 from patina.core.views.drawing import Dots, Drawing, Line, Picture, box
 from patina.core.views.highlight_curve import highlight_curve
 from patina.core.views.image_slice import ratio_slice
@@ -138,7 +138,7 @@ def test_points_are_few_and_spread_and_do_not_depend_on_order() -> None:
     assert np.array_equal(again.rho, found.rho) and np.array_equal(again.photo, found.photo)
     assert not len(MeasuredPoints.of(SampleTable.empty()))
     subject = Subject("x", flat(0.1), None, found)
-    assert most_measured(subject) == pytest.approx(np.degrees(0.5), abs=4)
+    assert best_sampled_theta_d(subject) == pytest.approx(np.degrees(0.5), abs=4)
 
 
 def test_area_of_shapes() -> None:

@@ -26,7 +26,7 @@ from patina.core.diagnose.effects.vignetting import Vignetting
 from patina.core.diagnose.forward.diagnosis_context import DiagnosisContext
 from patina.core.diagnose.forward.material_brdfs import MaterialBRDFs
 from patina.core.diagnose.solver.model import Model
-from patina.core.fit.held_out import predicted as unseen_photo
+from patina.core.fit.held_out import prediction_errors as unseen_photo
 from patina.core.samples import SampleTable
 from tests.make_lit_ball import EACH, GLOSSY, SHARP, changed, lit_ball, shadowed
 

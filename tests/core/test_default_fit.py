@@ -15,10 +15,10 @@ from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.brdf import TabulatedBRDF, metrics, nbrdf
 from patina.core.capture import read_capture
 from patina.core.concurrency.steps import drained
-from patina.core.fit.held_out import predicted, summarise
+from patina.core.fit.held_out import prediction_errors, summarise
 from patina.core.fit.measured_result import MeasuredResult
 from patina.core.jobs.estimators import Estimate, estimate
-from patina.core.jobs.fit_warnings import trust_warnings
+from patina.core.jobs.fit_warnings import quality_warnings
 from patina.core.samples import SampleTable
 from tests import make_capture as made
 from tests.sampled import sampled, sampled_materials
@@ -101,7 +101,7 @@ def test_a_photo_that_is_far_too_bright_is_named(tmp_path: Path) -> None:
     found = fitted(path, "surface", table, "measured", BALL)
     assert isinstance(found.fit, MeasuredResult)
     assert max(found.fit.gains, key=found.fit.gains.__getitem__) == 1
-    said = trust_warnings(found, read_capture(path))
+    said = quality_warnings(found, read_capture(path))
     assert any("lit_2.exr" in told and "brighter" in told for told in said)
 
 
@@ -125,7 +125,7 @@ def test_held_out_error_is_that_of_the_samples() -> None:
         light=np.zeros((n, 3), np.float32), curvature=np.zeros(n, np.float32),
         weight=np.ones(n, np.float32), response=np.ones((n, 3), np.float32),
     )  # fmt: skip
-    held = summarise([predicted(table, photo, brdf) for photo in (0, 3)])
+    held = summarise([prediction_errors(table, photo, brdf) for photo in (0, 3)])
     assert held is not None and set(held.per_photo) == {0, 3}
     for value in (held.error, held.typical, *held.per_photo.values()):
         assert value == pytest.approx(0.1, abs=1e-4)

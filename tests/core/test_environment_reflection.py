@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import nnls
 
-from patina.core.diagnose.effects.environment_reflection import LOBES, MOST, EnvironmentReflection
+from patina.core.diagnose.effects.environment_reflection import (
+    LOBES,
+    MAX_FINE_LOBES,
+    EnvironmentReflection,
+)
 from tests.make_lit_ball import lit_ball
 
 WINDOW = np.array([0.6, -0.3, 0.7]) / np.linalg.norm([0.6, -0.3, 0.7])
@@ -28,7 +32,7 @@ def test_the_edge_of_a_window_is_found_once_it_is_known_where_it_is_bright():
     x, left = described(effect, shown)
     finer = effect.rebuilt(context, x)
     x_finer, left_finer = described(finer, shown)
-    assert LOBES < len(finer.parameters) <= LOBES + MOST
+    assert LOBES < len(finer.parameters) <= LOBES + MAX_FINE_LOBES
     assert len(set(finer.parameters.names)) == len(finer.parameters)
     assert left_finer < 0.5 * left
     angle = np.radians(np.arange(0, 90, 1.0))
@@ -43,4 +47,4 @@ def test_the_edge_of_a_window_is_found_once_it_is_known_where_it_is_bright():
 def test_a_room_that_is_bright_all_over_stays_within_bounds():
     context = lit_ball()
     finer = EnvironmentReflection.of(context).rebuilt(context, np.ones(LOBES))
-    assert len(finer.parameters) == LOBES + MOST
+    assert len(finer.parameters) == LOBES + MAX_FINE_LOBES

@@ -27,7 +27,7 @@ def test_without_the_reference_data_it_says_so(
     monkeypatch.setattr("sys.argv", ["experiments", "check"])
     monkeypatch.setenv("PATINA_SHARED", str(tmp_path))
     assert command.main() == 2
-    assert "reference data is not here" in capsys.readouterr().err
+    assert "found no reference data" in capsys.readouterr().err
 
 
 def test_results_are_kept_apart_from_quick_ones(
@@ -51,9 +51,9 @@ def test_records_come_in_the_order_of_the_tasks() -> None:
 
 def test_only_the_estimators_asked_for_are_run() -> None:
     try:
-        estimators.restrict(["paper"])
+        estimators.select(["paper"])
         assert list(estimators.rows()) == ["paper"]
-        assert estimators.asked("paper") and not estimators.asked("ours")
+        assert estimators.is_selected("paper") and not estimators.is_selected("ours")
     finally:
-        estimators.restrict(None)
+        estimators.select(None)
     assert "all samples k=20" in estimators.rows()

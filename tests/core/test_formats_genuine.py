@@ -136,7 +136,7 @@ def test_its_lens_is_understood(cameras: Path, tmp_path: Path) -> None:
     path = tmp_path / "posed.sfm"
     path.write_text(json.dumps(data))
     found = read_reconstruction(path)
-    assert found.notes == ("29 photos without a pose or a lens were left out",)
+    assert found.notes == ("Photos without a pose or a lens that were left out: 29.",)
     camera = found.cameras[0]
     assert (camera.width, camera.height, camera.label) == (6016, 3200, "1119.exr")
     assert np.isclose(camera.lens.focal_length_x, 43.45584412271571 / 36 * 6016)

@@ -135,7 +135,7 @@ def test_an_outline_that_cannot_be_seen_is_used_as_given():
     circle = Circle(tuple(middle), float(np.sqrt((mask > 0.5).sum() / np.pi)))
     found = light_from_sphere(pixels, WIDE, circle)
     assert not found.refined
-    assert "used as given" in found.notes[0]
+    assert "used without refinement" in found.notes[0]
     assert angle(found.direction, direction) < 2.0
 
 
@@ -249,15 +249,15 @@ DISC = scene(WIDE)[1]
     [
         (BLACK[:100], DISC, "320 × 100"),
         (BLACK, DISC, "no highlight"),
-        (BLACK, None, "no sphere found"),
+        (BLACK, None, "found no sphere"),
         (BLACK, DISC[:, :50], "50 × 240"),
-        (BLACK, np.zeros_like(DISC), "edge of 0 pixels"),
-        (BLACK, np.ones_like(DISC), "edge of 0 pixels"),
+        (BLACK, np.zeros_like(DISC), "has 0 points"),
+        (BLACK, np.ones_like(DISC), "has 0 points"),
         (BLACK, DISC * np.nan, "NaN"),
         (BLACK * np.nan, DISC, "NaN"),
-        (BLACK, np.stack([DISC] * 3, axis=2), "no grey image"),
-        (BLACK, Circle((100.0, 100.0), -3.0), "no circle"),
-        (BLACK, Circle((np.nan, 100.0), 3.0), "no circle"),
+        (BLACK, np.stack([DISC] * 3, axis=2), "not a grey image"),
+        (BLACK, Circle((100.0, 100.0), -3.0), "expected finite pixels and a positive radius"),
+        (BLACK, Circle((np.nan, 100.0), 3.0), "expected finite pixels and a positive radius"),
         (BLACK, Circle((100.0, 100.0), 3.0), "pixels"),
         (BLACK, Circle((5000.0, 100.0), 60.0), "outside"),
         (BLACK, Circle((100.0, 100.0), 1e7), "sphere"),

@@ -132,16 +132,16 @@ def test_what_no_photo_saw_follows_its_surroundings_and_then_the_fit():
     seen = np.flatnonzero(x < 20)
     sums = VertexScales.empty(len(mesh.vertices), 3)
     sums.add(mesh, texels, seen, np.full((len(seen), 3), 2.0), np.full(len(seen), 400.0))
-    carried = sums.carried(mesh, 1.0)[:201, 0]
-    assert np.allclose(carried[:19], 2.0, atol=0.02)
-    assert (np.diff(carried[20:]) <= 1e-3).all()  # falls back smoothly
-    assert carried[25] > 1.8 and abs(carried[200] - 1.0) < 0.15
+    interpolated = sums.interpolated(mesh, 1.0)[:201, 0]
+    assert np.allclose(interpolated[:19], 2.0, atol=0.02)
+    assert (np.diff(interpolated[20:]) <= 1e-3).all()  # falls back smoothly
+    assert interpolated[25] > 1.8 and abs(interpolated[200] - 1.0) < 0.15
 
 
 def test_nothing_seen_at_all_is_the_fit():
     mesh = strip(3)
     sums = VertexScales.empty(len(mesh.vertices), 2)
-    assert (sums.carried(mesh, 1.0) == 1.0).all()
+    assert (sums.interpolated(mesh, 1.0) == 1.0).all()
 
 
 def coated(diffuse, strength, alpha):

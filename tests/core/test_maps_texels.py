@@ -74,7 +74,7 @@ def test_more_rows_than_are_looked_at_together(monkeypatch):
     mesh = flat(points, Delaunay(points).simplices)
     whole = rasterise(mesh, 64)
     monkeypatch.setattr(module, "BAND", 64 * 7)
-    monkeypatch.setattr(module, "MOST_AT_ONCE", 50)
+    monkeypatch.setattr(module, "TEXELS_AT_ONCE", 50)
     parts = rasterise(mesh, 64)
     assert np.array_equal(whole.place, parts.place) and np.array_equal(whole.face, parts.face)
     assert np.array_equal(whole.second, parts.second)
@@ -96,7 +96,7 @@ def test_coordinates_outside_of_the_texture_are_refused_with_their_number(shift)
 def test_a_thousand_layers_are_refused_before_any_work():
     uv = np.array([[0, 0], [1, 0], [1, 1]], float)
     mesh = flat(uv, np.tile([[0, 1, 2]], (1000, 1)))
-    with pytest.raises(InputError, match="over one another"):
+    with pytest.raises(InputError, match="cover the texture"):
         rasterise(mesh, 8192)
 
 

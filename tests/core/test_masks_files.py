@@ -17,10 +17,11 @@ from patina.core.errors import InputError
 from patina.core.geometry import RayScene, view_surface
 from patina.core.inputs import capture_data
 from patina.core.inputs.lights import find_lights
+from patina.core.inputs.material_pixels import material_pixels
 from patina.core.inputs.photos import LitPhotos
 from patina.core.masks.capture_text import capture_with_masks
 from patina.core.masks.shadow import from_grey, light_visibility
-from patina.core.masks.write_masks import MasksJob, Wanted, check_final
+from patina.core.masks.write_masks import MasksJob, MasksSettings, check_final
 from tests import make_capture as made
 
 
@@ -41,7 +42,7 @@ def two_balls(folder: Path) -> Path:
     return path
 
 
-def write(path: Path, out: Path, wanted: Wanted):
+def write(path: Path, out: Path, wanted: MasksSettings):
     out.mkdir()
     job = MasksJob(read_capture(path), wanted, out, out)
     job.drain()
@@ -51,7 +52,7 @@ def write(path: Path, out: Path, wanted: Wanted):
 
 def test_shadow_masks_are_the_visibilities_and_leave_partial_shadow_out(tmp_path: Path) -> None:
     path = two_balls(tmp_path / "in")
-    done = write(path, tmp_path / "out", Wanted(uncertainty=0.0))
+    done = write(path, tmp_path / "out", MasksSettings(uncertainty=0.0))
     capture = read_capture(done.capture)
     scan = capture_data.open_scan(capture)
     capture_data.check_photos(capture, scan)
@@ -69,7 +70,7 @@ def test_shadow_masks_are_the_visibilities_and_leave_partial_shadow_out(tmp_path
         assert (grey[~view.seen] == 0).all()
         told = from_grey(grey.ravel()[view.pixel])
         assert np.abs(told - exact).mean() < 0.01
-        _, out = capture_data.material_pixels(capture, scan, view, place)
+        _, out = material_pixels(capture, scan, view, capture_data.photo_masks(capture, place))
         assert out[exact < 0.88].all()
         assert not out[exact > 0.999].any()
         partial += int(((exact > 0.1) & (exact < 0.9)).sum())
@@ -80,7 +81,7 @@ def test_the_new_capture_is_the_old_one_elsewhere(tmp_path: Path) -> None:
     path = two_balls(tmp_path / "in")
     before = path.read_bytes()
     old = read_capture(path)
-    new = read_capture(write(path, tmp_path / "out", Wanted()).capture)
+    new = read_capture(write(path, tmp_path / "out", MasksSettings()).capture)
     assert path.read_bytes() == before
     assert new.file.name == path.name and new.file.parent == tmp_path / "out"
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"masks", path.name}
@@ -104,7 +105,7 @@ def test_what_the_artist_marked_stays_marked(tmp_path: Path) -> None:
     path.write_text(
         text.replace('light = "lamp1"', 'light = "lamp1"\nmasks = {shadow = "mine.png"}')
     )
-    new = read_capture(write(path, tmp_path / "out", Wanted()).capture)
+    new = read_capture(write(path, tmp_path / "out", MasksSettings()).capture)
     assert (pixels(new.photos[0].masks["shadow"])[5:20, 30:90] == 255).all()
     assert (pixels(path.parent / "mine.png") == mask).all()
 
@@ -114,7 +115,7 @@ def test_proposed_materials_cover_the_object_once(tmp_path: Path) -> None:
 
     paints = [((0.2, 0.04, 0.03), 0.3, 40), ((0.04, 0.06, 0.2), 0.3, 40)]
     path = made.make_capture(tmp_path / "in", photos=6, brdf=painted(paints, halves))
-    done = write(path, tmp_path / "out", Wanted(shadows=False, materials=True))
+    done = write(path, tmp_path / "out", MasksSettings(shadows=False, materials=True))
     capture = read_capture(done.capture)
     assert [m.name for m in capture.materials] == ["material_1", "material_2"]
     tally = np.zeros((2, 2))
@@ -132,7 +133,7 @@ def test_proposed_materials_cover_the_object_once(tmp_path: Path) -> None:
 def test_one_material_needs_no_masks(tmp_path: Path) -> None:
     path = made.make_capture(tmp_path / "in", photos=4)
     capture = read_capture(
-        write(path, tmp_path / "out", Wanted(shadows=False, materials=True)).capture
+        write(path, tmp_path / "out", MasksSettings(shadows=False, materials=True)).capture
     )
     assert [m.name for m in capture.materials] == ["surface"]
     assert not any(photo.masks for photo in capture.photos)
@@ -144,7 +145,7 @@ def test_nothing_of_the_capture_is_overwritten(tmp_path: Path) -> None:
         check_final(read_capture(path), tmp_path)
     check_final(read_capture(path), tmp_path / "other")
     (tmp_path / "out").mkdir()
-    again = write(path, tmp_path / "out2", Wanted()).capture
+    again = write(path, tmp_path / "out2", MasksSettings()).capture
     with pytest.raises(InputError, match="overwritten"):
         check_final(read_capture(again), again.parent)
 

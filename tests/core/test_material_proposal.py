@@ -218,6 +218,7 @@ def test_demo_capture(root: Path) -> None:
     """Glaze and clay of the embedded capture, against the masks that were painted for it."""
     from patina.core.geometry import view_surface
     from patina.core.inputs import capture_data
+    from patina.core.inputs.material_pixels import material_pixels
 
     path = root / "assets" / "demo" / "demo.capture.toml"
     result = proposed(path)
@@ -226,7 +227,9 @@ def test_demo_capture(root: Path) -> None:
     for place in range(len(capture.photos)):
         camera = capture_data.camera_of(capture, result.scan, place)
         view = view_surface(result.rays, camera)
-        where, _ = capture_data.material_pixels(capture, result.scan, view, place)
+        where, _ = material_pixels(
+            capture, result.scan, view, capture_data.photo_masks(capture, place)
+        )
         label = result.proposal.labels[view.face]
         right += (where["glaze"] & (label == 0)).sum() + (where["clay"] & (label == 1)).sum()
         all_of_them += where["glaze"].sum() + where["clay"].sum()

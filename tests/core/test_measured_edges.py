@@ -15,16 +15,16 @@ from patina.core.basis import Basis, default_basis
 from patina.core.basis.log_table import LogTable
 from patina.core.capture import read_capture
 from patina.core.errors import FitError
-from patina.core.fit.held_out import LeftOut, predicted, summarise
+from patina.core.fit.held_out import HeldOutPhoto, prediction_errors, summarise
 from patina.core.fit.measured import MeasuredFit, MeasuredSettings, fit_measured
-from patina.core.fit.measured.cell_weights import crowding
+from patina.core.fit.measured.cell_weights import cells_per_observation
 from patina.core.fit.measured.cells import AngleCells, gather
 from patina.core.fit.measured.equations import Arrow
 from patina.core.fit.measured.forward import CellModel
-from patina.core.fit.measured.grazing_prior import carried_on
+from patina.core.fit.measured.grazing_prior import extrapolated
 from patina.core.fit.measured.normals import refine_normals
 from patina.core.fit.measured.patches import Patches
-from patina.core.fit.measured.posterior import GAIN, STEP, _residuals, solve
+from patina.core.fit.measured.posterior import GAIN_DEVIATION, MAX_STEP, _residuals, solve
 from patina.core.fit.measured.prior import ChannelPrior
 from patina.core.fit.measured_result import MeasuredResult
 from patina.core.geometry import RayScene, view_surface
@@ -117,7 +117,7 @@ def is_whole(fit: MeasuredFit) -> None:
     assert np.isfinite(kept.band.values).all() and (kept.band.values > 0).all()
     told = [
         kept.normal_deviation,
-        fit.together,
+        fit.temperature,
         *kept.gains.values(),
         *vars(kept.band.spread()).values(),
     ]
@@ -231,13 +231,13 @@ def whole_matrices(
     p, n = len(photos), 3 * k
     prediction = model.predict(start)
     residual, weight = _residuals(model, prediction, np.zeros(len(place)), 0.15)
-    weight = weight / (10.0 * crowding(model.cells)[:, None])
+    weight = weight / (10.0 * cells_per_observation(model.cells)[:, None])
     each, pulls = np.zeros((p, n + p, n + p)), np.zeros((p, n + p))
     for i in range(p):
         own = place == i
         for c in range(3):
             part = slice(c * k, (c + 1) * k)
-            w, rows = weight[own, c].astype(np.float32), prediction.slopes[c][own]
+            w, rows = weight[own, c].astype(np.float32), prediction.jacobian[c][own]
             weighted = rows * w[:, None]
             each[i, part, part] = weighted.T @ rows
             each[i, part, n + i] = each[i, n + i, part] = weighted.sum(axis=0)
@@ -246,14 +246,16 @@ def whole_matrices(
             pulls[i, n + i] += w @ residual[own, c]
     own_precision = np.zeros((n + p, n + p))
     own_precision[:n, :n] = prior.precision()
-    own_precision[range(n, n + p), range(n, n + p)] = GAIN**-2
+    own_precision[range(n, n + p), range(n, n + p)] = GAIN_DEVIATION**-2
     total = each.sum(axis=0) + own_precision
     state = np.concatenate([start.ravel(), np.zeros(p)])
-    pull = pulls.sum(axis=0) - own_precision @ state
-    pull[:n] += prior.pull()
-    step = np.linalg.solve(total, pull)
-    size = np.concatenate([np.tile(np.sqrt(prior.own + prior.shared), 3), np.full(p, GAIN)])
-    state = state + step * min(1.0, STEP / np.abs(step / size).max())
+    rhs = pulls.sum(axis=0) - own_precision @ state
+    rhs[:n] += prior.rhs()
+    step = np.linalg.solve(total, rhs)
+    size = np.concatenate(
+        [np.tile(np.sqrt(prior.own + prior.shared), 3), np.full(p, GAIN_DEVIATION)]
+    )
+    state = state + step * min(1.0, MAX_STEP / np.abs(step / size).max())
     full = np.linalg.inv(total)[:n, :n].reshape(3, k, 3, k)
     out = {}
     for i, photo in enumerate(photos.tolist()):
@@ -267,7 +269,7 @@ def test_leaving_out_agrees_with_whole_matrices(coupled: bool) -> None:
     basis = default_basis()
     model = model_of(5, 600, basis)
     prior = ChannelPrior.of(basis, 12, coupled)
-    prior = prior.anchored(carried_on(model, np.zeros((3, 12))), 1.0)
+    prior = prior.with_grazing_prior(extrapolated(model, np.zeros((3, 12))), 1.0)
     start = solve(model, prior, 0.15, None, False, 30, 10.0).coefficients
     found = solve(model, prior, 0.15, start, True, 1, 10.0)
     precision, covariance, without = whole_matrices(model, prior, start)
@@ -301,8 +303,8 @@ def test_an_arrow_is_its_matrix() -> None:
     n, p = 7, 5
     root = rng.normal(size=(n, n))
     arrow = Arrow(root @ root.T + 9 * np.eye(n), 0.5 * rng.normal(size=(n, p)), 4 + rng.random(p))
-    pull = rng.normal(size=n + p)
-    assert np.allclose(arrow.dense() @ arrow.solve(pull), pull)
+    rhs = rng.normal(size=n + p)
+    assert np.allclose(arrow.dense() @ arrow.solve(rhs), rhs)
     inverse = np.linalg.inv(arrow.dense())[:n, :n]
     assert np.allclose(np.linalg.inv(arrow.marginal()), inverse)
 
@@ -316,7 +318,7 @@ def test_memory_does_not_grow_with_the_photos() -> None:
         model = model_of(photos, 1200, basis)
         assert len(basis.nodes)  # kept, and no part of what is measured
         tracemalloc.start()
-        found = solve(model, prior, 0.15, iterations=1, together=10.0)
+        found = solve(model, prior, 0.15, iterations=1, temperature=10.0)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
         assert len(found.without) == len(np.unique(model.cells.photo))
@@ -337,10 +339,10 @@ def test_a_black_photo_has_no_relative_error() -> None:
     radiance = np.where(dark[:, None], np.float32(0), table.radiance)
     table = replace(table, radiance=radiance)
     fit = fit_measured(table, default_basis(), QUICK)
-    held = summarise([predicted(table, p, fit.brdf) for p in (0, 1, 2)])
+    held = summarise([prediction_errors(table, p, fit.brdf) for p in (0, 1, 2)])
     assert held is not None and sorted(held.per_photo) == [0, 2]
     assert np.isfinite([held.error, held.typical]).all() and held.typical < 1.0
-    one = LeftOut(1, 2.0, 0.0, np.zeros(0), np.zeros(0, np.float32))
+    one = HeldOutPhoto(1, 2.0, 0.0, np.zeros(0), np.zeros(0, np.float32))
     assert summarise([one]) is None
 
 
@@ -350,7 +352,7 @@ def test_noise_below_black_divides_nothing() -> None:
     radiance = np.full_like(table.radiance, -1e-3)
     radiance[:100] = 0.0
     radiance[100:180] = table.radiance[100:180]
-    found = predicted(
+    found = prediction_errors(
         replace(table, radiance=radiance), 0, fit_measured(table, default_basis(), QUICK).brdf
     )
     assert np.isfinite(found.relative).all() and (found.relative >= 0).all()

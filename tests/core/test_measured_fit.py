@@ -14,14 +14,19 @@ from patina.core.errors import FitError
 from patina.core.fit.measured import MeasuredSettings, fit_measured
 from patina.core.fit.measured.cells import gather
 from patina.core.fit.measured.forward import CellModel, _distinct
-from patina.core.fit.measured.grazing_prior import Anchors, directions
+from patina.core.fit.measured.grazing_prior import GrazingPrior, directions
 from patina.core.fit.measured.lobes import Lobes, fit_lobes
-from patina.core.fit.measured.normal_quadrature import rings, scattered
-from patina.core.fit.measured.normals import refine_normals, seen_with
+from patina.core.fit.measured.normal_quadrature import quadrature_angles, rings
+from patina.core.fit.measured.normals import refine_normals, with_normals
 from patina.core.fit.measured.patches import Patches
-from patina.core.fit.measured.power_likelihood import LARGEST, LEAST, size, tempered
+from patina.core.fit.measured.power_likelihood import (
+    MAX_MEAN_SQUARE,
+    MIN_TEMPERATURE,
+    normalised_mean_square,
+    solve_power_likelihood,
+)
 from patina.core.fit.measured.prior import ChannelPrior
-from patina.core.fit.measured.shrinkage import CAUTION, caution
+from patina.core.fit.measured.shrinkage import SHRINKAGE, shrinkage_step
 from patina.core.samples import SampleTable
 from tests import make_capture as made
 from tests.sampled import sampled
@@ -43,7 +48,7 @@ def test_scatter_integrates_a_plane_gaussian() -> None:
 
 def test_no_scatter_is_the_direction_itself() -> None:
     angles = Angles(np.array([0.1, 0.5]), np.array([0.3, 0.9]), np.array([1.0, 2.0]))
-    seen, cos_i, cos_o, weights = scattered(angles, np.zeros(2))
+    seen, cos_i, cos_o, weights = quadrature_angles(angles, np.zeros(2))
     assert np.allclose(np.stack(seen)[..., 0], np.stack(angles))
     own_i, own_o = cosines(*angles)
     assert np.allclose(cos_i[:, 0], own_i) and np.allclose(cos_o[:, 0], own_o)
@@ -63,14 +68,14 @@ def test_slopes_are_those_of_the_prediction(table: SampleTable) -> None:
     model = CellModel.of(cells, basis)
     k = 12
     c = 0.03 * np.random.default_rng(0).standard_normal((3, k))
-    slopes = model.predict(c).slopes
+    jacobian = model.predict(c).jacobian
     for component in (0, 5, 11):
         step = np.zeros((3, k))
         step[:, component] = 1e-3
-        up, down = model.predict(c + step, slopes=False), model.predict(c - step, slopes=False)
+        up, down = model.predict(c + step, jacobian=False), model.predict(c - step, jacobian=False)
         numeric = np.log(up.level / down.level) / 2e-3
         for channel in range(3):
-            difference = slopes[channel][:, component] - numeric[:, channel]
+            difference = jacobian[channel][:, component] - numeric[:, channel]
             assert np.abs(difference).max() < 2e-2 * max(1.0, np.abs(numeric).max())
 
 
@@ -80,7 +85,7 @@ def test_part_of_a_model_predicts_as_the_whole(table: SampleTable) -> None:
     some = np.random.default_rng(2).random(len(model.cells)) < 0.4
     whole, part = model.predict(c), model.select(some).predict(c)
     assert np.allclose(part.level, whole.level[some], rtol=1e-5)
-    assert np.allclose(part.slopes[1], whole.slopes[1][some], rtol=1e-4, atol=1e-5)
+    assert np.allclose(part.jacobian[1], whole.jacobian[1][some], rtol=1e-4, atol=1e-5)
 
 
 def test_precision_is_the_inverse_of_the_priors_covariance() -> None:
@@ -102,9 +107,9 @@ def test_anchors_carry_the_lobes_change_on() -> None:
     grid = Angles(*(a.ravel() for a in basis.grid.nodes()))
     as_lobes = basis.project(lobes.evaluate(grid), grid, k, 0.3)
     edge = np.radians(60.0)
-    anchors = Anchors.of(lobes, basis, as_lobes, edge)
-    prior = ChannelPrior.of(basis, k, coupled=False).anchored(anchors, 0.05)
-    c = np.linalg.solve(prior.precision(), prior.pull()).reshape(3, k)
+    grazing = GrazingPrior.of(lobes, basis, as_lobes, edge)
+    prior = ChannelPrior.of(basis, k, coupled=False).with_grazing_prior(grazing, 0.05)
+    c = np.linalg.solve(prior.precision(), prior.rhs()).reshape(3, k)
     angles = directions(edge)
     at_edge = Angles(angles.theta_h, np.full_like(angles.theta_d, edge), angles.phi_d)
 
@@ -137,7 +142,7 @@ def test_normals_come_back(table: SampleTable) -> None:
     true = clean.normal.astype(np.float64)
     wrong = true + tilt - np.sum(tilt * true, axis=1, keepdims=True) * true
     wrong /= np.linalg.norm(wrong, axis=1, keepdims=True)
-    scanned = seen_with(clean, wrong)
+    scanned = with_normals(clean, wrong)
     patches = Patches.of_points(scanned.point)
     found = refine_normals(scanned, patches, truth, np.radians(1.5))
 
@@ -196,7 +201,7 @@ def test_patches_touch_their_neighbours(table: SampleTable) -> None:
 
 
 def test_normals_seen_anew_agree_with_sampling(table: SampleTable) -> None:
-    again = seen_with(table, table.normal.astype(np.float64))
+    again = with_normals(table, table.normal.astype(np.float64))
     expected = half_difference(table.normal, table.light, table.view)
     assert np.allclose(again.theta_h, expected.theta_h, atol=1e-6)
     assert np.allclose(again.rho, table.rho, rtol=1e-3)
@@ -229,11 +234,11 @@ def test_cells_of_an_unlikely_material_count_less(table: SampleTable) -> None:
     for rho in (likely, odd):
         light = rho * table.irradiance * table.cos_i[:, None]
         cells = gather(replace(table, radiance=light.astype(np.float32)), 0.0)
-        found, together = tempered(CellModel.of(cells, basis), prior, 0.15)
-        sizes.append(size(found.coefficients, prior))
-        counts.append(together)
-    assert counts[0] == LEAST < counts[1]
-    assert sizes[1] < 2 * LARGEST
+        found, temperature = solve_power_likelihood(CellModel.of(cells, basis), prior, 0.15)
+        sizes.append(normalised_mean_square(found.coefficients, prior))
+        counts.append(temperature)
+    assert counts[0] == MIN_TEMPERATURE < counts[1]
+    assert sizes[1] < 2 * MAX_MEAN_SQUARE
 
 
 def test_caution_darkens_only_what_is_unsure() -> None:
@@ -242,12 +247,12 @@ def test_caution_darkens_only_what_is_unsure() -> None:
     k = basis.count
     covariance = np.tile(1e-8 * np.eye(k), (3, 1, 1))
     covariance[:, 2, 2] = basis.coefficient_variance
-    change = basis.nodes[:, 1 : 1 + k] @ caution(basis, covariance)[0]
+    change = basis.nodes[:, 1 : 1 + k] @ shrinkage_step(basis, covariance)[0]
     variance = basis.coefficient_variance * basis.nodes[:, 3].astype(np.float64) ** 2
     cos_i, cos_o = cosines(*(Angles(*(a.ravel() for a in basis.grid.nodes()))))
     seen = np.minimum(cos_i, cos_o) > 0.05
     unsure, sure = seen & (variance > 0.2), seen & (variance < 0.002)
-    assert change[unsure].mean() < -0.6 * CAUTION * np.minimum(variance, 1.5)[unsure].mean()
+    assert change[unsure].mean() < -0.6 * SHRINKAGE * np.minimum(variance, 1.5)[unsure].mean()
     assert abs(change[sure].mean()) < 0.02
 
 

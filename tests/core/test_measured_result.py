@@ -24,7 +24,7 @@ def made_result(deviation: float, gains: dict[int, float] | None = None) -> Meas
         samples=1000,
         normal_deviation=1.0,
         gains=gains or {},
-        anchoring="",
+        extrapolation="",
         band=Band(grid, np.full((grid.size, 3), deviation, np.float32)),
         warnings=(),
     )
@@ -75,8 +75,8 @@ def test_the_kept_band_is_the_fits_own() -> None:
 
 def test_only_gains_that_matter_are_told() -> None:
     result = made_result(0.1, {0: 1.0, 1: 1.03, 4: 0.9})
-    assert result.odd_gains(0.02) == {1: 1.03, 4: 0.9}
-    assert replace(result, gains={}).odd_gains(0.0) == {}
+    assert result.gains_beyond(0.02) == {1: 1.03, 4: 0.9}
+    assert replace(result, gains={}).gains_beyond(0.0) == {}
 
 
 def test_spread_of_candidates_is_their_standard_deviation() -> None:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from patina.core.errors import InputError
 from patina.core.scan.mesh import Mesh, read_mesh
-from patina.core.scan.mesh_formats.texture_path import beside
+from patina.core.scan.mesh_formats.texture_path import resolve_inside
 from tests import make_meshes as made
 
 SAMPLES = made.samples()
@@ -249,13 +249,13 @@ def test_numbers_no_surface_has(tmp_path: Path, text: str) -> None:
 @pytest.mark.parametrize(
     ("face", "message"),
     [
-        ("f 1 2 4", "v 4, but there are 3"),
+        ("f 1 2 4", "v 4; the file has 3"),
         ("f 1 2 -4", "v -4"),
         ("f 1/9 2/1 3/1", "vt 9"),
         ("f 1 2", "at least 3 corners"),
-        ("f 1 2 0", "counted from 1"),
-        ("f 1 2 x", "numbers like"),
-        ("f 1 2 99999999999999999999999", "there are 3"),
+        ("f 1 2 0", "numbered from 1"),
+        ("f 1 2 x", "corners like"),
+        ("f 1 2 99999999999999999999999", "the file has 3"),
     ],
 )
 def test_a_wrong_face_is_named_with_its_line(tmp_path: Path, face: str, message: str) -> None:
@@ -365,7 +365,7 @@ def test_names_that_leave_the_folder(tmp_path: Path) -> None:
 @example(name="//server/share/x.png")
 def test_fuzz_names(name: str) -> None:
     here = Path(__file__)
-    found = beside(here, name)
+    found = resolve_inside(here, name)
     assert found is None or here.parent.resolve() in found.parents
 
 

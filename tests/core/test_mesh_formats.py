@@ -153,7 +153,7 @@ def test_relative_indices_count_from_their_own_line(tmp_path: Path) -> None:
 def test_faces_without_texture_coordinates_among_others(tmp_path: Path) -> None:
     text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt .5 .25\nvt 1 0 0\nf 1/1 2/2 3/-1\nf 1 3 4\n"
     mesh = read_mesh(saved(tmp_path, "m.obj", text))
-    assert mesh.uv is not None and "3 corners" in mesh.notes[0]
+    assert mesh.uv is not None and "3 face corners" in mesh.notes[0]
     assert mesh.uv.tolist() == [[[0.5, 0.25], [1, 0], [1, 0]], [[0, 0]] * 3]
 
 
@@ -272,7 +272,7 @@ def test_gltf_colours_are_linear_and_textures_are_named(tmp_path: Path) -> None:
     assert mesh.textures == (tmp_path.resolve() / "the skin.jpg",)
     writer.document["images"] = [{"bufferView": 0, "mimeType": "image/png"}]
     mesh = read_mesh(saved(tmp_path, "m.glb", writer.glb()))
-    assert mesh.textures == () and "inside the file" in mesh.notes[0]
+    assert mesh.textures == () and "inside the mesh file" in mesh.notes[0]
 
 
 def test_gltf_strips_fans_and_lists_without_indices(tmp_path: Path) -> None:
@@ -337,7 +337,7 @@ def test_gltf_buffers_beside_the_file(tmp_path: Path) -> None:
         "%2e%2e/out.bin",
     ):
         saved(folder, "m.gltf", writer.gltf(uri))
-        with pytest.raises(InputError, match="own folder"):
+        with pytest.raises(InputError, match="not in the mesh's folder"):
             read_mesh(path)
 
 

@@ -91,16 +91,16 @@ def test_chunks_of_a_project(tmp_path):
     path = made.write_psx(tmp_path, "p", chunks, active=1)
     assert read_reconstruction(path).cameras[0].label == "bIMG_0000"
     assert read_reconstruction(path, chunk="a").cameras[0].label == "aIMG_0000"
-    refused(path, "no chunk 'c'; its chunks: 'a', 'b'", chunk="c")
+    refused(path, "no chunk 'c'; expected one of 'a', 'b'", chunk="c")
 
 
 def test_the_folder_must_be_there(tmp_path, scene):
     path = made.write_psx(tmp_path, "p", [made.chunk_xml(scene)])
     lonely = tmp_path / "other.psx"
     shutil.copy(path, lonely)
-    refused(lonely, "its folder 'other.files' with 'project.zip' is not beside it")
+    refused(lonely, "its folder 'other.files' with 'project.zip' is missing")
     shutil.rmtree(tmp_path / "p.files" / "0")
-    refused(path, r"its chunk '0' is missing: there is no 'p.files/0/chunk.zip'")
+    refused(path, r"its chunk '0' is missing; expected the file 'p.files/0/chunk.zip'")
 
 
 def test_without_its_frame_the_photos_are_not_known(tmp_path, scene):
@@ -108,7 +108,7 @@ def test_without_its_frame_the_photos_are_not_known(tmp_path, scene):
     shutil.rmtree(tmp_path / "p.files" / "0" / "0")
     found = read_reconstruction(path)
     assert all(c.photo is None for c in found.cameras)
-    assert any("photos' paths are not known" in note for note in found.notes)
+    assert any("paths of the photos are unknown" in note for note in found.notes)
 
 
 @pytest.mark.parametrize(
@@ -131,12 +131,12 @@ def test_paths_stay_in_the_project(tmp_path, scene, place):
     listed = f'<document><chunks><chunk id="0" path="{place}"/></chunks></document>'
     if "\0" not in place:
         path.write_text(f'<document path="{place}"/>')
-        refused(path, "leads out of the project's folder")
+        refused(path, "leads outside the project's folder")
         path.write_text('<document path="{projectname}.files/project.zip"/>')
         made.write_zip(path.parent / "p.files" / "project.zip", {"doc.xml": listed})
-        refused(path, "leads out of the project's folder")
+        refused(path, "leads outside the project's folder")
         psz = made.write_zip(path.parent / "p.psz", {"doc.xml": listed})
-        refused(psz, "leads out of the project's folder")
+        refused(psz, "leads outside the project's folder")
     else:
         path.write_text(f'<document path="{place}"/>')
         refused(path, "is not valid XML")
@@ -145,7 +145,7 @@ def test_paths_stay_in_the_project(tmp_path, scene, place):
 def test_a_name_no_file_can_have(tmp_path):
     path = tmp_path / "p.psx"
     path.write_text(f'<document path="{"x" * 5000}/project.zip"/>')
-    refused(path, "is not beside it")
+    refused(path, "is missing; copy the folder")
 
 
 def bomb(size, method=zipfile.ZIP_DEFLATED):
@@ -162,7 +162,7 @@ def test_zip_bombs(tmp_path):
     path.write_bytes(bomb(64 << 20))
     refused(path, "unpacks to 64 MB")
     path.write_bytes(bomb(3 << 20, zipfile.ZIP_LZMA))
-    refused(path, "unpacks to 3 MB|packed in method")
+    refused(path, "unpacks to 3 MB|compressed with method")
     inner = bomb(64 << 20)
     listed = '<document><chunks><chunk id="0" path="0.zip"/></chunks></document>'
     made.write_zip(path, {"doc.xml": listed, "0.zip": inner})
@@ -187,13 +187,13 @@ def test_a_project_of_many_large_documents(tmp_path, monkeypatch):
         tmp_path / "p.psz",
         {"doc.xml": f"<document><chunks>{listed}</chunks></document>", "0.xml": chunk},
     )
-    monkeypatch.setattr(metashape_project, "LARGEST_TOGETHER", 20 * len(chunk))
-    refused(path, "too large for a project")
+    monkeypatch.setattr(metashape_project, "MAX_TOTAL_BYTES", 20 * len(chunk))
+    refused(path, "too large for a Metashape project")
 
 
 def test_a_list_of_files_that_is_too_long(tmp_path, scene, monkeypatch):
     path = made.write_psz(tmp_path / "p.psz", [made.chunk_xml(scene)])
-    monkeypatch.setattr(metashape_zip, "DIRECTORY", 10)
+    monkeypatch.setattr(metashape_zip, "MAX_DIRECTORY_BYTES", 10)
     refused(path, "lists too many files")
 
 
@@ -221,10 +221,10 @@ def test_no_project_at_all(tmp_path, name):
 
 def test_zips_without_a_document(tmp_path):
     refused(made.write_zip(tmp_path / "p.psz", {"other.xml": "<a/>"}), "holds no doc.xml")
-    refused(made.write_zip(tmp_path / "q.psz", {"doc.xml": "<a/>"}), "no <document> of Metashape's")
+    refused(made.write_zip(tmp_path / "q.psz", {"doc.xml": "<a/>"}), "not a Metashape <document>")
     psx = tmp_path / "r.psx"
     psx.write_text("<document version='1.2.0'/>")
-    refused(psx, "is no project of Metashape's")
+    refused(psx, "is not a Metashape project")
 
 
 def survives(path):

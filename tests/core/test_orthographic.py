@@ -73,5 +73,5 @@ def test_a_scaled_photo_has_a_scaled_camera() -> None:
     assert np.allclose(quarter.project(points), whole.project(points) / 4, atol=1e-9)
     assert whole.resized(601, 451).width == 601  # both sides rounded up: still a scaled copy
     for size in ((450, 600), (601, 400), (2399, 1800), (2390, 1793)):
-        with pytest.raises(PatinaError, match="no scaled copy"):
+        with pytest.raises(PatinaError, match="expected a scaled copy"):
             whole.resized(*size)

@@ -11,7 +11,7 @@ import pytest
 from patina.core.basis import default_basis
 from patina.core.errors import FitError
 from patina.core.fit import PaperSettings, fit_paper, reliability, selection
-from patina.core.fit.held_out import leave_out, photos_to_hold_out, summarise
+from patina.core.fit.held_out import fit_without_photo, photos_to_hold_out, summarise
 from patina.core.fit.ridge import solve
 from patina.core.fit.spread import candidate_spread
 from patina.core.predict import similarity_sums
@@ -129,7 +129,7 @@ def test_similarity_is_the_cosine(table: SampleTable) -> None:
 def test_a_held_out_photo_is_predicted_and_one_photo_is_none(table: SampleTable) -> None:
     basis = default_basis()
     assert photos_to_hold_out(table) == list(range(6))
-    parts = [leave_out(table, photo, basis, PaperSettings(trials=2)) for photo in range(6)]
+    parts = [fit_without_photo(table, photo, basis, PaperSettings(trials=2)) for photo in range(6)]
     held = summarise([part for part in parts if part is not None])
     assert held is not None and set(held.per_photo) == set(range(6))
     assert 0 < held.error < 0.8 and 0 < held.typical < 0.4
@@ -214,5 +214,7 @@ def test_a_wrong_hue_is_an_error_too(table: SampleTable) -> None:
     shift = 0.3 * exact.mean(axis=1)
     hued = exact + np.stack([shift, -shift, np.zeros_like(shift)], axis=1)
     radiance = np.where((table.photo == 0)[:, None], hued, table.radiance).astype(np.float32)
-    part = leave_out(replace(table, radiance=radiance), 0, basis, PaperSettings(trials=2, seed=0))
+    part = fit_without_photo(
+        replace(table, radiance=radiance), 0, basis, PaperSettings(trials=2, seed=0)
+    )
     assert part is not None and np.median(part.relative) == pytest.approx(0.2, abs=0.01)

@@ -19,7 +19,7 @@ from patina.core.diagnose.forward.partial_visibility import (
 from patina.core.diagnose.forward.pixels import Pixels
 from patina.core.diagnose.forward.shading_state import ShadingState
 from patina.core.geometry import RayScene
-from patina.core.geometry.lift import LEAST, SHADOW_LIFT, facet_lift
+from patina.core.geometry.lift import MIN_LIFT, SHADOW_LIFT, facet_lift
 from patina.core.scan import Mesh
 from tests import make_lit_ball
 
@@ -129,7 +129,7 @@ def test_the_lift_is_as_fine_as_the_mesh() -> None:
         ball = trimesh.creation.icosphere(subdivisions=level)
         mesh = Mesh(np.array(ball.vertices), np.array(ball.faces, np.int32))
         lift = facet_lift(mesh) / mesh.size
-        assert LEAST <= lift <= SHADOW_LIFT
+        assert MIN_LIFT <= lift <= SHADOW_LIFT
         lifts.append(lift)
     assert lifts[0] == SHADOW_LIFT and lifts[0] > lifts[1] > lifts[2]
 

@@ -214,7 +214,7 @@ def test_movement_is_told() -> None:
                                                     shots[0].black)), INFO)  # fmt: skip
     merged = merge_bracket([moved, *shots[1:]], EXPOSURES, [NOISE] * 3, ["a", "b", "c"])
     assert merged.moved[0] > 0.03
-    assert any(w.startswith("a:") and "moved" in w for w in merged.warnings)
+    assert any(w.startswith("a ") and "moved" in w for w in merged.warnings)
 
 
 def test_clipped_everywhere_is_not_valid() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 import patina
 from patina.core.errors import InputError
-from patina.core.jobs.photo_prediction import same
+from patina.core.jobs.photo_prediction import entries_equal
 from patina.core.photo.encoding import Encoding
 from patina.core.photo.transfer import Transfer
 from patina.core.predict.errors import PhotoErrors
@@ -115,8 +115,8 @@ def test_an_unknown_light_of_unknown_strength_is_refused(
 
 def test_entries_with_arrays_compare(ball: patina.Capture) -> None:
     light = ball.lights[0]
-    assert same(light, replace(light, direction=np.array(light.direction)))
-    assert not same(light, replace(light, direction=-np.array(light.direction)))
+    assert entries_equal(light, replace(light, direction=np.array(light.direction)))
+    assert not entries_equal(light, replace(light, direction=-np.array(light.direction)))
 
 
 def test_export_writes_what_the_command_line_reads(

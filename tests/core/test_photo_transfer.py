@@ -94,7 +94,7 @@ def test_an_asked_curve_rules(tmp_path: Path, name: str) -> None:
     made.write_png(tmp_path / "p.png", STRIP, [(b"sRGB", b"\0")])
     photo = read_photo(tmp_path / "p.png", name)
     assert np.abs(photo.radiance[1, :, 0] - TRUTH[name](CODES / 255)).max() < 1e-6
-    assert photo.info.reason == "it was asked for"
+    assert photo.info.reason == "set by the user"
 
 
 @pytest.mark.parametrize("bits", [8, 16])
@@ -105,7 +105,7 @@ def test_without_a_statement_srgb_is_assumed(tmp_path: Path, bits: int) -> None:
     for name in ("p.tif", "p.png"):
         photo = read_photo(tmp_path / name)
         assert np.abs(photo.radiance[2] - srgb(CODES / 255)[:, None]).max() < 1e-6
-        assert "does not say" in photo.info.reason
+        assert "declares no curve" in photo.info.reason
         assert any("linear" in note for note in photo.info.notes) == (bits == 16)
         assert photo.info.saturation == 1.0 and photo.info.levels == 2**bits
 

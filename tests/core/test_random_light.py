@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patina.core.angles import Angles
-from patina.core.appearance.closeness import Closeness
+from patina.core.appearance.closeness import FitObjective
 from patina.core.appearance.cube_root import COARSE
 from patina.core.appearance.principled import Principled
 from patina.core.appearance.random_light import LIMB, SKIES, VIEWS, Pictures, encoded
@@ -38,7 +38,7 @@ def test_the_truth_is_nearest_and_a_tenth_is_seen() -> None:
 
 
 def test_slopes_are_differences() -> None:
-    goal = Closeness.of(GLOSSY.evaluate, COARSE)
+    goal = FitObjective.of(GLOSSY.evaluate, COARSE)
     f = GLOSSY.at(goal.where)
     change = np.random.default_rng(0).normal(size=f.shape) * f
     residual, slopes = goal.residual_and_slopes(f, change[None])

@@ -13,7 +13,7 @@ import pytest
 from patina.core.brdf import TabulatedBRDF, metrics
 from patina.core.capture import read_capture
 from patina.core.jobs import CaptureResult, FitJob
-from patina.core.jobs.fit_warnings import black_photos
+from patina.core.jobs.fit_warnings import black_photo_warnings
 from patina.core.photo import read_encoded
 from patina.core.report import figures, result_json, write_report
 from patina.core.views import display
@@ -87,7 +87,7 @@ def test_the_papers_result_says_which_pixels_it_chose(tmp_path: Path) -> None:
     assert "interval_90" not in material["uncertainty"] and "gains" not in material
     list(write_report(tmp_path / "report", job.result))
     page = (tmp_path / "report" / "index.html").read_text()
-    assert "6 chosen" in page and "shaded" not in page
+    assert "6 selected" in page and "shaded" not in page
     assert "Rings: the pixels" in page and "too curved" in page
 
 
@@ -116,15 +116,15 @@ def test_wide_intervals_are_told_as_factors() -> None:
 
 def test_samples_left_out_are_told(result: CaptureResult) -> None:
     material = replace(result.materials[0], samples=2_500_000, used=400_001)
-    said = dict(figures.figures(material, ["a"] * 3))["samples"]
-    assert said.startswith("2,500,000 lit pixels: 400,001 of them, which stand for")
+    said = dict(figures.figures(material, ["a"] * 3))["Samples"]
+    assert said.startswith("2,500,000 lit pixels; 400,001 of them are used, as a representative")
 
 
 def test_the_page_says_how_sure_it_is(result: CaptureResult, tmp_path: Path) -> None:
     list(write_report(tmp_path / "report", result))
     page = (tmp_path / "report" / "index.html").read_text()
     assert page.count("<polygon") == 12  # four charts, three channels
-    assert "90 % interval" in page and "every one of them used" in page
+    assert "90 % interval" in page and "all of them used" in page
 
 
 def test_difference_picture_has_the_sign_of_the_difference() -> None:
@@ -155,10 +155,10 @@ def test_a_photo_of_another_camera_is_named(tmp_path: Path) -> None:
     path = made.make_capture(tmp_path / "ball", photos=6)
     text = path.read_text().replace("view_02", "swap").replace("view_05", "view_02")
     path.write_text(text.replace("swap", "view_05"))
-    said = " ".join(black_photos(sampled(path)[0], read_capture(path)))
+    said = " ".join(black_photo_warnings(sampled(path)[0], read_capture(path)))
     assert "lit_2.exr" in said or "lit_5.exr" in said, said
 
 
 def test_a_good_capture_has_no_such_warning(result: CaptureResult) -> None:
     said = " ".join(result.materials[0].warnings)
-    assert "black" not in said and "times worse" not in said
+    assert "black" not in said and "times the median" not in said

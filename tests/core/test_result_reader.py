@@ -110,7 +110,7 @@ def test_whole_files_that_are_wrong(tmp_path: Path) -> None:
         assert "\n" not in str(caught.value) and len(str(caught.value)) < 600
     file.unlink()
     for path in (tmp_path, tmp_path / "nowhere", file):
-        with pytest.raises(InputError, match="is not there"):
+        with pytest.raises(InputError, match="does not exist"):
             read_result(path)
     file.mkdir()
     with pytest.raises(InputError, match="not a"):

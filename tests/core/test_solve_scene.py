@@ -172,11 +172,11 @@ def test_what_cannot_be_solved_is_said(tmp_path: Path) -> None:
     for i in range(3):
         made.write_picture(tmp_path / f"{i}.png", grey)
     job = SolveJob(tmp_path, threads=1)
-    with pytest.raises(PatinaError, match="fit together"):
+    with pytest.raises(PatinaError, match="can be connected"):
         job.drain()
     (tmp_path / "2.png").write_bytes(b"\x89PNG\r\n\x1a\n torn")
     job = SolveJob(tmp_path, threads=1)
-    with pytest.raises(PatinaError, match=r"2 photos are too few.*2\.png"):
+    with pytest.raises(PatinaError, match=r"found 2 usable photos.*2\.png"):
         job.drain()
     with pytest.raises(InputError, match="lens"):
         SolveJob(tmp_path, lens="FOV2")

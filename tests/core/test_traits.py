@@ -37,27 +37,27 @@ def _shifts(seed: int) -> np.ndarray:
 def test_a_shift_is_so_many_deviations_of_the_training_coefficients(brdf) -> None:
     basis, shifts = brdf.basis, _shifts(2)
     spread = basis.training.std(axis=0)[:8]
-    np.testing.assert_allclose(traits.deviation(basis), spread, rtol=2e-3)
-    there = traits.moved(brdf, shifts).coefficients
+    np.testing.assert_allclose(traits.shift_unit(basis), spread, rtol=2e-3)
+    there = traits.shifted(brdf, shifts).coefficients
     np.testing.assert_allclose(
-        there[:, :8] - brdf.coefficients[:, :8], traits.deviation(basis) * shifts, atol=1e-12
+        there[:, :8] - brdf.coefficients[:, :8], traits.shift_unit(basis) * shifts, atol=1e-12
     )
     np.testing.assert_array_equal(there[:, 8:], brdf.coefficients[:, 8:])
     few = PrincipalBRDF(basis, brdf.coefficients[:, :5])  # the paper's method has no more
-    assert traits.moved(few, shifts).coefficients.shape == (3, 5)
+    assert traits.shifted(few, shifts).coefficients.shape == (3, 5)
 
 
 def test_no_shift_is_the_measured_brdf_to_the_bit(brdf, angles) -> None:
     none = np.zeros((3, 8))
-    assert traits.moved(brdf, none) is brdf
-    there_and_back = traits.moved(traits.moved(brdf, _shifts(3)), none)
+    assert traits.shifted(brdf, none) is brdf
+    there_and_back = traits.shifted(traits.shifted(brdf, _shifts(3)), none)
     assert there_and_back.coefficients is not brdf.coefficients
-    movable = traits.Movable.of(brdf, traits.Looked.of(brdf.basis, angles))
+    movable = traits.ShiftableBRDF.of(brdf, traits.ComponentLookup.of(brdf.basis, angles))
     np.testing.assert_array_equal(movable.at(none), brdf.evaluate(angles))
 
 
 def test_moving_is_linear_in_the_logarithm(brdf, angles) -> None:
-    movable = traits.Movable.of(brdf, traits.Looked.of(brdf.basis, angles))
+    movable = traits.ShiftableBRDF.of(brdf, traits.ComponentLookup.of(brdf.basis, angles))
     weight = mapping.cos_map(angles)
     first, second = 0.3 * _shifts(4), 0.3 * _shifts(5)
 
@@ -73,9 +73,9 @@ def test_moving_is_linear_in_the_logarithm(brdf, angles) -> None:
 
 
 def test_what_is_looked_up_once_says_what_the_moved_brdf_says(brdf, angles) -> None:
-    movable = traits.Movable.of(brdf, traits.Looked.of(brdf.basis, angles))
+    movable = traits.ShiftableBRDF.of(brdf, traits.ComponentLookup.of(brdf.basis, angles))
     shifts = _shifts(6)
-    expected = traits.moved(brdf, shifts).evaluate(angles)
+    expected = traits.shifted(brdf, shifts).evaluate(angles)
     np.testing.assert_allclose(movable.at(shifts), expected, rtol=2e-4, atol=1e-6)
     red = np.zeros((3, 8))
     red[0] = shifts[0]
@@ -84,9 +84,12 @@ def test_what_is_looked_up_once_says_what_the_moved_brdf_says(brdf, angles) -> N
 
 def test_the_moved_sphere_is_the_sphere_of_the_moved_brdf(brdf) -> None:
     sphere, shifts = LitSphere.of(48), _shifts(7)
-    parts = [traits.Movable.of(brdf, traits.Looked.of(brdf.basis, p.angles)) for p in sphere.parts]
+    parts = [
+        traits.ShiftableBRDF.of(brdf, traits.ComponentLookup.of(brdf.basis, p.angles))
+        for p in sphere.parts
+    ]
     seen, coverage = sphere.picture([part.at(shifts) for part in parts])
-    expected, inside = lit_sphere(traits.moved(brdf, shifts).evaluate, 48)
+    expected, inside = lit_sphere(traits.shifted(brdf, shifts).evaluate, 48)
     np.testing.assert_allclose(seen, expected, rtol=1e-3, atol=1e-4 * expected.max())
     np.testing.assert_array_equal(coverage, inside)
     unmoved, _ = sphere.picture([part.at(np.zeros((3, 8))) for part in parts])
@@ -94,8 +97,8 @@ def test_the_moved_sphere_is_the_sphere_of_the_moved_brdf(brdf) -> None:
 
 
 def test_the_albedo_is_that_of_the_moved_brdf(brdf) -> None:
-    albedo, shifts = traits.MovableAlbedo.of(brdf), _shifts(8)
-    moved = traits.moved(brdf, shifts)
+    albedo, shifts = traits.ShiftableAlbedo.of(brdf), _shifts(8)
+    moved = traits.shifted(brdf, shifts)
     expected = directional_albedo(moved.evaluate, np.array(traits.VIEWS))
     np.testing.assert_allclose(albedo.at(shifts), expected, rtol=1e-3)
     by_hand = []
@@ -106,7 +109,7 @@ def test_the_albedo_is_that_of_the_moved_brdf(brdf) -> None:
 
 
 def test_more_light_out_than_in_is_told(brdf) -> None:
-    albedo = traits.MovableAlbedo.of(brdf)
+    albedo = traits.ShiftableAlbedo.of(brdf)
     assert traits.excess(albedo.at(np.zeros((3, 8)))) is None
     shifts = np.zeros((3, 8))
     shifts[1, 1] = -5.0  # green alone: a much brighter body
@@ -138,7 +141,7 @@ def test_words_follow_from_what_is_measured() -> None:
         "stronger, sharper highlight",
         "darker body",
         "more at grazing angles",
-        trait_words.NOTHING,
+        trait_words.NO_EFFECT,
         "wider highlight, brighter body",
     ]
 
@@ -155,7 +158,7 @@ def test_a_component_does_what_its_words_say() -> None:
     def moved(component: int) -> PrincipalBRDF:
         shifts = np.zeros((3, 8))
         shifts[:, component] = 1.0
-        return traits.moved(plain, shifts)
+        return traits.shifted(plain, shifts)
 
     first, second, fourth = moved(0), moved(1), moved(3)
     assert "stronger" in words[0] and "sharper" in words[0]

@@ -12,7 +12,7 @@ import pytest
 from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.capture import Capture, read_capture
 from patina.core.concurrency.steps import drained
-from patina.core.fit.reliability import calm
+from patina.core.fit.reliability import below_curvature_limit
 from patina.core.geometry import RayScene, view_surface
 from patina.core.inputs import capture_data
 from patina.core.inputs.lights import Lights, find_lights
@@ -21,7 +21,7 @@ from patina.core.inputs.photos import LitPhotos
 from patina.core.jobs.sampling import take_samples
 from patina.core.samples import Criterion, SampleTable
 from patina.core.views import display
-from patina.core.views.criteria import LOOKS, PALETTE, SPARE
+from patina.core.views.criteria import LOOKS, PALETTE, UNSELECTED
 from patina.core.views.photo_pictures import comparison_picture, criteria_picture
 from patina.core.views.photo_view import PhotoView, chosen_pixels, look_at_photo
 from tests import make_capture as made
@@ -146,7 +146,9 @@ def test_reliable_pixels_are_exactly_the_samples(painted: Path, method: str) -> 
         believed = {
             int(p)
             for table in tables
-            for p, good in zip(table.pixel, calm(table.curvature, 0.02), strict=True)
+            for p, good in zip(
+                table.pixel, below_curvature_limit(table.curvature, 0.02), strict=True
+            )
             if good or method == "measured"
         }
         assert pixels_of(view, Criterion.RELIABLE) == believed
@@ -209,7 +211,7 @@ def test_a_photo_is_looked_at_in_bands_of_any_size(
 ) -> None:
     brdf = flat_brdf(0.1)
     whole = opened.look(1, [("red", brdf, 1.0)])
-    monkeypatch.setattr("patina.core.views.photo_view.PIXELS", 1500)
+    monkeypatch.setattr("patina.core.views.photo_view.BAND_PIXELS", 1500)
     steps = look_at_photo(
         opened.capture, opened.scan, opened.rays, opened.photos, opened.lights,
         [("red", brdf, 1.0)], 1,
@@ -311,7 +313,7 @@ def test_the_papers_choice_is_found_again(opened: Opened) -> None:
 def test_colours_are_told_apart_by_all_eyes() -> None:
     """Without red, or without green cones (Machado et al. 2009), and with all three."""
     assert set(LOOKS) == set(Criterion) and len({look.key for look in LOOKS.values()}) == 15
-    shown = np.concatenate([PALETTE[1:], [SPARE]]).astype(np.uint8)
+    shown = np.concatenate([PALETTE[1:], [UNSELECTED]]).astype(np.uint8)
     deuteranope = [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]]
     protanope = [[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]]
     for eyes in (np.eye(3), deuteranope, protanope):

@@ -41,10 +41,10 @@ def test_what_is_hidden_is_named(cause, tmp_path):
     assert found.held_out_after.mean < found.held_out_before.mean
     trial = found.accepted[0]
     if cause == "cast_shadow":
-        off = trial.identified + truth.numbers["darkness"]
+        off = trial.identified + truth.parameters["darkness"]
         assert (np.abs(off) < np.maximum(3 * trial.standard_errors, 0.03)).all()
     if cause == "vignetting":
         corner = trial.effect.gain(trial.x)[np.argmax(trial.effect.r2)]
         r2 = trial.effect.r2.max()
-        tangent2 = (1 - truth.numbers["corner"]) ** -0.5 - 1
+        tangent2 = (1 - truth.parameters["corner"]) ** -0.5 - 1
         assert corner == pytest.approx((1 + tangent2 * r2) ** -2, abs=0.03)

@@ -55,4 +55,4 @@ def test_a_table_says_what_was_right():
     assert "| right cause first, at 1 % | 1 of 3 | 1 |" in said
     assert "**near_light**" in said and "**none**" in said
     assert "| parameters within their 95 % interval | 3 of 3 | |" in said
-    assert "| rows of the present state" in said and "| 0 of 3 | |" in said
+    assert "| rows computed by the current code" in said and "| 0 of 3 | |" in said

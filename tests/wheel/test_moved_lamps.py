@@ -103,7 +103,7 @@ def _build(folder: Path, far: np.ndarray, known: bool = True) -> Built:
     scene = bpy.context.scene
     built = create_scan_collection(scene, capture, scan, found, folder / "rectified")
     stood = [built.cameras[photo.camera] for photo in capture.photos]
-    return Built(capture, scene, built.lights, stood, built.mesh, scan)
+    return Built(capture, scene, built.lamps, stood, built.mesh, scan)
 
 
 @pytest.fixture(params=FAR, ids=["here", "far"])
@@ -202,7 +202,7 @@ def test_strength_and_size_by_hand(built: Built) -> None:
     assert np.allclose(now["ball"].strength, 2.0) and now["ball"].sphere is not None
     assert np.isclose(now["flash"].radius, 0.3)
     lamps["lamp"].data.energy = 0.0
-    with pytest.raises(PatinaError, match=r"lamp.*gives no light"):
+    with pytest.raises(PatinaError, match=r"lamp.*emits no light"):
         built.now()
 
 

@@ -14,7 +14,7 @@ import bpy  # noqa: E402
 
 from patina.core.angles import half_difference  # noqa: E402
 from patina.core.appearance.principled_fit import fit_principled  # noqa: E402
-from patina.core.appearance.traits import MovableAlbedo, excess  # noqa: E402
+from patina.core.appearance.traits import ShiftableAlbedo, excess  # noqa: E402
 from patina.core.basis import PrincipalBRDF, default_basis  # noqa: E402
 from patina.scene.material import (  # noqa: E402
     material_nodes,
@@ -71,7 +71,7 @@ def test_cycles_shows_the_moved_brdf_before_and_after_the_rest_has_followed(tmp_
     normal, inside = cycles_sphere.normals()
     kept = inside & (normal @ LIGHT > 0.1) & (normal @ VIEW > 0.1)
     light, view = np.broadcast_to(LIGHT, normal.shape), np.broadcast_to(VIEW, normal.shape)
-    rho = trait_offsets.moved_brdf(material).evaluate(half_difference(normal, light, view))
+    rho = trait_offsets.edited_brdf(material).evaluate(half_difference(normal, light, view))
     expected = (2.0 * rho * (normal @ LIGHT)[..., None])[kept]
     scale = np.sqrt(np.mean(expected**2))
     # the render would wait for the rest
@@ -90,11 +90,11 @@ def test_a_material_moved_beyond_what_can_be_is_held_to_the_light_it_gets(tmp_pa
     cycles_sphere.sky(1.0)
     material = _material(sphere)
     material.patina_traits.every.trait_2 = -4.0
-    albedo = MovableAlbedo.of(trait_offsets.measured_brdf(material)).at(
+    albedo = ShiftableAlbedo.of(trait_offsets.measured_brdf(material)).at(
         trait_offsets.shifts(material)
     )
     assert excess(albedo)[0] > 1.5
-    trait_update.settle()
+    trait_update.finish_updates()
     image = cycles_sphere.render(tmp_path)
     normal, inside = cycles_sphere.normals()
     kept = inside & (normal @ VIEW > 0.4)

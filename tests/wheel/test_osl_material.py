@@ -289,7 +289,7 @@ def test_where_osl_is_off_cycles_gets_the_portable_material(tmp_path):
     assert fallback.update_fallback(scene) == 1 and leads() == "SCRIPT"
     assert fallback.update_fallback(scene) == 0
     scene.render.engine = "BLENDER_WORKBENCH"
-    assert "another engine" in fallback.osl_hindrance(scene)
+    assert "another render engine" in fallback.osl_hindrance(scene)
 
 
 def test_handlers_come_and_go():

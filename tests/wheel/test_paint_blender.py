@@ -178,7 +178,7 @@ def test_a_large_photo_is_painted_on_in_a_smaller_size(scene, monkeypatch) -> No
     from patina.scene.paint.mask_images import mask_images, read_mask_image
     from patina.scene.session.scene_properties import capture_path
 
-    monkeypatch.setattr(canvas, "LARGEST", 47)
+    monkeypatch.setattr(canvas, "MAX_CANVAS_SIDE", 47)
     _two_materials(scene)
     image = _canvas(scene, 0)
     assert tuple(image.size) == (40, 30)
@@ -251,9 +251,9 @@ def test_nothing_is_lost_by_importing_anew(scene) -> None:  # noqa: F811
 
 
 def test_reasons_are_said(scene) -> None:  # noqa: F811
-    with pytest.raises(RuntimeError, match="one material only"):
+    with pytest.raises(RuntimeError, match="only one material"):
         bpy.ops.patina.paint_mesh()
-    with pytest.raises(RuntimeError, match="one face set only"):
+    with pytest.raises(RuntimeError, match="only one face set"):
         bpy.ops.patina.slots_from_face_sets()
     scene.camera = None
     assert not bpy.ops.patina.paint_photo.poll()

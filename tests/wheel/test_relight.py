@@ -43,10 +43,10 @@ def test_a_sphere_for_each_material_under_each_world(tmp_path):
 
 
 def test_what_is_no_world_is_told_in_one_line(tmp_path):
-    with pytest.raises(InputError, match="no file and no world") as told:
-        relight.worlds_named([str(tmp_path / "none.hdr")])
+    with pytest.raises(InputError, match="neither a file nor an environment image") as told:
+        relight.find_worlds([str(tmp_path / "none.hdr")])
     assert "\n" not in str(told.value)
     (tmp_path / "text.hdr").write_text("not a picture")
     bpy.ops.wm.read_factory_settings(use_empty=True)
     with pytest.raises(InputError, match="picture"):
-        relight.light_by(bpy.context.scene, tmp_path / "text.hdr")
+        relight.light_with(bpy.context.scene, tmp_path / "text.hdr")

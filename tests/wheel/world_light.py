@@ -38,7 +38,7 @@ def wear(brdf: PrincipalBRDF, *things: bpy.types.Object) -> bpy.types.Node:
 
 def world(path: Path) -> np.ndarray:
     """Light the scene by a picture; returns its (h, w, 3) radiance, the zenith in row 0."""
-    relight.light_by(bpy.context.scene, path)
+    relight.light_with(bpy.context.scene, path)
     return np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT), np.float64)[..., :3]
 
 

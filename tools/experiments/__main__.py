@@ -1,5 +1,5 @@
-"""`run.py experiments [NAME ...]`: tables of docs/method/experiments.md and appearance.md, measured
-and drawn again."""
+"""`run.py experiments [NAME ...]`: run the experiments, and write their tables and figures to
+docs/method/experiments.md and docs/method/appearance.md."""
 
 from __future__ import annotations
 
@@ -18,57 +18,66 @@ NAMES = ("check", "ablation", "sweeps", "goals", "appearance")
 
 
 def main() -> int:
-    """Run the named experiments, or all, then write the document; returns the exit code."""
+    """Run the named experiments, or all, then write the documents; return the exit code."""
     parser = argparse.ArgumentParser(prog="run.py experiments", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(NAMES)}")
     parser.add_argument(
-        "--quick", action="store_true", help="a few cases, below three minutes; no document"
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help=f"experiments to run: {', '.join(NAMES)} (default: all)",
     )
     parser.add_argument(
-        "--render", action="store_true", help="write the document from results already there"
+        "--quick",
+        action="store_true",
+        help="run a few cases, in less than three minutes; write no document",
+    )
+    parser.add_argument(
+        "--render", action="store_true", help="write the documents from stored results; run nothing"
     )
     parser.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1), metavar="N")
     parser.add_argument(
         "--only", nargs="+", metavar="ESTIMATOR",
-        help='run these estimators alone ("ours", "paper" ...), keep the other results',
+        help='run only these estimators ("ours", "paper" ...), and keep other results',
     )  # fmt: skip
     parser.add_argument(
-        "--scenes", nargs="+", metavar="SCENE", help="these scenes alone, keep the other results"
+        "--scenes", nargs="+", metavar="SCENE", help="run only these scenes, and keep other results"
     )
-    told = parser.parse_args()
-    unknown = [name for name in told.names if name not in NAMES]
+    arguments = parser.parse_args()
+    unknown = [name for name in arguments.names if name not in NAMES]
     if unknown:
-        parser.error(f"no experiment is called {unknown[0]!r}; there are {', '.join(NAMES)}")
-    for key in THREADS:  # one thread a process; read when numpy loads, here and in the children
+        parser.error(f"found {unknown[0]!r}, expected one of {', '.join(NAMES)}")
+    for (
+        key
+    ) in THREADS:  # one thread per process; numpy reads these when it is imported, also in children
         os.environ.setdefault(key, "1")
     load_patina()
     from . import document, materials, store
     from .runs import Records, merged, run_all
 
-    if not told.render:
+    if not arguments.render:
         if not materials.data_folder().is_dir():
-            say("experiments: the reference data is not here (data/ of ../shared)")
+            say("experiments: found no reference data; expected it in ../shared/data")
             return 2
-        materials.training_set()  # once, before processes share it
-        for name in told.names or NAMES:
+        materials.training_set()  # computed before the worker processes need it
+        for name in arguments.names or NAMES:
             module = _module(name)
-            since = time.perf_counter()
-            old = store.load(name, told.quick) or []
+            start = time.perf_counter()
+            old = store.load(name, arguments.quick) or []
 
             def keep(records: Records, name: str = name, old: Records = old) -> None:
-                store.save(name, merged(old, records, told.only, ended=False), told.quick)
+                store.save(name, merged(old, records, arguments.only, ended=False), arguments.quick)
 
-            tasks = module.tasks(told.quick)
-            if told.scenes:
-                tasks = [t for t in tasks if not set(told.scenes).isdisjoint(map(str, t))]
-            records = run_all(name, module.work, tasks, told.workers, told.only, keep)
-            all_made = merged(old, records, told.only, ended=not told.scenes)
-            store.save(name, all_made, told.quick)
-            say(f"{name}: {len(records)} records, {time.perf_counter() - since:.0f} s")
-    if told.quick:
+            tasks = module.tasks(arguments.quick)
+            if arguments.scenes:
+                tasks = [t for t in tasks if not set(arguments.scenes).isdisjoint(map(str, t))]
+            records = run_all(name, module.work, tasks, arguments.workers, arguments.only, keep)
+            all_made = merged(old, records, arguments.only, ended=not arguments.scenes)
+            store.save(name, all_made, arguments.quick)
+            say(f"{name}: {len(records)} records, {time.perf_counter() - start:.0f} s")
+    if arguments.quick:
         print(document.summary())
     else:
-        document.write(told.names or NAMES)
+        document.write(arguments.names or NAMES)
     return 0
 
 

@@ -1,4 +1,4 @@
-"""Figure 10: the paper's assumptions one by one; also the samples for its Figures 9 and 11."""
+"""Figure 10 of Ono et al. 2019: ablation of the paper's assumptions; data for Figures 9 and 11."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "highest intensity": {"curvature": None, "monotonicity": False},
     "all": {},
 }
-"""As the paper's bars; "none" is Nielsen's method on random pixels of the photos."""
+"""Bar of the paper's figure → changed settings; "none" is Nielsen's method on random pixels."""
 
 SCENES = ("bunny-openmvs", "knot-blurred")
 INCIDENCE = 45.0
-"""Degrees from the normal: 135° on the half-circle whose 90° is the normal, as the paper counts."""
-CANDIDATE_RUNS = 4  # of "all", whose candidates are measured one by one (Figure 11)
+"""Degrees from the normal. 135° in the paper, which counts along the half-circle."""
+CANDIDATE_RUNS = 4  # runs of "all" whose candidates are all evaluated (Figure 11)
 
 
 def tasks(quick: bool) -> list[tuple[str, str, int]]:
-    """(scene, material, runs)."""
+    """Return (scene, material, runs) of each task."""
     some = ("pebble-wavy",) if quick else SCENES
     names = ("alum-bronze", "pink-fabric") if quick else materials.PAPER
     return [(scene, name, 2 if quick else RUNS) for scene in some for name in names]
 
 
 def work(task: tuple[str, str, int]) -> Records:
-    """One record a run and variant; those of "all" hold their candidates; one of slices."""
+    """Return records of runs and variants (with the candidates for "all"), and of slices."""
     scene, name, runs = task
     material = materials.materials([name])[0]
     taken = scenes.sampled(scene)
@@ -46,11 +46,11 @@ def work(task: tuple[str, str, int]) -> Records:
     basis = materials.basis_for(material)
     found: Records = []
     slices: dict[str, Any] = {"truth": _slice(material.evaluate)}
-    runs = runs if estimators.asked("paper") else 1
+    runs = runs if estimators.is_selected("paper") else 1
     light = taken.true.transport(material.evaluate)
     for seed in range(runs):
         table = taken.exposed(light, seed)
-        for variant, changes in VARIANTS.items() if estimators.asked("paper") else ():
+        for variant, changes in VARIANTS.items() if estimators.is_selected("paper") else ():
             fit = fit_paper(table, basis, PaperSettings(seed=seed, **changes))
             record = {
                 "scene": scene, "material": name, "estimator": "paper", "variant": variant,
@@ -81,7 +81,7 @@ def work(task: tuple[str, str, int]) -> Records:
 
 
 def _owner(kind: str) -> str:
-    """The estimator whose run makes a slice anew."""
+    """Return the estimator that computes a slice."""
     return {"ours": "ours", "truth": "truth"}.get(kind, "paper")
 
 

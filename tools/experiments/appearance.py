@@ -1,9 +1,9 @@
-"""What the portable models lose: Principled and lobe stack against the table, sphere by sphere.
+"""Errors of the portable models (Principled and lobe stack), compared with the table on spheres.
 
-Every material is fitted as a capture's result would be, but from its true BRDF: what is lost is the
-model's own. Pictures under Blender's HDR worlds (sphere_light.py), PSNR of the 8-bit sRGB values of
-the disc's pixels, white at the 95th percentile of the true picture; the median over the worlds
-stands for a material.
+Every material is fitted like the result of a capture, but from its true BRDF, so that the errors
+are those of the model alone. Pictures are rendered under Blender's HDR worlds (sphere_light.py).
+The measure is the PSNR of the 8-bit sRGB values of the disc's pixels, with white at the 95th
+percentile of the true picture; a material has the median over the worlds.
 """
 
 from __future__ import annotations
@@ -26,31 +26,31 @@ from .runs import Records
 from .sphere_light import lit
 
 IMAGES = "images/appearance"
-LARGE = 64  # pixels across in a picture of the worst
-SHOWN = ("city", "studio", "sunset")  # the worlds they are shown under
+LARGE = 64  # diameter in pixels, in the pictures of the worst materials
+SHOWN = ("city", "studio", "sunset")  # worlds in these pictures
 WORST = 5
-PAPER = 246  # grey behind the spheres
+BACKGROUND = 246  # 8-bit grey level behind the spheres
 MODELS = {
     "principled": "Principled",
     "plain": "lobe stack, plain",
     "lobes": "lobe stack",
-    "free": "any weights",
+    "free": "free weights",
     "lambertian": "best Lambertian",
 }
-METRIC = tuple(key for key in MODELS if key != "free")  # fitted to pictures and nothing else
+METRIC = tuple(key for key in MODELS if key != "free")  # "free" is fitted to pictures only
 GOALS = {"principled": 38.0, "lobes": 42.0}  # dB, median over the materials
 
 
 def tasks(quick: bool) -> list[str]:
-    """The validation materials by name."""
+    """Return the names of the validation materials."""
     names = [m.name for m in materials.materials() if not m.trained]
     return names[:2] if quick else names
 
 
 def work(name: str) -> Records:
-    """A record: cube-root error, PSNR under each world and processor time of every model."""
+    """Return a record with cube-root error, PSNR per world and processor time of every model."""
     (material,) = materials.materials([name])
-    since = time.process_time()
+    start = time.process_time()
     principled = fit_principled(material.evaluate)
     between = time.process_time()
     lobes = fit_lobe_stack(material.evaluate)
@@ -74,13 +74,13 @@ def work(name: str) -> Records:
             "worlds": list(spheres.worlds()),
             **found,
             "lobe_count": len(lobes.stack.lobes),
-            "seconds": {"principled": between - since, "lobes": ended - between},
+            "seconds": {"principled": between - start, "lobes": ended - between},
         }
     ]
 
 
 def summary(records: list[Record]) -> str:
-    """The medians, and the goals beside them."""
+    """Return a table of medians and goals."""
     rows = []
     for key, label in MODELS.items():
         levels = [_level(r, key) for r in records]
@@ -97,7 +97,7 @@ def summary(records: list[Record]) -> str:
                 f"{100 * np.median(errors):.1f} %" if key in METRIC else "–",
             ]
         )
-    head = ["model", "median PSNR", "goal", "materials that reach it", "range"]
+    head = ["model", "median PSNR", "goal", "materials that reach the goal", "range"]
     seconds = [np.median([r["seconds"][key] for r in records]) for key in ("principled", "lobes")]
     return (
         table([*head, "median cube-root error"], rows)
@@ -107,7 +107,7 @@ def summary(records: list[Record]) -> str:
 
 
 def by_material(records: list[Record]) -> str:
-    """One row a material, the worst lobe stack last."""
+    """Return a table with one row per material, in descending order of the lobe stack's PSNR."""
     rows = []
     for r in sorted(records, key=lambda r: -_level(r, "lobes")):
         rows.append(
@@ -121,7 +121,7 @@ def by_material(records: list[Record]) -> str:
 
 
 def worst(records: list[Record]) -> str:
-    """The five materials that the lobe stack does worst, each with its picture."""
+    """Return the five materials with the lowest PSNR of the lobe stack, each with a picture."""
     folder = ROOT / "docs" / IMAGES
     folder.mkdir(parents=True, exist_ok=True)
     parts = []
@@ -141,7 +141,7 @@ def _level(record: Record, key: str) -> float:
 
 
 def _picture(name: str) -> np.ndarray:
-    """(LARGE, 9·LARGE, 3): table, lobe stack, Principled, under each of the worlds shown."""
+    """Render (LARGE, 9·LARGE, 3): table, lobe stack and Principled under each world in SHOWN."""
     (material,) = materials.materials([name])
     lobes, principled = fit_lobe_stack(material.evaluate), fit_principled(material.evaluate)
     spheres_shown = []
@@ -151,7 +151,7 @@ def _picture(name: str) -> np.ndarray:
         white = max(float(np.percentile(truth, spheres.WHITE)), 1e-9)
         models = [light.model(model.at)[0] for model in (lobes.stack, principled.principled)]
         for radiance in (truth, *models):
-            picture = np.full((LARGE, LARGE, 3), PAPER, np.uint8)
+            picture = np.full((LARGE, LARGE, 3), BACKGROUND, np.uint8)
             picture[light.inside] = srgb(radiance / white)
             spheres_shown.append(picture)
     return np.concatenate(spheres_shown, axis=1)

@@ -1,4 +1,4 @@
-"""The three scanned bunnies of the reference data: real reconstruction errors, exact truth."""
+"""Three scanned bunnies of the reference data: real reconstruction errors, known truth."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ BUNNIES = {
 
 
 def folder(tool: str) -> Path:
-    """The capture's folder."""
+    """Return the folder of the capture."""
     return data_folder() / "scans" / BUNNIES[tool]
 
 
 @lru_cache(maxsize=1)
 def true_bunny() -> Mesh:
-    """The exact surface, in the scans' frame."""
+    """Return the exact surface, in the frame of the scans."""
     return read_mesh(data_folder() / "scans" / "bunny_truth.ply")
 
 
 @lru_cache(maxsize=3)
 def opened(tool: str) -> tuple[Capture, Scan, tuple[Shot, ...]]:
-    """The capture as the program reads it, its scan and its eight shots."""
+    """Return the capture as Patina reads it, its scan and its eight shots."""
     capture = read_capture(folder(tool) / "scan.capture.toml")
     scan = capture_data.open_scan(capture)
     lights = find_lights(capture, scan, LitPhotos.open(capture))
@@ -51,7 +51,7 @@ def opened(tool: str) -> tuple[Capture, Scan, tuple[Shot, ...]]:
 
 
 def other_cameras(tool: str) -> list[Camera]:
-    """Cameras of the scan that none of the eight lit photos was taken with."""
+    """Return the cameras of the scan that are not cameras of the eight lit photos."""
     _, scan, shots = opened(tool)
     used = {shot.camera.label for shot in shots}
     size = (shots[0].camera.width, shots[0].camera.height)

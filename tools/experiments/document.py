@@ -1,4 +1,4 @@
-"""docs/method/experiments.md: what stands between its markers is written anew from the results."""
+"""Write the marked parts of docs/method/experiments.md and appearance.md from stored results."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ ESTIMATORS = (
     "floor k=20", "floor k=40", "floor k=100",
 )  # fmt: skip
 X_LABELS = {
-    "samples": "samples the fit is solved from",
+    "samples": "number of samples in the fit",
     "curvature": "largest curvature allowed, 1/pixel",
     "photos": "lit photos",
     "mesh error, bumpy": "median normal error, degrees",
     "mesh error, blurred": "median normal error, degrees",
-    "stereo tool": "mesh of",
+    "stereo tool": "mesh made by",
 }
 Section = Callable[[list[Record]], str]
 
 
 def sections() -> dict[str, tuple[str, Section]]:
-    """Marker → (experiment it needs, what makes its text)."""
+    """Return marker → (experiment, function that makes the text) of experiments.md."""
     found: dict[str, tuple[str, Section]] = {
         "check": ("check", tables.check),
         "goals": ("goals", goal_table.goals),
@@ -48,7 +48,7 @@ def sections() -> dict[str, tuple[str, Section]]:
 
 
 def appearance_sections() -> dict[str, tuple[str, Section]]:
-    """The same of docs/method/appearance.md."""
+    """Return the same for docs/method/appearance.md."""
     return {
         "models": ("appearance", appearance.summary),
         "models by material": ("appearance", appearance.by_material),
@@ -57,7 +57,7 @@ def appearance_sections() -> dict[str, tuple[str, Section]]:
 
 
 def write(names: Sequence[str]) -> None:
-    """Fill the marked parts of these experiments whose results are there; the rest stays."""
+    """Write the marked parts of these experiments if results are stored; keep all other text."""
     for document, found in ((DOCUMENT, sections()), (APPEARANCE, appearance_sections())):
         mine = {marker: part for marker, part in found.items() if part[0] in names}
         if mine:
@@ -69,7 +69,7 @@ def _fill(document: Path, found: dict[str, tuple[str, Section]]) -> None:
     for marker, (experiment, make) in found.items():
         records = store.load(experiment)
         if not records:
-            say(f"{marker}: no results of {experiment!r} yet, left as it was")
+            say(f"{marker}: no stored results of {experiment!r}; this part was not changed")
             continue
         if content := make(records):
             text = replaced(text, marker, content)
@@ -78,7 +78,7 @@ def _fill(document: Path, found: dict[str, tuple[str, Section]]) -> None:
 
 
 def summary() -> str:
-    """The tables of the quick runs, for the terminal."""
+    """Return the tables of the quick runs, for the terminal."""
     parts = []
     for marker in ("check", "goals", "by scene", "models", "models by material"):
         experiment, make = (sections() | appearance_sections())[marker]
@@ -93,11 +93,14 @@ def summary() -> str:
 
 
 def replaced(text: str, marker: str, content: str) -> str:
-    """The text with what stands between a marker's two comments replaced."""
+    """Return the text with the part between the two comments of a marker replaced.
+
+    Raises ValueError if the text has no such marker.
+    """
     begin, end = f"<!-- begin {marker} -->", f"<!-- end {marker} -->"
     pattern = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
     if not pattern.search(text):
-        raise ValueError(f"the document has no part {marker!r}")
+        raise ValueError(f"found no part {marker!r} in the document")
     return pattern.sub(lambda _: f"{begin}\n{content.strip()}\n{end}", text)
 
 

@@ -1,4 +1,4 @@
-"""What is compared, by name. An estimator is a function of samples, basis and seed."""
+"""The estimators that are compared, by name: functions of samples, basis and seed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from patina.core.angles import Angles
 from patina.core.basis import Basis, PrincipalBRDF
 from patina.core.fit import PaperSettings, fit_paper, ridge
-from patina.core.fit.held_out import HeldOut, photos_to_hold_out, predicted, summarise
+from patina.core.fit.held_out import HeldOutErrors, photos_to_hold_out, prediction_errors, summarise
 from patina.core.fit.measured import fit_measured
 from patina.core.fit.measured_result import MeasuredResult
 from patina.core.samples import SampleTable
@@ -23,10 +23,10 @@ _only: frozenset[str] | None = None
 
 
 class Fitted(Protocol):
-    """A BRDF that was fitted."""
+    """A fitted BRDF."""
 
     def evaluate(self, angles: Angles) -> NDArray[np.floating]:
-        """ρ (n, 3) in 1/sr."""
+        """Return ρ (n, 3) in 1/sr."""
 
 
 Interval = Callable[[Angles], tuple[NDArray[np.floating], NDArray[np.floating]]]
@@ -35,8 +35,8 @@ Estimator = Callable[[SampleTable, Basis, int], Fitted]
 
 @dataclass(frozen=True)
 class Row:
-    """One line of a table. true_mesh: it is given the exact surface (an oracle); components: what
-    its basis needs; random: whether the result depends on the seed but for the noise."""
+    """One row of a table. true_mesh: the estimator gets the exact surface (an oracle); components:
+    size of its basis; random: whether it is random itself, apart from the noise of the photos."""
 
     name: str
     estimator: Estimator
@@ -46,12 +46,12 @@ class Row:
 
 
 def paper(table: SampleTable, basis: Basis, seed: int) -> PrincipalBRDF:
-    """Ono et al. 2019, everything on."""
+    """The method of Ono et al. 2019 with all its assumptions."""
     return fit_paper(table, basis, PaperSettings(seed=seed)).brdf
 
 
 def paper_with(**changes: Any) -> Estimator:
-    """The paper's method with some of its settings changed."""
+    """Return the paper's method with changed settings."""
 
     def estimate(table: SampleTable, basis: Basis, seed: int) -> PrincipalBRDF:
         return fit_paper(table, basis, replace(PaperSettings(), seed=seed, **changes)).brdf
@@ -60,7 +60,7 @@ def paper_with(**changes: Any) -> Estimator:
 
 
 def all_samples(count: int, eta: float = ridge.ETA) -> Estimator:
-    """Plain ridge over every sample, in the mapped space."""
+    """Return ridge regression over all samples, in the mapped space (Nielsen et al. 2015)."""
 
     def estimate(table: SampleTable, basis: Basis, seed: int) -> PrincipalBRDF:
         gram, right = np.zeros((count, count)), np.zeros((count, 3))
@@ -78,10 +78,10 @@ def all_samples(count: int, eta: float = ridge.ETA) -> Estimator:
 
 @dataclass(frozen=True)
 class Ours:
-    """What the program's own estimator returned. held_out: what the program reports of it."""
+    """Result of Patina's estimator. held_out: the error on held-out photos that Patina reports."""
 
     result: MeasuredResult
-    held_out: HeldOut | None
+    held_out: HeldOutErrors | None
 
     def evaluate(self, angles: Angles) -> NDArray[np.floating]:
         """ρ (n, 3) in 1/sr."""
@@ -89,36 +89,36 @@ class Ours:
 
 
 def ours(table: SampleTable, basis: Basis, seed: int) -> Ours:
-    """Patina's own, as the program runs it."""
+    """Patina's estimator, as the program runs it."""
     fit = fit_measured(table, basis)
-    unseen = [p for p in photos_to_hold_out(table) if p in fit.without]
-    held = summarise([predicted(table, p, fit.without[p]) for p in unseen])
-    return Ours(MeasuredResult.of(fit), held)
+    held_out_photos = [p for p in photos_to_hold_out(table) if p in fit.without]
+    summary = summarise([prediction_errors(table, p, fit.without[p]) for p in held_out_photos])
+    return Ours(MeasuredResult.of(fit), summary)
 
 
 def interval(fit: Fitted) -> Interval | None:
-    """The fit's 90 % bands, (low (n, 3), high (n, 3)) in 1/sr at angles, where it has any."""
+    """Return the function angles → 90 % interval (low (n, 3), high (n, 3)) in 1/sr, or None."""
     return fit.result.interval if isinstance(fit, Ours) else None
 
 
-def reported(fit: Fitted) -> HeldOut | None:
-    """What the program itself reports of held-out photos, where the fit says it."""
+def reported(fit: Fitted) -> HeldOutErrors | None:
+    """Return the error on held-out photos that Patina reports; None for other estimators."""
     return fit.held_out if isinstance(fit, Ours) else None
 
 
-def restrict(names: Sequence[str] | None) -> None:
-    """Only these estimators are run from now on, in this process (None: all)."""
+def select(names: Sequence[str] | None) -> None:
+    """Select the estimators that this process runs (None: all)."""
     global _only
     _only = None if names is None else frozenset(names)
 
 
-def asked(name: str) -> bool:
-    """True where an estimator is to be run."""
+def is_selected(name: str) -> bool:
+    """Return whether an estimator is selected."""
     return _only is None or name in _only
 
 
 def rows() -> dict[str, Row]:
-    """Name → what is compared."""
+    """Return name → row of the selected estimators."""
     known = [
         Row("paper", paper),
         Row("all samples k=20", all_samples(20), random=False),
@@ -126,4 +126,4 @@ def rows() -> dict[str, Row]:
         Row("ours", ours, components=OUR_COMPONENTS, random=False),
         Row("ours, true mesh", ours, True, components=OUR_COMPONENTS, random=False),
     ]
-    return {row.name: row for row in known if asked(row.name)}
+    return {row.name: row for row in known if is_selected(row.name)}

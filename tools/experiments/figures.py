@@ -10,7 +10,7 @@ from ..common import ROOT
 from . import svg
 from .ablation import INCIDENCE, VARIANTS
 from .half_circle import half_circle
-from .records import Record, distinct, middle, values, where
+from .records import Record, distinct, median, values, where
 
 FOLDER = ROOT / "docs" / "images" / "experiments"
 SLICES = {
@@ -27,7 +27,7 @@ MEASURES = {
 
 
 def write(name: str, drawing: str) -> Path:
-    """Write one figure; returns its file."""
+    """Write one figure; return its file."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     file = FOLDER / name
     file.write_text(drawing, "utf-8")
@@ -35,7 +35,7 @@ def write(name: str, drawing: str) -> Path:
 
 
 def polar(records: list[Record], scene: str) -> str:
-    """Figure 9: truth solid, the fit dashed; one row a material, one column a method."""
+    """Figure 9: truth solid, fit dashed; one row per material, one column per method."""
     here = [r for r in where(records, scene=scene) if "slice" in r]
     kinds = [k for k in SLICES if where(here, kind=k)]
     panels = []
@@ -94,7 +94,7 @@ def ablation(records: list[Record]) -> str:
 
 
 def similarity(records: list[Record]) -> str:
-    """Figure 11: every candidate's cosine similarity against its error; chosen ones ringed."""
+    """Figure 11: cosine similarity of every candidate against its error; selected ones ringed."""
     runs = [r for r in records if "candidates" in r]
     scenes, panels = distinct(runs, "scene"), []
     for name in distinct(runs, "material"):
@@ -120,7 +120,7 @@ def similarity(records: list[Record]) -> str:
 
 
 def sweep(records: list[Record], sweeps: list[str], x_label: dict[str, str]) -> str:
-    """One panel a sweep and place: medians over materials and seeds of the log-relative RMS."""
+    """One panel per sweep and scene: median log-relative RMS over materials and seeds."""
     panels = []
     drawn: set[str] = set()
     for name in sweeps:
@@ -139,7 +139,7 @@ def _sweep_panel(here: list[Record], title: str, x_label: str, drawn: set[str]) 
         if estimator not in LINES:
             continue
         points = [
-            (i, middle(where(here, estimator=estimator, label=label), "log_rms"))
+            (i, median(where(here, estimator=estimator, label=label), "log_rms"))
             for label, i in place.items()
         ]
         curves[estimator] = [(i, y) for i, y in points if np.isfinite(y)]

@@ -1,8 +1,9 @@
-"""How near sums of a diffuse base and three GGX lobes can come, whatever their weights.
+"""Lower bound on the error of a sum of a diffuse base and three GGX lobes with free weights.
 
-An oracle for the lobe stack, not a material: each weight is a free curve over the view's angle, for
-every channel by itself, without layers, energy or an order between F0 and F90. What it misses, no
-better fit of the stack's colours can reach; only other shapes could.
+An oracle for the lobe stack, not a physical material: each weight is a free function of the view
+angle, separate for every channel, without layering, energy conservation or an order of F0 and F90.
+A better fit of the colours of the stack cannot reduce the error below this; only other lobe shapes
+can.
 """
 
 from __future__ import annotations
@@ -15,16 +16,16 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares, nnls
 
 from patina.core.appearance.cube_root import Evaluate
-from patina.core.appearance.lobe_stack import MOST_LOBES, Lobe, LobeStack
+from patina.core.appearance.lobe_stack import MAX_LOBES, Lobe, LobeStack
 from patina.core.appearance.oren_nayar import oren_nayar
 from patina.core.appearance.principled import Configuration
 from patina.core.appearance.random_light import Pictures, encoded
 
 Array = NDArray[np.floating]
 
-DEGREE = 4  # of the weights in 1 − cosθ of the view
-STEPS = 80
-WIDER = (2.0, 0.4)  # of lobes that the stack has not, as multiples of one that it has
+DEGREE = 4  # of the weights, polynomials in 1 − cosθ of the view
+MAX_EVALUATIONS = 80
+EXTRA_ROUGHNESS = (2.0, 0.4)  # of lobes that the stack lacks, relative to its first lobe
 
 
 @dataclass(frozen=True)
@@ -37,11 +38,11 @@ class FreeSum:
 
     @classmethod
     def fit(cls, evaluate: Evaluate, stack: LobeStack) -> FreeSum:
-        """The nearest to ``evaluate`` in pictures, with the widths of a fitted stack."""
+        """Fit the weights to pictures of ``evaluate``, with the roughness of a fitted stack."""
         found = [lobe.roughness for lobe in stack.lobes] or [0.4]
-        for factor in WIDER:
+        for factor in EXTRA_ROUGHNESS:
             found.append(float(np.clip(factor * found[0], 0.05, 0.95)))
-        roughness = tuple(found[:MOST_LOBES])
+        roughness = tuple(found[:MAX_LOBES])
         pictures = Pictures.of(evaluate)
         columns = terms(pictures.where, roughness, stack.diffuse_roughness)
         light = np.concatenate([sky @ columns[part] for part, sky in pictures.parts])
@@ -50,38 +51,38 @@ class FreeSum:
         return cls(roughness, stack.diffuse_roughness, np.stack(channels, axis=1))
 
     def at(self, where: Configuration) -> Array:
-        """f (n, 3) in 1/sr at n directions."""
+        """Return the BRDF (n, 3) in 1/sr at n configurations."""
         f = terms(where, self.roughness, self.diffuse_roughness) @ self.weights
         return np.where(where.seen[:, None], f, 0.0)
 
 
 def terms(where: Configuration, roughness: tuple[float, ...], base: float) -> Array:
-    """(n, k) what a weight of 1 reflects: diffuse, then GGX and GGX with Schlick's rise, lobe by
-    lobe, each times the Bernstein polynomials of the view."""
-    rise = np.clip(1 - where.cos_d, 0, 1) ** Lobe.exponent
+    """Return the reflectance (n, k) for weights of 1: the diffuse term, then for each lobe GGX and
+    GGX times Schlick's Fresnel factor, each times the Bernstein polynomials of the view angle."""
+    fresnel = np.clip(1 - where.cos_d, 0, 1) ** Lobe.exponent
     shapes = [oren_nayar(np.ones(3), base, where.cos_i, where.cos_o, where.cos_io)[:, 0]]
     for width in roughness:
         lobe = where.ggx(width)
-        shapes += [lobe, lobe * rise]
+        shapes += [lobe, lobe * fresnel]
     x = 1 - np.clip(where.cos_o, 0, 1)
     curves = [comb(DEGREE, i) * x**i * (1 - x) ** (DEGREE - i) for i in range(DEGREE + 1)]
     return np.stack([shape * curve for shape in shapes for curve in curves], axis=1)
 
 
-def _weights(light: Array, seen: Array) -> Array:
-    """(k,) ≥ 0 with the least Σ(encoded(light @ weights) − seen)²."""
-    linear = np.where(seen <= 0.04045, seen / 12.92, ((seen + 0.055) / 1.055) ** 2.4)
+def _weights(light: Array, observed: Array) -> Array:
+    """Return weights (k,) ≥ 0 that minimise Σ(encoded(light @ weights) − observed)²."""
+    linear = np.where(observed <= 0.04045, observed / 12.92, ((observed + 0.055) / 1.055) ** 2.4)
     slope = encoded(0.999 * linear)[1]
-    kept = seen < 0.9999
+    kept = observed < 0.9999
     start, _ = nnls(light[kept] * slope[kept, None], linear[kept] * slope[kept], maxiter=3000)
 
-    def slopes(root: Array) -> Array:
+    def jacobian(root: Array) -> Array:
         return encoded(light @ root**2)[1][:, None] * light * (2 * root)
 
     found = least_squares(
-        lambda root: encoded(light @ root**2)[0] - seen,
+        lambda root: encoded(light @ root**2)[0] - observed,
         np.sqrt(start) + 1e-3,
-        jac=slopes,
-        max_nfev=STEPS,
+        jac=jacobian,
+        max_nfev=MAX_EVALUATIONS,
     )
     return np.asarray(found.x**2)

@@ -7,13 +7,13 @@ from collections.abc import Callable
 import numpy as np
 
 from . import materials, scenes
-from .records import Record, middle, number, per_case, ratios, table, values, where
+from .records import Record, median, number, per_case, ratios, table, values, where
 
-NOT = "not measured"
+NOT_MEASURED = "not measured"
 
 
 def goals(records: list[Record]) -> str:
-    """One row a goal: figure, reached or by how much not, and what the oracles make of it."""
+    """Return a table, one row per goal: target, result, whether it is reached, oracle."""
     own = [r for r in records if not r["in_basis"] and r["scene"] != "floor"]
     paper, ours = where(own, estimator="paper"), where(own, estimator="ours")
     oracle = where(own, estimator="ours, true mesh")
@@ -35,7 +35,7 @@ def goals(records: list[Record]) -> str:
 
 
 def by_material(records: list[Record], estimators: list[str]) -> str:
-    """Median over scenes and seeds, one row a material and estimator."""
+    """Return medians over scenes and seeds, one row per material and estimator."""
     own = [r for r in records if not r["in_basis"]]
     rows = []
     for material in materials.materials():
@@ -50,18 +50,18 @@ def by_material(records: list[Record], estimators: list[str]) -> str:
                 [
                     material.name if name == estimators[0] else "",
                     name,
-                    *(number(middle(some, key)) for key in ("log_rms", "cube_root", "relative_l2")),
-                    number(middle(some, "specular_l2")),
-                    f"{middle(some, 'peak'):.2f}",
+                    *(number(median(some, key)) for key in ("log_rms", "cube_root", "relative_l2")),
+                    number(median(some, "specular_l2")),
+                    f"{median(some, 'peak'):.2f}",
                     _psnr(some),
                 ]
             )
     head = ["material", "estimator", "log RMS ≤ 80°", "cube-root RMS", "relative L2"]
-    return table([*head, "around specular", "peak fit ÷ truth", "PSNR, dB"], rows)
+    return table([*head, "near specular direction", "peak, fit ÷ truth", "PSNR, dB"], rows)
 
 
 def by_scene(records: list[Record], estimators: list[str]) -> str:
-    """Median over materials and seeds of each scene."""
+    """Return medians over materials and seeds, one row per scene and estimator."""
     own = [r for r in records if not r["in_basis"]]
     rows = []
     for scene in scenes.SCENES:
@@ -74,17 +74,24 @@ def by_scene(records: list[Record], estimators: list[str]) -> str:
                     [
                         scene if name == estimators[0] else "",
                         name,
-                        *(number(middle(some, key)) for key in keys),
-                        f"{100 * middle(some, 'coverage'):.1f} %",
-                        number(middle(some, "seconds"), 2),
+                        *(number(median(some, key)) for key in keys),
+                        f"{100 * median(some, 'coverage'):.1f} %",
+                        number(median(some, "seconds"), 2),
                     ]
                 )
-    head = ["scene", "estimator", "log RMS", "cube-root RMS", "relative L2", "relative L2, seen"]
-    return table([*head, "around specular", "cells seen", "s a fit"], rows)
+    head = [
+        "scene",
+        "estimator",
+        "log RMS",
+        "cube-root RMS",
+        "relative L2",
+        "relative L2, observed",
+    ]
+    return table([*head, "near specular direction", "observed cells", "seconds per fit"], rows)
 
 
 def in_basis(records: list[Record]) -> str:
-    """The paper's six with a basis that has seen them, beside one that has not."""
+    """Compare bases with and without the material itself, for the six materials of the paper."""
     rows = []
     for name in materials.PAPER:
         for estimator in ("paper", "ours", "floor k=20", "floor k=40"):
@@ -93,10 +100,12 @@ def in_basis(records: list[Record]) -> str:
                 continue
             cells = []
             for key in ("log_rms", "cube_root", "relative_l2"):
-                out, inside = (middle(where(here, in_basis=b), key) for b in (False, True))
+                out, inside = (median(where(here, in_basis=b), key) for b in (False, True))
                 cells.append(f"{number(out)} → {number(inside)}")
             rows.append([name if estimator == "paper" else "", estimator, *cells])
-    return table(["material", "", "log RMS: without → in-basis", "cube-root", "relative L2"], rows)
+    return table(
+        ["material", "", "log RMS: not in basis → in basis", "cube-root", "relative L2"], rows
+    )
 
 
 def _ratio_row(
@@ -112,7 +121,7 @@ def _ratio_row(
     return [
         words,
         f"≤ {wanted:g}",
-        number(float(np.median(found)), 2) if found else NOT,
+        number(float(np.median(found)), 2) if found else NOT_MEASURED,
         _reached(found, lambda x: float(np.median(x)) <= wanted),
         f"{number(float(np.median(best)), 2)} with the true mesh" if best else "",
     ]
@@ -126,31 +135,37 @@ def _worst_row(ours: list[Record], paper: list[Record]) -> list[str]:
             by.setdefault(material, []).append(ratio)
         worse += [(float(np.median(v)), m, key) for m, v in by.items()]
     if not worse:
-        return ["worse in no material (both)", "≤ 1", NOT, "", ""]
+        return ["worse than the paper in no material (both measures)", "≤ 1", NOT_MEASURED, "", ""]
     top = max(worse)
     count = len({m for x, m, _ in worse if x > 1})
-    said = f"worst {number(top[0], 2)} ({top[1]}, {top[2]}); worse in {count}"
-    return ["worse in no material (both)", "≤ 1", said, "yes" if count == 0 else "**no**", ""]
+    text = f"largest ratio {number(top[0], 2)} ({top[1]}, {top[2]}); worse in {count}"
+    return [
+        "worse than the paper in no material (both measures)",
+        "≤ 1",
+        text,
+        "yes" if count == 0 else "**no**",
+        "",
+    ]
 
 
 def _peak_row(ours: list[Record], paper: list[Record], oracle: list[Record]) -> list[str]:
-    def said(rows: list[Record]) -> tuple[str, bool]:
+    def summarised(rows: list[Record]) -> tuple[str, bool]:
         flat = [r for r in rows if r["material"] in materials.FLAT]
         found = list(per_case(flat, "peak").values())
         if not found:
-            return NOT, False
+            return NOT_MEASURED, False
         worst = [max(r["peaks"], key=lambda x: abs(np.log(x))) for r in flat]
         inside = float(np.mean([0.8 <= x <= 1.25 for x in found]))
         words = (
             f"{np.median(found):.2f} ({min(found):.2f} … {max(found):.2f}), "
-            f"{100 * inside:.0f} % inside; by bands of θd the worst "
+            f"{100 * inside:.0f} % within the target; worst band of θd "
             f"{min(worst):.2f} … {max(worst):.2f}"
         )
         return words, inside == 1.0
 
-    mine, ok = said(ours)
-    theirs, _ = said(paper)
-    best, _ = said(oracle)
+    mine, ok = summarised(ours)
+    theirs, _ = summarised(paper)
+    best, _ = summarised(oracle)
     return [
         "flat materials: fit ÷ truth at θh < 5°, median (range over cases)",
         "0.8 … 1.25",
@@ -165,9 +180,9 @@ def _mesh_row(ours: list[Record], oracle: list[Record]) -> list[str]:
     for key in ("log_rms", "cube_root"):
         found = list(ratios(ours, oracle, key).values())
         found_all += [float(np.median(found))] if found else []
-        cells.append(f"{key} {number(float(np.median(found)), 2)}" if found else NOT)
+        cells.append(f"{key} {number(float(np.median(found)), 2)}" if found else NOT_MEASURED)
     return [
-        "scanned ÷ true mesh, ours",
+        "error with the scanned ÷ with the true mesh, ours",
         "≤ 1.5",
         ", ".join(dict.fromkeys(cells)),
         _reached(found_all, lambda x: max(x) <= 1.5),
@@ -176,22 +191,22 @@ def _mesh_row(ours: list[Record], oracle: list[Record]) -> list[str]:
 
 
 def _held_out_row(ours: list[Record], paper: list[Record]) -> list[str]:
-    def said(rows: list[Record]) -> tuple[str, list[float]]:
+    def summarised(rows: list[Record]) -> tuple[str, list[float]]:
         found = {}
         for kind in ("typical", "rms"):
             found[kind] = [
                 r[f"held_out_{kind}"] / r[f"image_{kind}"] for r in rows if f"held_out_{kind}" in r
             ]
         if not found["rms"]:
-            return NOT, []
+            return NOT_MEASURED, []
         words = ", ".join(
             f"{kind} {np.median(x):.2f} ({np.quantile(x, 0.1):.2f} … {np.quantile(x, 0.9):.2f})"
             for kind, x in found.items()
         )
         return words, [float(np.median(x)) for x in found.values()]
 
-    mine, figures = said(ours)
-    theirs, _ = said(paper)
+    mine, figures = summarised(ours)
+    theirs, _ = summarised(paper)
     return [
         "reported held-out error ÷ true image error, median (10 … 90 %)",
         "0.8 … 1.2",
@@ -209,34 +224,34 @@ def _picture_row(
 
     mine = each(ours)
     floor = [each(where(records, estimator=f"floor k={k}")) for k in (40, 100)]
-    told = f"{np.median(mine):.1f} dB" if mine else NOT
+    text = f"{np.median(mine):.1f} dB" if mine else NOT_MEASURED
     theirs = each(paper)
     best = [f"{np.median(each(oracle)):.1f} with the true mesh"] if each(oracle) else []
     best += [
-        f"{np.median(x):.1f} the truth on {k} components"
+        f"{np.median(x):.1f} for the truth projected on {k} components"
         for k, x in zip((40, 100), floor, strict=True)
         if x
     ]
     return [
         "PSNR of a sphere under 8 HDR worlds, 25 validation materials",
         "≥ 40 dB",
-        told + (f"; the paper's: {np.median(theirs):.1f} dB" if theirs else ""),
+        text + (f"; the paper's: {np.median(theirs):.1f} dB" if theirs else ""),
         _reached(mine, lambda x: float(np.median(x)) >= 40),
         ", ".join(best),
     ]
 
 
 def _band_row(ours: list[Record]) -> list[str]:
-    seen, unseen = values(ours, "band_seen"), values(ours, "band_unseen")
-    said = NOT
-    if seen:
-        shown, others = np.median(seen), np.median(unseen)
-        said = f"{shown:.0%} in directions that photos show, {others:.0%} elsewhere"
+    observed, not_observed = values(ours, "band_seen"), values(ours, "band_unseen")
+    text = NOT_MEASURED
+    if observed:
+        shown, others = np.median(observed), np.median(not_observed)
+        text = f"{shown:.0%} in directions that photos show, {others:.0%} elsewhere"
     return [
         "truth inside the 90 % interval, ours, median over cases",
         "85 … 95 %",
-        said,
-        _reached(seen and [float(np.median(seen))], lambda x: 0.85 <= x[0] <= 0.95),
+        text,
+        _reached(observed and [float(np.median(observed))], lambda x: 0.85 <= x[0] <= 0.95),
         "",
     ]
 

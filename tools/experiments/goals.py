@@ -1,4 +1,4 @@
-"""Every estimator on every material and scene: the records behind the table of goals."""
+"""Run every estimator on every material and scene; the records of the table of goals."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from patina.core.basis import Basis
 from patina.core.fit import PaperSettings
-from patina.core.fit.held_out import leave_out, photos_to_hold_out, summarise
+from patina.core.fit.held_out import fit_without_photo, photos_to_hold_out, summarise
 from patina.core.samples import SampleTable
 
 from . import estimators, materials, metrics, scenes, spheres
@@ -22,17 +22,17 @@ SEEDS = 3
 IN_BASIS = ("paper", "ours")
 PICTURES = ("paper", "ours", "ours, true mesh")
 ORACLES = ("jar-bumpy", "pebble-wavy")
-"""Scenes where our own estimator is given the true mesh too (it is the slowest row)."""
+"""Scenes in which Patina's estimator, the slowest one, is also run with the true mesh."""
 SOME = (
     *materials.PAPER, "aurora_white_rgb", "cm_military_green_rgb", "ilm_l3_37_metallic_rgb",
     "leaf_maple_rgb", "paper_blue_rgb", "satin_purple_rgb",
 )  # fmt: skip
-"""The materials of own shapes' scenes; the reconstructed bunnies see all of them."""
+"""Materials of the scenes with scripted shapes; the reconstructed bunnies use all materials."""
 FLOORS = (5, 20, 40, 100)
 
 
 def tasks(quick: bool) -> list[tuple[str, list[str], int]]:
-    """(scene or "floors", materials, seeds), longest first."""
+    """Return (scene or "floors", materials, seeds) of each task, the longest first."""
     names = [m.name for m in materials.materials()]
     if quick:
         names = ["pink-fabric2", "paper_blue_rgb"]
@@ -48,17 +48,17 @@ def tasks(quick: bool) -> list[tuple[str, list[str], int]]:
 
 
 def work(task: tuple[str, list[str], int]) -> Records:
-    """The records of one task."""
+    """Return the records of one task."""
     scene, names, seeds = task
     if scene == "floors":
-        return floors(names) if estimators.asked("floors") else []
+        return floors(names) if estimators.is_selected("floors") else []
     found: Records = []
     taken, oracle = scenes.sampled(scene), scenes.sampled(scene, "oracle")
     elsewhere = scenes.sampled(scene, "elsewhere")
     seen = metrics.covered(taken.table)
     for material in materials.materials(names):
         reference = metrics.Reference.of(material.evaluate)
-        unseen = elsewhere.photograph(material.evaluate, None)
+        new_photos = elsewhere.photograph(material.evaluate, None)
         light = {False: taken.true.transport(material.evaluate)}
         light[True] = oracle.true.transport(material.evaluate)
         for row in estimators.rows().values():
@@ -71,9 +71,9 @@ def work(task: tuple[str, list[str], int]) -> Records:
                 for seed in range(seeds if row.random and not in_basis else 1):
                     capture = oracle if row.true_mesh else taken
                     table = capture.exposed(light[row.true_mesh], seed)
-                    since = time.perf_counter()
+                    start = time.perf_counter()
                     fit = row.estimator(table, basis, seed)
-                    seconds = time.perf_counter() - since
+                    seconds = time.perf_counter() - start
                     record: dict[str, Any] = {
                         "scene": scene, "material": material.name, "estimator": row.name,
                         "in_basis": in_basis, "seed": seed, "seconds": seconds,
@@ -82,7 +82,7 @@ def work(task: tuple[str, list[str], int]) -> Records:
                     }  # fmt: skip
                     record |= band_coverage(fit, reference, seen)
                     if not row.true_mesh and not in_basis and seed == 0:
-                        record |= image_errors(fit, table, unseen, basis, row.name)
+                        record |= image_errors(fit, table, new_photos, basis, row.name)
                     if (
                         not in_basis
                         and seed == 0
@@ -97,31 +97,32 @@ def work(task: tuple[str, list[str], int]) -> Records:
 
 
 def image_errors(
-    fit: estimators.Fitted, table: SampleTable, unseen: SampleTable, basis: Basis, name: str
+    fit: estimators.Fitted, table: SampleTable, new_photos: SampleTable, basis: Basis, name: str
 ) -> dict[str, float]:
-    """What the program reports of held-out photos, beside the error of photos of unseen views and
-    lights without noise, both through the scanned mesh: relative RMS and typical pixel."""
-    rho = np.asarray(fit.evaluate(unseen.angles))
-    predicted = rho * unseen.irradiance * unseen.cos_i[:, None]
-    rms, typical = metrics.image_error(predicted, unseen.radiance)
+    """Return the reported error on held-out photos, and the true error on photos of new views and
+    lights without noise, both with the scanned mesh: relative RMS and typical pixel."""
+    rho = np.asarray(fit.evaluate(new_photos.angles))
+    predicted = rho * new_photos.irradiance * new_photos.cos_i[:, None]
+    rms, typical = metrics.image_error(predicted, new_photos.radiance)
     out = {"image_rms": rms, "image_typical": typical}
     if name == "paper":
         parts = [
-            leave_out(table, photo, basis, PaperSettings()) for photo in photos_to_hold_out(table)
+            fit_without_photo(table, photo, basis, PaperSettings())
+            for photo in photos_to_hold_out(table)
         ]
-        held = summarise([part for part in parts if part is not None])
+        summary = summarise([part for part in parts if part is not None])
     else:
-        held = estimators.reported(fit)
-    if held is not None:
-        out |= {"held_out_rms": held.error, "held_out_typical": held.typical}
+        summary = estimators.reported(fit)
+    if summary is not None:
+        out |= {"held_out_rms": summary.error, "held_out_typical": summary.typical}
     return out
 
 
 def band_coverage(
     fit: estimators.Fitted, reference: metrics.Reference, seen: NDArray[np.bool_]
 ) -> dict[str, float]:
-    """Share of the truth inside the fit's 90 % bands (all channels), light and view within 80°: of
-    cells that hold a sample, and of those that do not. Nothing where a fit has no bands."""
+    """Return the fraction of cells whose true value is inside the 90 % interval (all channels,
+    light and view within 80°), for cells with and without samples. Empty without an interval."""
     interval = estimators.interval(fit)
     if interval is None:
         return {}
@@ -135,7 +136,7 @@ def band_coverage(
 
 
 def floors(names: list[str]) -> Records:
-    """The truth itself on the components of the basis without it."""
+    """Project the truth on the components of a basis: the lowest error that a fit can reach."""
     found: Records = []
     for material in materials.materials(names):
         reference = metrics.Reference.of(material.evaluate)
@@ -157,5 +158,5 @@ def floors(names: list[str]) -> Records:
 
 @lru_cache(maxsize=40)
 def true_pictures(name: str) -> NDArray[np.float32]:
-    """The sphere of a material under every world."""
+    """Return pictures of a sphere of the material under every world."""
     return spheres.pictures(materials.materials([name])[0].evaluate)

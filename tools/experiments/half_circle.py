@@ -1,4 +1,4 @@
-"""A polar slice as the paper draws it (its Fig. 9): a half-circle, the normal upwards."""
+"""A polar slice as in Fig. 9 of the paper: a half-circle with the normal upwards."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from patina.core.views.subject import COLOURS, round_up
 from .svg import FAINT
 
 RADIUS, WIDTH = 138.0, 310.0
-BASE = 168.0  # where the surface lies, pixels from the top
+BASE = 168.0  # y of the surface, pixels from the top
 
 
 def half_circle(
     title: str, curves: Sequence[tuple[NDArray[np.float64], str]], incidence: float, top: float
 ) -> str:
-    """Curves ((n, 3) ρ at the directions of slice_angles, dash) as an SVG group.
+    """Return an SVG group of curves ((n, 3) ρ at the directions of slice_angles, dash).
 
-    The radius is the cube root of ρ; the outer ring is the next of 1, 2, 5 above ``top``, so that
-    panels of one material can share it. Light from the left at ``incidence`` degrees.
+    The radius is the cube root of ρ. The outer ring is ``top``, rounded up to 1, 2 or 5 times a
+    power of ten, so that panels of one material can share it. Light comes from the left at
+    ``incidence`` degrees.
     """
     theta, _ = slice_angles(np.radians(incidence))
     ring, centre = round_up(top), WIDTH / 2
@@ -61,7 +62,7 @@ def half_circle(
 
 
 def _simplified(xs: NDArray, ys: NDArray) -> list[int]:
-    """Points at least a pixel apart, and the turns: a tenth of the file for the same picture."""
+    """Return indices of points at least 1.5 pixels apart: the file is ten times smaller."""
     keep = [0]
     for k in range(1, len(xs) - 1):
         if np.hypot(xs[k] - xs[keep[-1]], ys[k] - ys[keep[-1]]) >= 1.5:

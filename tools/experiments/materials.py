@@ -1,4 +1,4 @@
-"""The materials, their truth from the neural encodings, and the basis that has not seen them."""
+"""The materials, their true BRDFs from neural encodings, and bases that do not contain them."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PAPER = (
     "pink-fabric2",
     "green-latex",
 )
-"""The six of Ono et al. 2019, in the order of their Fig. 9."""
+"""The six materials of Ono et al. 2019, in the order of their Fig. 9."""
 
 FLAT = frozenset(
     (
@@ -37,48 +37,50 @@ FLAT = frozenset(
         "paper_white_rgb", "greencloth",
     )
 )  # fmt: skip
-"""Fabric, latex, felt and paper: materials without a highlight to speak of."""
+"""Fabric, latex, felt and paper: materials almost without a highlight."""
 
 
 @dataclass(frozen=True)
 class Material:
-    """One material. weights: (675,) of its encoding; trained: it is one of the 100 of MERL."""
+    """One material. weights: (675,) of its encoding; trained: whether it is in MERL."""
 
     name: str
     weights: NDArray[np.float32]
     trained: bool
 
     def evaluate(self, angles: Angles) -> NDArray[np.float32]:
-        """True ρ (..., 3) in 1/sr, from the network itself."""
+        """Return the true ρ (..., 3) in 1/sr, computed by the network."""
         return nbrdf.evaluate(self.weights, angles)
 
 
 def data_folder() -> Path:
-    """The folder of reference data beside the checkout."""
+    """Return the folder of the reference data, by default in ../shared."""
     return Path(os.environ.get("PATINA_SHARED", ROOT.parent / "shared")) / "data"
 
 
 def materials(names: Sequence[str] | None = None) -> list[Material]:
-    """The paper's six and the 25 validation materials, or those named (any of MERL's too)."""
+    """Return the named materials; by default the paper's six and the 25 validation materials."""
     merl = _encodings("nbrdf_merl.npz")
-    unseen = _encodings("nbrdf_validation.npz")
+    validation = _encodings("nbrdf_validation.npz")
     if names is None:
-        names = [*PAPER, *unseen]
+        names = [*PAPER, *validation]
     return [
-        Material(name, merl[name], True) if name in merl else Material(name, unseen[name], False)
+        Material(name, merl[name], True)
+        if name in merl
+        else Material(name, validation[name], False)
         for name in names
     ]
 
 
 def training_set() -> TrainingSet:
-    """The columns of the 100 encodings of MERL: computed once (20 s), then read from the cache."""
+    """Return the columns of the 100 MERL encodings, computed once (20 s) and then cached."""
     return _training_set()
 
 
 def basis_for(material: Material, count: int = 40, in_basis: bool = False) -> TrainedBasis:
-    """The basis that does not contain the material (all of it for a validation material).
+    """Return the basis without the material (of all 100 materials for a validation material).
 
-    in_basis: the other variant, the basis of all 100, which has seen the paper's six.
+    in_basis: return the basis of all 100 materials, which includes the paper's six.
     """
     without = (material.name,) if material.trained and not in_basis else ()
     return _basis(without, count)
@@ -93,8 +95,8 @@ def _training_set() -> TrainingSet:
         try:
             return TrainingSet.load(stored)
         except InputError:
-            stored.unlink()  # a damaged cache is made anew
-    say("training columns at cells and nodes (20 s, once)")
+            stored.unlink()  # a damaged cache file is computed again
+    say("computing the training columns (20 s, once)")
     names, weights = nbrdf.load(file)
     found = TrainingSet.compute(NeuralObservations(weights), names, PROVENANCE)
     stored.parent.mkdir(parents=True, exist_ok=True)

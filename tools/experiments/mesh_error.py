@@ -1,7 +1,8 @@
-"""Scanned variants of an exact mesh: how wrong its normals are is chosen, in degrees.
+"""Simulated scans: variants of an exact mesh with a given median normal error, in degrees.
 
-bumpy: vertices moved along their normals by a smooth random field (stereo errs in patches, not
-point by point), fine or coarse; blurred: details smoothed away, as refinement and decimation do.
+bumpy: vertices are moved along their normals by a smooth random field, fine or coarse, because the
+errors of stereo are correlated between neighbours; blurred: details are smoothed, as refinement and
+decimation do.
 """
 
 from __future__ import annotations
@@ -20,25 +21,25 @@ from .shapes import waves
 Array = NDArray[np.float64]
 
 FINE, COARSE = 0.012, 0.06
-"""Wavelengths of the bumps, of the mesh's size (diagonal of its box)."""
+"""Wavelengths of the bumps, as fractions of the diagonal of the bounding box."""
 
 
 def normal_errors(vertices: Array, true: Mesh) -> Array:
-    """(v,) degrees between a mesh's normals and those with its vertices moved to ``vertices``."""
+    """Return (v,) angles in degrees between true normals and those of ``vertices``."""
     incidence = _incidence(true)
     before = _normals(true.vertices, true.faces, incidence)
     return _angle(_normals(vertices, true.faces, incidence), before)
 
 
 def bumpy(true: Mesh, degrees: float, wavelength: float = FINE, seed: int = 0) -> Mesh:
-    """Bumps whose median normal error is ``degrees``; wavelength: of the mesh's size."""
+    """Add bumps of median normal error ``degrees``; wavelength: fraction of the mesh size."""
     field = waves(wavelength * true.size, 100 + seed)(true.vertices)
     moved = _bumps(true, true.vertices, field, degrees, 1e-3 * true.size * wavelength)
     return replace(true, vertices=moved)
 
 
 def blurred(true: Mesh, degrees: float, seed: int = 0) -> Mesh:
-    """Smoothed until the median normal error is ``degrees``, then faint coarse bumps (a third)."""
+    """Smooth until the median normal error is ``degrees``; add coarse bumps of a third of this."""
     average = _averaging(true)
     incidence = _incidence(true)
     normals = _normals(true.vertices, true.faces, incidence)
@@ -62,8 +63,10 @@ def blurred(true: Mesh, degrees: float, seed: int = 0) -> Mesh:
 
 
 def _bumps(mesh: Mesh, origin: Array, field: Array, degrees: float, start: float) -> Array:
-    """``origin`` moved along its normals by the amplitude whose median normal error is asked for
-    (steps in tan, which is all but linear)."""
+    """Move ``origin`` along its normals such that the median normal error is ``degrees``.
+
+    The amplitude is scaled iteratively by tan of the errors, which is almost linear in it.
+    """
     incidence = _incidence(mesh)
     normals = _normals(origin, mesh.faces, incidence)
     amplitude = start
@@ -77,14 +80,14 @@ def _bumps(mesh: Mesh, origin: Array, field: Array, degrees: float, start: float
 
 
 def _incidence(mesh: Mesh) -> csr_matrix:
-    """(v, f) 1 where a face meets a vertex."""
+    """Return the (v, f) matrix that is 1 where a face contains a vertex."""
     rows = mesh.faces.ravel()
     columns = np.repeat(np.arange(len(mesh.faces)), 3)
     return csr_matrix((np.ones(len(rows)), (rows, columns)), (len(mesh.vertices), len(mesh.faces)))
 
 
 def _normals(vertices: Array, faces: NDArray[np.int32], incidence: csr_matrix) -> Array:
-    """(v, 3) area-weighted: quicker than the program's, and the same on even triangles."""
+    """Return (v, 3) area-weighted normals: faster than Patina's, equal on uniform triangles."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     total = incidence @ np.cross(b - a, c - a)
     return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300))
@@ -96,7 +99,7 @@ def _angle(a: Array, b: Array) -> Array:
 
 
 def _averaging(mesh: Mesh) -> csr_matrix:
-    """(v, v) mean over the neighbours of each vertex."""
+    """Return the (v, v) matrix that averages over the neighbours of each vertex."""
     a, b = mesh.faces.ravel(), np.roll(mesh.faces, 1, axis=1).ravel()
     n = len(mesh.vertices)
     rows, columns = np.concatenate([a, b]), np.concatenate([b, a])
@@ -107,7 +110,10 @@ def _averaging(mesh: Mesh) -> csr_matrix:
 
 
 def make(kind: str) -> Callable[[Mesh, float, int], Mesh]:
-    """kind: bumpy (fine bumps), wavy (coarse bumps) or blurred, by their median normal error."""
+    """Return the function (mesh, median normal error in degrees, seed) → simulated scan.
+
+    kind: "bumpy" (fine bumps), "wavy" (coarse bumps) or "blurred".
+    """
     if kind == "blurred":
         return blurred
     wavelength = {"bumpy": FINE, "wavy": COARSE}[kind]

@@ -1,4 +1,4 @@
-"""Errors of a fitted BRDF against the truth: every measure that docs/method/experiments.md uses."""
+"""Errors of a fitted BRDF: all measures that docs/method/experiments.md uses."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from patina.core.samples import SampleTable
 
 Evaluate = Callable[[Angles], NDArray[np.floating]]
 
-LIMIT = 80.0  # degrees: light and view of the log and cube-root figures
+LIMIT = 80.0  # degrees: largest angle of light and view, for the log and cube-root errors
 SPECULAR = 10.0  # degrees of θh: the view is within twice that of the mirror direction
-PEAK = 5.0  # degrees of θh: where a false peak would stand
-BANDS = tuple(np.radians((0.0, 30.0, 60.0, 80.0)))  # of θd, for the peak's parts
-EVERY = 3  # of the 180 φd cells: the figures change by less than a hundredth of themselves
+PEAK = 5.0  # degrees of θh: cells of the highlight's peak
+BANDS = tuple(np.radians((0.0, 30.0, 60.0, 80.0)))  # of θd, in which the peak is also evaluated
+EVERY = 3  # step in the 180 φd cells: errors change by less than 1 % of their value
 
 
 @dataclass(frozen=True)
 class Cells:
-    """Cells of the MERL grid in view, at their centres. flat: (n,) place in the grid; near: light
-    and view within LIMIT; specular, peak: of those, θh below SPECULAR and PEAK."""
+    """Visible cells of the MERL grid, at their centres. flat: (n,) index in the grid; near: light
+    and view within LIMIT; specular, peak: the subset with θh below SPECULAR and PEAK."""
 
     angles: Angles
     flat: NDArray[np.intp]
@@ -40,11 +40,14 @@ class Cells:
 
 @dataclass(frozen=True)
 class Errors:
-    """log_rms, cube_root: light and view within 80° (core/brdf/metrics.py). relative_l2: all cells
-    in view, ‖fit − truth‖/‖truth‖ (the paper). specular_l2: the same for θh < 10°, light and view
-    within 80°. peak: fit ÷ truth at θh < 5°, geometric mean over the cells of the channels' sum;
-    peaks: the same for θd of 0–30°, 30–60°, 60–80° apart. seen_l2: relative L2 of the cells that
-    hold a sample (NaN: not asked for)."""
+    """log_rms, cube_root: light and view within 80° (core/brdf/metrics.py). relative_l2: all
+    visible cells, ‖fit − truth‖/‖truth‖ (the paper). specular_l2: the same for θh < 10°, light and
+    view within 80°. peak: fit ÷ truth at θh < 5°, geometric mean over the cells of the channels'
+    sum; peaks: the same separately for θd of 0–30°, 30–60°, 60–80°. seen_l2: relative L2 of the
+    cells that contain a sample (NaN: not computed).
+
+    The names of the fields are the keys of the stored records.
+    """
 
     log_rms: float
     cube_root: float
@@ -57,7 +60,7 @@ class Errors:
 
 @lru_cache(maxsize=2)
 def cells(every: int = EVERY) -> Cells:
-    """The cells that are compared."""
+    """Return the cells that are compared, every ``every``-th one in φd."""
     centres = Angles(*(a[:, :, every // 2 :: every] for a in merl_grid.node_angles(0.5)))
     flat = np.arange(90 * 90 * 180).reshape(merl_grid.SHAPE)[:, :, every // 2 :: every]
     seen = merl_grid.visible(centres)
@@ -77,18 +80,18 @@ def cells(every: int = EVERY) -> Cells:
 
 @dataclass(frozen=True)
 class Reference:
-    """The truth at the compared cells, evaluated once. values: (n, 3)."""
+    """True BRDF at the compared cells. values: (n, 3) in 1/sr."""
 
     values: NDArray[np.float64]
     every: int = EVERY
 
     @classmethod
     def of(cls, truth: Evaluate, every: int = EVERY) -> Reference:
-        """The truth of one material."""
+        """Evaluate the true BRDF of a material."""
         return cls(_at(truth, cells(every).angles), every)
 
     def errors(self, fit: Evaluate, seen: NDArray[np.bool_] | None = None) -> Errors:
-        """All figures of one fit; seen: (n,) cells of :func:`covered`."""
+        """Return all errors of a fit; seen: (n,) cells with samples, of :func:`covered`."""
         c = cells(self.every)
         a, b = _at(fit, c.angles), self.values
         root_a, root_b = (np.cbrt(x[c.near] * c.cos_i[c.near, None]) for x in (a, b))
@@ -109,8 +112,8 @@ class Reference:
         )
 
     def projected(self, basis: Basis, count: int, eta: float = 0.3) -> PrincipalBRDF:
-        """The truth on ``count`` components: what no fit in this basis can be expected to beat.
-        Least squares of the mapped values over the cells with light and view within LIMIT."""
+        """Project the truth on ``count`` components, the best that a fit in this basis is expected
+        to reach: least squares of mapped values over cells with light and view within LIMIT."""
         c = cells(self.every)
         angles = Angles(*(a[c.near] for a in c.angles))
         return PrincipalBRDF(basis, basis.project(self.values[c.near], angles, count, eta))
@@ -119,12 +122,12 @@ class Reference:
 def errors(
     fit: Evaluate, truth: Evaluate, seen: NDArray[np.bool_] | None = None, every: int = EVERY
 ) -> Errors:
-    """All figures of one fit, the truth evaluated anew."""
+    """Return all errors of a fit; evaluates the truth again at each call."""
     return Reference.of(truth, every).errors(fit, seen)
 
 
 def covered(table: SampleTable, every: int = EVERY) -> NDArray[np.bool_]:
-    """(n,) of the compared cells, those that hold at least one sample."""
+    """Return (n,), whether a compared cell contains at least one sample."""
     hit = np.zeros(90 * 90 * 180, bool)
     ih, idx, ip = merl_grid.index(table.angles)
     hit[np.ravel_multi_index((ih, idx, ip), merl_grid.SHAPE)] = True
@@ -132,15 +135,15 @@ def covered(table: SampleTable, every: int = EVERY) -> NDArray[np.bool_]:
 
 
 def projected(basis: Basis, truth: Evaluate, count: int, eta: float = 0.3) -> PrincipalBRDF:
-    """As :meth:`Reference.projected`, the truth evaluated anew."""
+    """As :meth:`Reference.projected`; evaluates the truth again at each call."""
     return Reference.of(truth).projected(basis, count, eta)
 
 
 def image_error(
     predicted: NDArray[np.floating], measured: NDArray[np.floating], dark: float = 0.05
 ) -> tuple[float, float]:
-    """(relative RMS ‖L̂ − L‖/‖L‖, median over pixels that are not dark of mean |L̂ − L| / mean L):
-    the two figures the program reports of held-out photos."""
+    """Return (relative RMS ‖L̂ − L‖/‖L‖, median over pixels that are not dark of mean |L̂ − L| /
+    mean L): the two errors that Patina reports for held-out photos."""
     difference = predicted.astype(np.float64) - measured
     level = measured.mean(axis=1)
     bright = level > dark * np.median(level)

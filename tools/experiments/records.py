@@ -1,4 +1,4 @@
-"""Picking from records: the few verbs that tables and figures need."""
+"""Queries on records, for tables and figures."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ Record = dict[str, Any]
 
 
 def where(records: Iterable[Record], **wanted: Any) -> list[Record]:
-    """The records that hold all of these values."""
+    """Return the records with all of these values."""
     return [r for r in records if all(r.get(k) == v for k, v in wanted.items())]
 
 
 def values(records: Iterable[Record], key: str) -> list[float]:
-    """One figure of each record that has it, NaN and failures left out."""
+    """Return the finite values of a key; records without one are skipped."""
     found = [r[key] for r in records if isinstance(r.get(key), int | float)]
     return [float(v) for v in found if np.isfinite(v)]
 
 
-def middle(records: Iterable[Record], key: str) -> float:
-    """Median of a figure; NaN where there is none."""
+def median(records: Iterable[Record], key: str) -> float:
+    """Return the median of the values of a key; NaN if there are none."""
     found = values(records, key)
     return float(np.median(found)) if found else float("nan")
 
 
 def distinct(records: Iterable[Record], key: str) -> list[Any]:
-    """The values of a key in the order of their first appearance."""
+    """Return the distinct values of a key in the order of their first appearance."""
     return list(dict.fromkeys(r[key] for r in records if key in r))
 
 
 def per_case(records: Iterable[Record], key: str) -> dict[tuple[str, str], float]:
-    """(material, scene) → median over seeds."""
+    """Return (material, scene) → median over seeds."""
     groups: dict[tuple[str, str], list[float]] = {}
     for r in records:
         if isinstance(r.get(key), int | float) and np.isfinite(r[key]):
@@ -44,19 +44,19 @@ def per_case(records: Iterable[Record], key: str) -> dict[tuple[str, str], float
 def ratios(
     above: Iterable[Record], below: Iterable[Record], key: str
 ) -> dict[tuple[str, str], float]:
-    """(material, scene) → figure of one estimator ÷ that of another, where both have it."""
+    """Return (material, scene) → ratio of the medians, for the cases in both sets of records."""
     a, b = per_case(above, key), per_case(below, key)
     return {case: a[case] / b[case] for case in a if case in b and b[case] > 0}
 
 
 def table(head: list[str], rows: Iterable[Iterable[str]]) -> str:
-    """A Markdown table."""
+    """Return a Markdown table."""
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)]) + "\n"
 
 
 def number(x: float, digits: int = 3) -> str:
-    """A figure for a table; – where there is none."""
+    """Format a value for a table; – if it is not finite."""
     if not np.isfinite(x):
         return "–"
     return f"{x:.0f}" if abs(x) >= 100 else f"{x:.{digits - (abs(x) >= 10) - (abs(x) >= 1)}f}"

@@ -1,4 +1,4 @@
-"""Tasks of an experiment on all cores, one process each, and what came out in their order."""
+"""Run the tasks of an experiment in parallel processes; the records keep the order of the tasks."""
 
 from __future__ import annotations
 
@@ -22,17 +22,19 @@ def run_all(
     only: Sequence[str] | None = None,
     keep: Callable[[Records], None] = lambda records: None,
 ) -> Records:
-    """The records of all tasks, in the tasks' order whatever their order of ending; only: the
-    estimators to run. keep is given all records so far after each task: a run that is broken off
-    has lost no more than one."""
-    since = time.perf_counter()
+    """Return the records of all tasks, in the order of the tasks.
+
+    only: estimators to run, None for all. keep: called with all records so far after each task, so
+    that an interrupted run loses only the tasks in progress.
+    """
+    start = time.perf_counter()
     results: dict[int, Records] = {}
     if workers <= 1 or len(tasks) == 1:
         _start(only)
         for place, task in enumerate(tasks):
             results[place] = work(task)
             keep(_in_order(results))
-            _tell(name, len(results), len(tasks), since)
+            _report_progress(name, len(results), len(tasks), start)
     else:
         context = get_context("spawn")
         with ProcessPoolExecutor(workers, context, _start, (only,)) as pool:
@@ -40,7 +42,7 @@ def run_all(
             for done in as_completed(waiting):
                 results[waiting[done]] = done.result()
                 keep(_in_order(results))
-                _tell(name, len(results), len(tasks), since)
+                _report_progress(name, len(results), len(tasks), start)
     return _in_order(results)
 
 
@@ -48,12 +50,16 @@ IDENTITY = (
     "sweep", "where", "value", "label", "variant", "kind",
     "scene", "material", "estimator", "in_basis", "seed",
 )  # fmt: skip
-"""What tells one record from another, where it has it."""
+"""Keys that identify a record, if it has them."""
 
 
 def merged(old: Records, new: Records, only: Sequence[str] | None, ended: bool) -> Records:
-    """New records in place of the old: until a run has ended, in place of the same cases alone (one
-    that is broken off loses nothing); then of all, or of the estimators that were run."""
+    """Replace old records by new ones.
+
+    While a run has not ended, only records of the same cases are replaced, so that an interrupted
+    run loses nothing. Afterwards, all old records are replaced, or (with ``only``) those of the
+    estimators that were run.
+    """
     if not ended:
         made = {_identity(record) for record in new}
         return [record for record in old if _identity(record) not in made] + new
@@ -71,12 +77,12 @@ def _start(only: Sequence[str] | None) -> None:
     load_patina()
     from . import estimators
 
-    estimators.restrict(only)
+    estimators.select(only)
 
 
 def _in_order(results: dict[int, Records]) -> Records:
     return [record for place in sorted(results) for record in results[place]]
 
 
-def _tell(name: str, done: int, of: int, since: float) -> None:
-    say(f"{name}: {done} of {of} ({time.perf_counter() - since:.0f} s)")
+def _report_progress(name: str, done: int, of: int, start: float) -> None:
+    say(f"{name}: {done} of {of} ({time.perf_counter() - start:.0f} s)")

@@ -1,4 +1,4 @@
-"""The captures that estimators are compared on: a true shape, its scan, shots, and unseen shots."""
+"""The captures for the comparison: a true shape, its scan, the lit photos and test photos."""
 
 from __future__ import annotations
 
@@ -16,42 +16,44 @@ from . import bunnies, mesh_error, shapes
 from .simulate import Sampled, Shot, sample_scanned
 
 ANGLES = (25.0, 60.0, 95.0, 130.0)
-"""Degrees from view to light, as in the scans of the reference data: two photos each."""
+"""Angles between view and light in degrees, two photos each, as in the reference data."""
 ORDER = (60.0, 25.0, 95.0, 130.0)
-"""The same in the order that own shapes' first photos have."""
-SIZE = (560, 480)  # pixels of the own shapes' photos
-FOCAL = 1150.0
-DISTANCE = 2.6
-LIT = 8  # photos
+"""The same angles in the order of the photos of the scripted shapes."""
+SIZE = (560, 480)  # of the photos of the scripted shapes, pixels
+FOCAL = 1150.0  # pixels
+DISTANCE = 2.6  # of the cameras, scan units
+LIT = 8  # number of lit photos
 
 
 @dataclass(frozen=True)
 class Scene:
-    """shots: the lit photos, 16 where there are so many (experiments use the first eight);
-    unseen: shots that no estimator is given."""
+    """shots: the lit photos, 8 or 16 (most experiments use the first 8). test_shots: photos that no
+    estimator gets, to measure the true error of predictions."""
 
     name: str
     true: Mesh
     scanned: Mesh
     shots: tuple[Shot, ...]
-    unseen: tuple[Shot, ...]
+    test_shots: tuple[Shot, ...]
 
     def sampled(self, photos: int = LIT) -> Sampled:
-        """What the program takes from the scan."""
+        """Return the samples that Patina takes with the scanned mesh."""
         return sample_scanned(self.true, self.scanned, self.shots[:photos])
 
     def oracle(self, photos: int = LIT) -> Sampled:
-        """The same with the true surface for a scan."""
+        """Return the samples with the true surface instead of the scan."""
         return sample_scanned(self.true, self.true, self.shots[:photos])
 
     def elsewhere(self) -> Sampled:
-        """The unseen shots, through the scan."""
-        return sample_scanned(self.true, self.scanned, self.unseen)
+        """Return the samples of the test photos, with the scanned mesh."""
+        return sample_scanned(self.true, self.scanned, self.test_shots)
 
 
 def light_at(camera: Camera, centre: np.ndarray, degrees: float, azimuth: float) -> DistantLight:
-    """A distant light of irradiance π so many degrees from the view of ``centre``; azimuth 0 is to
-    the photo's right, 90° above."""
+    """Return a distant light of irradiance π, ``degrees`` from the view direction of ``centre``.
+
+    azimuth: radians; 0 is to the right in the photo, π/2 is up.
+    """
     view = camera.pose.centre - centre
     view = view / np.linalg.norm(view)
     right, down = camera.pose.rotation[0], camera.pose.rotation[1]
@@ -63,9 +65,9 @@ def light_at(camera: Camera, centre: np.ndarray, degrees: float, azimuth: float)
 
 
 def rig(seed: int, count: int, angles: tuple[float, ...]) -> tuple[Shot, ...]:
-    """Cameras around an own shape, lights in turn at the given angles from the view.
+    """Return cameras around a scripted shape, with lights at the given angles from the view.
 
-    Cameras go around by the golden angle, so that any first n of them surround the object.
+    Azimuths of the cameras advance by the golden angle, so that the first n surround the object.
     """
     rng = np.random.default_rng(seed)
     shots = []
@@ -82,7 +84,7 @@ def rig(seed: int, count: int, angles: tuple[float, ...]) -> tuple[Shot, ...]:
 
 
 def own_scene(shape: str, kind: str, degrees: float) -> Scene:
-    """An own shape with 16 shots and a scan of chosen error."""
+    """Return a scripted shape with 16 shots and a simulated scan of given error."""
     true = shapes.true_shape(shape)
     scanned = mesh_error.make(kind)(true, degrees, 0)
     place = sorted(shapes.FIELDS).index(shape)
@@ -96,18 +98,18 @@ def own_scene(shape: str, kind: str, degrees: float) -> Scene:
 
 
 def bunny_scene(tool: str) -> Scene:
-    """A scanned bunny with its own eight lit shots; unseen: eight other cameras of the scan."""
+    """Return a scanned bunny with its eight lit shots, and eight test shots."""
     _, scan, shots = bunnies.opened(tool)
     true = bunnies.true_bunny()
     centre = true.vertices.mean(axis=0)
     cameras = bunnies.other_cameras(tool)
     rng = np.random.default_rng(3)
     some = [cameras[i] for i in np.linspace(0, len(cameras) - 1, LIT).astype(int)]
-    unseen = tuple(
+    test_shots = tuple(
         Shot(camera, light_at(camera, centre, degrees, np.radians(rng.uniform(-30, 210))))
         for camera, degrees in zip(some, ORDER * 2, strict=True)
     )
-    return Scene(f"bunny, {tool}", true, scan.mesh, shots, unseen)
+    return Scene(f"bunny, {tool}", true, scan.mesh, shots, test_shots)
 
 
 SCENES: dict[str, Callable[[], Scene]] = {
@@ -118,18 +120,18 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "bunny-refined": lambda: bunny_scene("OpenMVS refined"),
     "knot-blurred": lambda: own_scene("knot", "blurred", 1.0),
 }
-"""The captures of the table of goals."""
+"""Scenes of the table of goals."""
 
 
 @lru_cache(maxsize=6)
 def scene(name: str) -> Scene:
-    """One of SCENES."""
+    """Return one of SCENES, cached."""
     return SCENES[name]()
 
 
 @lru_cache(maxsize=8)
 def sampled(name: str, what: str = "sampled") -> Sampled:
-    """Geometry of a scene's samples, kept: what is "sampled", "oracle" or "elsewhere"."""
+    """Return the samples of a scene, cached; what: "sampled", "oracle" or "elsewhere"."""
     found = getattr(scene(name), what)()
     if not isinstance(found, Sampled):
         raise TypeError(what)

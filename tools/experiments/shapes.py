@@ -1,7 +1,7 @@
-"""True shapes made by script, all about one unit tall around the origin's vertical axis.
+"""Scripted true shapes, all about one unit tall, around the vertical axis through the origin.
 
-jar: the demo's object. pebble: a sphere with swells of three sizes. knot: a thick, ribbed trefoil,
-which like the paper's dragon hides and shadows much of itself.
+jar: the object of the demo. pebble: a sphere with bumps of three sizes. knot: a thick, ribbed
+trefoil with strong self-occlusion and self-shadowing, like the paper's dragon.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from .. import demo_shape
 from ..demo_shape import Field, make_field
 
 Array = NDArray[np.float64]
-CELL = 0.006
+CELL = 0.006  # of the grid for meshing
 CENTRE = np.array([0.0, 0.0, 0.5])
 
 
 def waves(wavelength: float, seed: int, count: int = 48) -> Callable[[Array], Array]:
-    """A smooth random field of about unit variance, points (..., 3): plane waves of about one
-    wavelength in random directions and phases."""
+    """Return a smooth random field of points (..., 3), of about unit variance: a sum of plane waves
+    of similar wavelength with random directions and phases."""
     rng = np.random.default_rng(seed)
     direction = rng.standard_normal((count, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -46,7 +46,7 @@ def waves(wavelength: float, seed: int, count: int = 48) -> Callable[[Array], Ar
 
 
 def pebble() -> Field:
-    """A sphere of radius 0.36 with swells."""
+    """Return a sphere of radius 0.36 with bumps."""
     large, middle, small = waves(0.55, 1), waves(0.22, 2), waves(0.09, 3)
 
     def field(p: Array) -> Array:
@@ -60,7 +60,7 @@ def pebble() -> Field:
 
 
 def knot() -> Field:
-    """A trefoil tube whose thickness swells and whose back is ribbed."""
+    """Return a trefoil tube of varying thickness, with ribs and bumps."""
     t = np.linspace(0, 2 * np.pi, 4001)[:-1]
     line = np.stack(
         [np.sin(t) + 2 * np.sin(2 * t), 1.15 * np.sin(3 * t), np.cos(t) - 2 * np.cos(2 * t)], -1
@@ -84,8 +84,10 @@ FIELDS: dict[str, Callable[[], Field]] = {"jar": make_field, "pebble": pebble, "
 
 @lru_cache(maxsize=3)
 def true_shape(name: str, cell: float = CELL) -> Mesh:
-    """The exact surface of one of FIELDS as a mesh of about 200,000 triangles; kept in the user's
-    cache (making it takes 20 to 40 s)."""
+    """Return the surface of one of FIELDS as a mesh of about 200,000 triangles.
+
+    The mesh is stored in the user's cache (computing it takes 20 to 40 s).
+    """
     code = hashlib.sha256(b"".join(Path(f).read_bytes() for f in (__file__, demo_shape.__file__)))
     stored = user_cache() / f"shape_{name}_{cell:g}_{code.hexdigest()[:12]}.npz"
     if stored.is_file():

@@ -1,9 +1,9 @@
-"""Photos of an exact surface, sampled through a scanned one.
+"""Simulate photos of the exact surface, and sample them with the scanned mesh.
 
-Rays meet the true mesh with its smooth normals; the truth is the neural encoding itself; light is
-direct, with cast shadows; the camera has shot and read noise. The samples are then taken by the
-program's own code through the scanned mesh. Geometry is found once for a pair of meshes; a material
-afterwards costs one evaluation of its network.
+Rays intersect the true mesh with its smooth normals. The true BRDF is the neural encoding; light is
+direct, with cast shadows; the camera has shot and read noise. Patina's own code then takes the
+samples with the scanned mesh. Geometry is computed once per pair of meshes, so that each material
+only costs one evaluation of its network.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from patina.core.scan import Camera, Mesh
 
 Evaluate = Callable[[Angles], NDArray[np.floating]]
 
-SUB = 2  # rays a pixel and axis: a highlight on a thin ear is narrower than a pixel
-FULL_WELL = 20_000  # electrons at the exposure's white: var = radiance·white/FULL_WELL + read²
+SUB = 2  # rays per pixel and axis: highlights on thin parts are narrower than a pixel
+FULL_WELL = 20_000  # electrons at the white level: var = radiance·white/FULL_WELL + read²
 READ_NOISE = 4.0  # electrons
-WHITE = 99.0  # percentile of the samples' radiance that is exposed to white; above it: bracketed
+WHITE = 99.0  # percentile of the radiance that is the white level; exposures are bracketed above it
 
 
 @dataclass(frozen=True)
 class Shot:
-    """One lit photo: where from, under which light."""
+    """One lit photo: its camera and light."""
 
     camera: Camera
     light: DistantLight
@@ -39,9 +39,9 @@ class Shot:
 
 @dataclass(frozen=True)
 class TruePixels:
-    """The true surface behind chosen pixels, SUB × SUB points of each. angles: (n, s) float32;
-    shading: (n, s) float32, max(n·l, 0), 0 in cast shadow and where the ray misses; hit: (n,) part
-    of the pixel that shows the surface."""
+    """The true surface in selected pixels, s = SUB × SUB points per pixel. angles: (n, s) float32;
+    shading: (n, s) float32, max(n·l, 0), 0 in cast shadow and where the ray misses; hit: (n,)
+    fraction of the pixel that shows the surface."""
 
     angles: Angles
     shading: NDArray[np.float32]
@@ -55,7 +55,7 @@ class TruePixels:
 
     @staticmethod
     def join(parts: Sequence[TruePixels]) -> TruePixels:
-        """One after the other."""
+        """Concatenate."""
         return TruePixels(
             Angles(*(np.concatenate([p.angles[k] for p in parts]) for k in range(3))),
             np.concatenate([p.shading for p in parts]),
@@ -63,7 +63,7 @@ class TruePixels:
         )
 
     def transport(self, evaluate: Evaluate) -> NDArray[np.float32]:
-        """(n, 3) mean over the pixel of ρ·max(n·l, 0): radiance for an irradiance of 1."""
+        """Return (n, 3) means over the pixels of ρ·max(n·l, 0): radiance for irradiance 1."""
         out = np.zeros((*self.shading.shape, 3), np.float32)
         lit = self.shading > 0
         rho = evaluate(Angles(*(a[lit] for a in self.angles)))
@@ -72,7 +72,7 @@ class TruePixels:
 
 
 def true_pixels(rays: RayScene, shot: Shot, sub: int = SUB) -> TruePixels:
-    """The true surface behind every pixel of a photo, h·w of them in row-major order."""
+    """Return the true surface in all h·w pixels of a photo, in row-major order."""
     width, height = shot.camera.width, shot.camera.height
     fine = shot.camera.resized(sub * width, sub * height)
     view = view_surface(rays, fine)
@@ -89,10 +89,10 @@ def true_pixels(rays: RayScene, shot: Shot, sub: int = SUB) -> TruePixels:
 
 @dataclass(frozen=True)
 class Sampled:
-    """Samples of a scanned mesh whose photos are not taken yet.
+    """Geometry of the samples of a scanned mesh, without radiance.
 
-    table: geometry as the scan says; radiance and ρ are 0. true: what is truly behind each row's
-    pixel. photos: how many.
+    table: samples with the geometry of the scan; radiance and ρ are 0. true: the true surface in
+    the pixel of each row. photos: number of photos.
     """
 
     table: SampleTable
@@ -100,11 +100,11 @@ class Sampled:
     photos: int
 
     def photograph(self, evaluate: Evaluate, seed: int | None = 0) -> SampleTable:
-        """The table a camera would give of this BRDF; seed None: without noise."""
+        """Return the samples for this BRDF; seed None: without noise."""
         return self.exposed(self.true.transport(evaluate), seed)
 
     def exposed(self, transport: NDArray[np.float32], seed: int | None = 0) -> SampleTable:
-        """As :meth:`photograph`, with the (n, 3) of TruePixels.transport found before."""
+        """As :meth:`photograph`, from the result (n, 3) of TruePixels.transport."""
         radiance = transport * self.table.irradiance
         if seed is not None:
             white = np.float32(np.percentile(radiance, WHITE) / FULL_WELL)
@@ -119,7 +119,7 @@ class Sampled:
         return Sampled(self.table.select(rows), self.true.select(rows), self.photos)
 
     def first_photos(self, count: int) -> Sampled:
-        """Only the first photos."""
+        """Return the samples of the first photos."""
         return replace(self.select(self.table.photo < count), photos=count)
 
 
@@ -130,8 +130,10 @@ def sample_scanned(
     margins: Margins | None = None,
     trusted: bool = True,
 ) -> Sampled:
-    """Geometry of all samples that the scanned mesh trusts; trusted False: every lit pixel that the
-    scan shows (what a prediction is compared on)."""
+    """Return the geometry of all samples that Patina would use.
+
+    trusted False: include all lit pixels that show the scan, for comparison with a prediction.
+    """
     true_rays, rays = RayScene.build(true_mesh), RayScene.build(scanned)
     tables, trues = [], []
     for shot in shots:

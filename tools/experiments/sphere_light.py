@@ -1,9 +1,9 @@
-"""A sphere under the HDR worlds, fit for mirrors too: every lobe is resolved, whatever its width.
+"""A sphere under the HDR worlds, with a quadrature that resolves lobes of any width.
 
-spheres.py draws one direction in each of 48 × 96 cells of a world: a lobe narrower than a cell is
-hit or missed. Here a pixel's directions of light lie on a grid of half vectors around its normal,
-θh on a logarithm, and each takes the mean of the world over about its own solid angle, from a
-pyramid of ever coarser maps. Orthographic view, no shadows or interreflection (a sphere has none).
+spheres.py samples one direction in each of 48 × 96 cells of a world, which is not enough for lobes
+narrower than a cell. Here the light directions of a pixel form a grid of half vectors around its
+normal, logarithmic in θh. Each direction uses the mean radiance over approximately its solid angle,
+from a pyramid of maps. Orthographic view, no shadows or interreflection (a sphere has none).
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ Floats = NDArray[np.float32]
 At = Callable[[Configuration], NDArray[np.floating]]
 
 DISC = 28  # pixels across
-NODES = (44, 48)  # half vectors: θh on a logarithm, φh over a whole turn
+NODES = (44, 48)  # numbers of half vectors: logarithmic in θh, uniform in φh over a full turn
 KNEE = np.radians(0.3)
 BLOCK = 200  # pixels at a time
 
 
 @dataclass(frozen=True)
 class Lit:
-    """Pairs of pixel and direction of light. normal: (p, 3) of the disc's pixels; inside: (h, w)
-    where they are; angles, cos_i, cos_o, each (p, n); light: (worlds, p, n, 3) L·cosθ·dω, 0 where
-    there is no such direction."""
+    """Pairs of a pixel and a light direction. inside: (h, w), whether a pixel is one of the p
+    pixels of the disc; angles, cos_i, cos_o: (p, n); light: (worlds, p, n, 3) L·cosθ·dω, 0 for
+    directions below the horizon."""
 
     inside: NDArray[np.bool_]
     angles: Angles
@@ -43,11 +43,11 @@ class Lit:
     light: Floats
 
     def table(self, evaluate: Evaluate) -> Floats:
-        """(worlds, p, 3) radiance of a BRDF that knows half/difference angles."""
+        """Return the radiance (worlds, p, 3) of a BRDF over half/difference angles."""
         return self._sum(lambda rows: evaluate(Angles(*(a[rows].ravel() for a in self.angles))))
 
     def model(self, at: At) -> Floats:
-        """(worlds, p, 3) radiance of a model that tells light from view."""
+        """Return the radiance (worlds, p, 3) of a model that is a function of a Configuration."""
 
         def rho(rows: slice) -> NDArray[np.floating]:
             cos_h, cos_d = (np.cos(a[rows].ravel()) for a in self.angles[:2])
@@ -68,7 +68,7 @@ class Lit:
 
 @lru_cache(maxsize=4)
 def lit(disc: int = DISC, only: str | None = None) -> Lit:
-    """The pairs of a disc ``disc`` pixels across; only: under one of the worlds."""
+    """Return the pairs for a disc of diameter ``disc`` pixels; only: name of a single world."""
     axis = (np.arange(disc) + 0.5) / disc * 2 - 1
     x, z = np.meshgrid(axis, -axis)
     inside = x**2 + z**2 < 0.98
@@ -108,12 +108,12 @@ def lit(disc: int = DISC, only: str | None = None) -> Lit:
 
 @dataclass(frozen=True)
 class Pyramid:
-    """A world as latitude-longitude maps, each half as large as the one before."""
+    """A world as latitude-longitude maps, each with half the resolution of the one before."""
 
     maps: tuple[Floats, ...]
 
     def mean_over(self, light: NDArray[np.floating], size: NDArray[np.floating]) -> Floats:
-        """Mean radiance (..., 3) over about ``size`` sr around unit vectors (..., 3), z up."""
+        """Return mean radiance (..., 3) over about ``size`` sr around unit vectors, z up."""
         rows, columns = self.maps[0].shape[:2]
         sine = np.sqrt(np.maximum(1 - light[..., 2] ** 2, 1e-4))
         texel = 2 * np.pi**2 / (rows * columns) * sine
@@ -133,7 +133,7 @@ class Pyramid:
 
 @lru_cache(maxsize=8)
 def pyramid(name: str) -> Pyramid:
-    """The named world of Blender's."""
+    """Return the pyramid of a world that Blender ships."""
     pixels = np.asarray(oiio.ImageBuf(str(worlds()[name])).get_pixels(oiio.FLOAT))[..., :3]
     maps = [pixels[: len(pixels) // 16 * 16, : pixels.shape[1] // 16 * 16].astype(np.float32)]
     while len(maps[-1]) % 2 == 0 and len(maps[-1]) > 8:

@@ -1,9 +1,9 @@
-"""A sphere under the HDR worlds that Blender ships: what a fit is worth in a picture.
+"""A sphere under the HDR worlds that Blender ships, to measure the error of a fit in pictures.
 
 Orthographic view, no shadows or interreflection (a sphere has none). Each pixel sums ρ·L·cos over
-the cells of the world (a latitude-longitude map averaged to 48 × 96 cells), one direction in each,
-jittered and the same for truth and fit. Exposure: the 95th percentile of the true picture is white.
-PSNR of the 8-bit sRGB values of the disc's pixels (background would only flatter).
+the cells of the world (a latitude-longitude map averaged to 48 × 96 cells), with one jittered
+direction per cell, equal for truth and fit. The 95th percentile of the true picture is white. PSNR
+of the 8-bit sRGB values of the disc's pixels (the background would increase it without reason).
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ Evaluate = Callable[[Angles], NDArray[np.floating]]
 
 ROWS, COLUMNS = 48, 96
 DISC = 28  # pixels across
-WHITE = 95.0
+WHITE = 95.0  # percentile
 CHUNK = 1 << 19
 
 
 @dataclass(frozen=True)
 class Quadrature:
-    """pixel, cell: (m,) of every pair of disc pixel and world cell above its horizon; angles: of
-    each; weight: (m,) cos θi × solid angle."""
+    """Pairs of a pixel of the disc and a cell of the world above its horizon. pixel, cell: (m,)
+    indices; angles: (m,); weight: (m,) cos θi × solid angle; pixels: number of pixels."""
 
     pixel: NDArray[np.int32]
     cell: NDArray[np.int32]
@@ -42,7 +42,7 @@ class Quadrature:
 
 
 def worlds() -> dict[str, Path]:
-    """Name → the .exr files that come with Blender's bpy module."""
+    """Return name → .exr file of the worlds in Blender's bpy module."""
     found = importlib.util.find_spec("bpy")
     if found is None or found.origin is None:
         return {}
@@ -53,7 +53,7 @@ def worlds() -> dict[str, Path]:
 
 @lru_cache(maxsize=1)
 def skies() -> tuple[tuple[str, ...], NDArray[np.float32]]:
-    """(names, (worlds, ROWS·COLUMNS, 3) mean radiance of each cell)."""
+    """Return (names, (worlds, ROWS·COLUMNS, 3) mean radiance of each cell)."""
     names, maps = [], []
     for name, file in worlds().items():
         pixels = np.asarray(oiio.ImageBuf(str(file)).get_pixels(oiio.FLOAT), np.float64)[..., :3]
@@ -70,7 +70,7 @@ def skies() -> tuple[tuple[str, ...], NDArray[np.float32]]:
 
 @lru_cache(maxsize=1)
 def quadrature() -> Quadrature:
-    """All pairs of pixel and cell."""
+    """Return all pairs of pixel and cell."""
     axis = (np.arange(DISC) + 0.5) / DISC * 2 - 1
     x, z = np.meshgrid(axis, -axis)
     inside = x**2 + z**2 < 0.98
@@ -100,7 +100,7 @@ def quadrature() -> Quadrature:
 
 
 def pictures(evaluate: Evaluate) -> NDArray[np.float32]:
-    """(worlds, pixels, 3) radiance of the disc's pixels under every world."""
+    """Return the radiance (worlds, pixels, 3) of the disc's pixels under every world."""
     q, (_, sky) = quadrature(), skies()
     out = np.zeros((len(sky), q.pixels, 3))
     for start in range(0, len(q.pixel), CHUNK):
@@ -115,7 +115,7 @@ def pictures(evaluate: Evaluate) -> NDArray[np.float32]:
 
 
 def psnr(fit: NDArray[np.float32], truth: NDArray[np.float32]) -> NDArray[np.float64]:
-    """(worlds,) dB between pictures of :func:`pictures`; at most 60 (the same bytes)."""
+    """Return the PSNR (worlds,) in dB of pictures of :func:`pictures`, at most 60 (equal bytes)."""
     found = []
     for a, b in zip(fit, truth, strict=True):
         white = max(float(np.percentile(b, WHITE)), 1e-9)

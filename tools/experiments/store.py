@@ -1,4 +1,4 @@
-"""Results on disk, one JSON file an experiment: documents are written without computing again."""
+"""Results on disk, one JSON file per experiment, to write documents without running it again."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ..common import cache_dir
 
 
 def path(name: str, quick: bool) -> Path:
-    """Where an experiment's results lie, in the user's cache."""
+    """Return the file of an experiment's results, in the user's cache."""
     return cache_dir() / "experiments" / f"{name}{'.quick' if quick else ''}.json"
 
 
 def save(name: str, results: Any, quick: bool) -> None:
-    """Write results; the file appears whole or not at all."""
+    """Write results; an interrupted call leaves no incomplete file."""
     file = path(name, quick)
     file.parent.mkdir(parents=True, exist_ok=True)
     partial = file.with_name(file.name + ".part")
@@ -25,6 +25,6 @@ def save(name: str, results: Any, quick: bool) -> None:
 
 
 def load(name: str, quick: bool = False) -> Any | None:
-    """What was saved, or None."""
+    """Return the stored results, or None."""
     file = path(name, quick)
     return json.loads(file.read_text("utf-8")) if file.is_file() else None

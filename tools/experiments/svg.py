@@ -1,4 +1,4 @@
-"""Charts as SVG, by hand: axes, lines, points, bars with whiskers, panels side by side."""
+"""Charts as SVG text: axes, lines, points, error bars, panels in rows and columns."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ LEFT, RIGHT, TOP, BOTTOM = 52, 10, 26, 40
 
 @dataclass
 class Chart:
-    """One pair of axes. x_log, y_log: decades; x_range, y_range: what is shown; x_ticks: (value,
-    label) where the automatic ones will not do. Coordinates are data, the rest pixels."""
+    """One pair of axes. x_log, y_log: whether an axis is logarithmic; x_range, y_range: limits;
+    x_ticks: (value, label) to replace automatic ticks. Positions are in data coordinates, all other
+    lengths in pixels."""
 
     title: str
     x_label: str
@@ -31,12 +32,12 @@ class Chart:
     parts: list[str] = field(default_factory=list)
 
     def x(self, value: float) -> float:
-        """Pixel of a value on the x axis."""
+        """Return the x coordinate of a value, pixels."""
         t = _place(value, self.x_range, self.x_log)
         return LEFT + t * (self.width - LEFT - RIGHT)
 
     def y(self, value: float) -> float:
-        """Pixel of a value on the y axis."""
+        """Return the y coordinate of a value, pixels."""
         t = _place(value, self.y_range, self.y_log)
         return self.height - BOTTOM - t * (self.height - TOP - BOTTOM)
 
@@ -44,7 +45,7 @@ class Chart:
         self, xs: Sequence[float], ys: Sequence[float], colour: str, dash: str = "",
         marks: bool = True,
     ) -> None:  # fmt: skip
-        """A polyline, with a dot at each point."""
+        """Draw a polyline, with a dot at each point if ``marks``."""
         path = " ".join(f"{self.x(a):.1f},{self.y(b):.1f}" for a, b in zip(xs, ys, strict=True))
         extra = f' stroke-dasharray="{dash}"' if dash else ""
         self.parts.append(
@@ -57,28 +58,28 @@ class Chart:
     def band(
         self, xs: Sequence[float], low: Sequence[float], high: Sequence[float], colour: str
     ) -> None:
-        """What lies between two lines, faintly."""
+        """Fill the area between two lines."""
         there = [f"{self.x(a):.1f},{self.y(b):.1f}" for a, b in zip(xs, low, strict=True)]
         back = [f"{self.x(a):.1f},{self.y(b):.1f}" for a, b in zip(xs, high, strict=True)]
         points = " ".join(there + back[::-1])
         self.parts.append(f'<polygon points="{points}" fill="{colour}" fill-opacity="0.13"/>')
 
     def dot(self, x: float, y: float, colour: str, radius: float = 2.6) -> None:
-        """A point."""
+        """Draw a point."""
         self.parts.append(
             f'<circle cx="{self.x(x):.1f}" cy="{self.y(y):.1f}" r="{radius}" fill="{colour}" '
             'fill-opacity="0.8"/>'
         )
 
     def ring(self, x: float, y: float, colour: str) -> None:
-        """A point that stands out."""
+        """Draw a ring around a point."""
         self.parts.append(
             f'<circle cx="{self.x(x):.1f}" cy="{self.y(y):.1f}" r="5" fill="none" '
             f'stroke="{colour}" stroke-width="1.6"/>'
         )
 
     def whisker(self, x: float, low: float, high: float, colour: str) -> None:
-        """A vertical line from low to high with small ends."""
+        """Draw a vertical error bar from low to high."""
         c, upper, lower = self.x(x), self.y(high), self.y(low)
         self.parts.append(
             f'<path d="M{c:.1f} {upper:.1f}V{lower:.1f}M{c - 2:.1f} {upper:.1f}h4'
@@ -86,7 +87,7 @@ class Chart:
         )
 
     def shade(self, low: float, high: float) -> None:
-        """A faint column between two values of x."""
+        """Shade the area between two values of x."""
         a, b = self.x(low), self.x(high)
         self.parts.append(
             f'<rect x="{a:.1f}" y="{TOP}" width="{b - a:.1f}" '
@@ -94,21 +95,21 @@ class Chart:
         )
 
     def level(self, y: float, colour: str = INK, dash: str = "4 3") -> None:
-        """A horizontal line across."""
+        """Draw a horizontal line over the full width."""
         self.parts.append(
             f'<path d="M{LEFT} {self.y(y):.1f}H{self.width - RIGHT}" stroke="{colour}" '
             f'stroke-dasharray="{dash}" fill="none"/>'
         )
 
     def text(self, x: float, y: float, words: str, anchor: str = "start") -> None:
-        """Words at a point of the data."""
+        """Write text at a point."""
         self.parts.append(
             f'<text x="{self.x(x):.1f}" y="{self.y(y):.1f}" text-anchor="{anchor}">'
             f"{escape(words)}</text>"
         )
 
     def drawing(self) -> str:
-        """The chart as an SVG group."""
+        """Return the chart as an SVG group."""
         bottom, right = self.height - BOTTOM, self.width - RIGHT
         out = [f'<text x="{LEFT}" y="15" class="t">{escape(self.title)}</text>']
         for value, label in _ticks(self.y_range, self.y_log):
@@ -136,7 +137,7 @@ class Chart:
 
 
 def legend(entries: Sequence[tuple[str, str, str]]) -> str:
-    """(label, colour, dash; "bar" for a filled swatch) in one row, as an SVG group."""
+    """Return an SVG group of entries in a row: (label, colour, dash or "bar" for a rectangle)."""
     out, x = [], 8.0
     for label, colour, dash in entries:
         if dash == "bar":
@@ -156,7 +157,7 @@ def legend(entries: Sequence[tuple[str, str, str]]) -> str:
 def sheet(
     panels: Sequence[str], columns: int, size: tuple[int, int], head: str = "", title: str = ""
 ) -> str:
-    """Panels (SVG groups of one size) in rows under a legend: a whole SVG file, on white."""
+    """Return an SVG file with panels (SVG groups of one size) in rows under a legend, on white."""
     rows = -(-len(panels) // columns)
     above = 24 if head else 4
     width, height = columns * size[0], rows * size[1] + above

@@ -1,4 +1,4 @@
-"""What the paper left open: one setting or circumstance changed at a time."""
+"""Sweeps that the paper does not report: one setting or condition is changed at a time."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ COMPARED = ("paper", "all samples k=20", "ours")
 
 
 def tasks(quick: bool) -> list[tuple[str, str, bool]]:
-    """(sweep, scene or shape, quick)."""
+    """Return (sweep, scene or shape, quick) of each task."""
     if quick:
         return [("samples", "pebble-wavy", True), ("mesh error, bumpy", "pebble", True)]
     return [
@@ -39,12 +39,12 @@ def tasks(quick: bool) -> list[tuple[str, str, bool]]:
 
 
 def work(task: tuple[str, str, bool]) -> Records:
-    """One record a value, material, estimator and seed."""
+    """Return one record per value, material, estimator and seed."""
     sweep, where, quick = task
     names = ("alum-bronze", "pink-fabric") if quick else MATERIALS
     found: Records = []
     for label, value, taken, row in _cases(sweep, where, quick):
-        if not estimators.asked(row.name):
+        if not estimators.is_selected(row.name):
             continue
         for material in materials.materials(names):
             reference = metrics.Reference.of(material.evaluate)

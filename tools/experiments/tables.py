@@ -6,11 +6,11 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from .ablation import VARIANTS
-from .records import Record, distinct, middle, number, table, values, where
+from .records import Record, distinct, median, number, table, values, where
 
 
 def check(records: list[Record]) -> str:
-    """Ours against the other renderer's photos."""
+    """Compare Patina's photos with those of the other renderer."""
     rows = [
         [
             r["tool"], r["material"], f"{r['samples']:,}", f"{r['median']:+.4f}",
@@ -18,12 +18,18 @@ def check(records: list[Record]) -> str:
         ]
         for r in records
     ]  # fmt: skip
-    head = ["mesh of", "material", "pixels", "median of ln(Patina / reference)", "robust scatter"]
+    head = [
+        "mesh made by",
+        "material",
+        "pixels",
+        "median of ln(Patina / reference)",
+        "robust scatter",
+    ]
     return table([*head, "relative L2", "share of the 20 worst pixels"], rows)
 
 
 def ablation(records: list[Record], key: str) -> str:
-    """Mean ± standard deviation over the runs, one row a scene and material."""
+    """Return mean ± standard deviation over the runs, one row per scene and material."""
     runs = [r for r in records if "variant" in r]
     rows = []
     for scene in distinct(runs, "scene"):
@@ -37,7 +43,7 @@ def ablation(records: list[Record], key: str) -> str:
 
 
 def ablation_claims(records: list[Record]) -> str:
-    """How often each assumption helps, from the means."""
+    """Return how often each assumption reduces the mean error."""
     runs = [r for r in records if "variant" in r]
     rows = []
     for key, words in (
@@ -60,12 +66,16 @@ def ablation_claims(records: list[Record]) -> str:
             better = sum(g < 1 for g in gains)
             cells.append(f"{np.median(gains):.2f} ({better} of {len(gains)})")
         rows.append([words, *cells])
-    head = ["error with ÷ without, median (cases where it is lower)", *list(VARIANTS)[1:]]
+    head = [
+        "error with ÷ without the assumption, median (cases where it is lower)",
+        *list(VARIANTS)[1:],
+    ]
     return table(head, rows)
 
 
 def similarity(records: list[Record]) -> str:
-    """Rank correlation of similarity and error within each run, and what choosing by it gains."""
+    """Return the rank correlation of similarity and error within each run, and the error of the
+    candidate with the highest similarity."""
     runs = [r for r in records if "candidates" in r]
     rows = []
     for name in distinct(runs, "material"):
@@ -84,12 +94,14 @@ def similarity(records: list[Record]) -> str:
                 f"{np.median(best):.2f}",
             ]
         rows.append([name, *cells])
-    head = ["material", "rank correlation, log RMS", "chosen ÷ median", "best ÷ median"]
-    return table([*head, "rank correlation, relative L2", "chosen ÷ median", "best ÷ median"], rows)
+    head = ["material", "rank correlation, log RMS", "selected ÷ median", "best ÷ median"]
+    return table(
+        [*head, "rank correlation, relative L2", "selected ÷ median", "best ÷ median"], rows
+    )
 
 
 def sweep(records: list[Record], name: str) -> str:
-    """Medians over materials and seeds: log RMS, then around the specular direction."""
+    """Return medians over materials and seeds: log RMS, and L2 near the specular direction."""
     here = where(records, sweep=name)
     rows = []
     for place in distinct(here, "where"):
@@ -100,7 +112,7 @@ def sweep(records: list[Record], name: str) -> str:
             for _, label in marks:
                 at = where(some, label=label)
                 failed = sum("failed" in r for r in at)
-                words = f"{number(middle(at, 'log_rms'))}, {number(middle(at, 'specular_l2'))}"
+                words = f"{number(median(at, 'log_rms'))}, {number(median(at, 'specular_l2'))}"
                 cells.append("" if not at else "no fit" if failed == len(at) else words)
             rows.append([place, estimator, *cells])
     labels = [label for _, label in sorted({(r["value"], r["label"]) for r in here})]

@@ -1,1 +1,1 @@
-"""Captures with a hidden effect, and whether `diagnose` finds it."""
+"""Simulated captures with a hidden effect, to test whether `diagnose` finds it."""

@@ -1,4 +1,7 @@
-"""What cameras do to light: each an operation on pictures, without a word of Patina's."""
+"""Faults of cameras as operations on images. Shares no code with Patina.
+
+photos: list of (h, w, 3) linear radiance; every function returns new images of the same shapes.
+"""
 
 from __future__ import annotations
 
@@ -9,19 +12,19 @@ Array = np.ndarray
 
 
 def tone(photos: list[Array], gamma: float) -> list[Array]:
-    """A power curve that leaves 18 % of the white where it is."""
+    """Apply a power curve that does not change 18 % grey (of the white level)."""
     grey = 0.18 * max(float(np.percentile(p, 99)) for p in photos)
     return [grey * np.power(np.maximum(p, 0) / grey, gamma) for p in photos]
 
 
 def clipped(photos: list[Array], level: float) -> list[Array]:
-    """Nothing above a level; level is of the photos' brightest."""
+    """Clip at ``level``, a fraction of the brightest value of all photos."""
     top = max(float(p.max()) for p in photos)
     return [np.minimum(p, level * top) for p in photos]
 
 
 def vignetted(photos: list[Array], corner: float) -> list[Array]:
-    """cos⁴ of a lens whose corners are darker by this part."""
+    """Apply cos⁴ vignetting; corner: fraction by which the corners are darker."""
     height, width = photos[0].shape[:2]
     y, x = np.mgrid[:height, :width] + 0.5
     r2 = ((x - width / 2) ** 2 + (y - height / 2) ** 2) / (0.25 * (width**2 + height**2))
@@ -30,7 +33,7 @@ def vignetted(photos: list[Array], corner: float) -> list[Array]:
 
 
 def veiled(photos: list[Array], part: float) -> list[Array]:
-    """Part of the light lands elsewhere: half evenly, half about where it came from."""
+    """Scatter a fraction ``part`` of the light: half uniformly, half nearby (veiling glare)."""
     out = []
     for p in photos:
         wide = 0.2 * np.hypot(*p.shape[:2])
@@ -40,7 +43,10 @@ def veiled(photos: list[Array], part: float) -> list[Array]:
 
 
 def smudged(photos: list[Array], where: Array, wide: float, depth: float) -> list[Array]:
-    """A soft dark spot at the same place of every photo; where: (2,), wide: parts of the width."""
+    """Darken a soft spot at the same position of every photo.
+
+    where: (2,) and wide: position and standard deviation, fractions of the width. depth: darkening.
+    """
     height, width = photos[0].shape[:2]
     y, x = np.mgrid[:height, :width] / width
     r2 = (x - where[0]) ** 2 + (y - where[1] * height / width) ** 2
@@ -49,7 +55,7 @@ def smudged(photos: list[Array], where: Array, wide: float, depth: float) -> lis
 
 
 def striped(photos: list[Array], turn: float, period: float, depth: float) -> list[Array]:
-    """Stripes of a period in pixels."""
+    """Multiply by cosine stripes. turn: direction, radians; period: pixels; depth: amplitude."""
     height, width = photos[0].shape[:2]
     y, x = np.mgrid[:height, :width]
     wave = np.cos(2 * np.pi * (x * np.cos(turn) + y * np.sin(turn)) / period)
@@ -57,12 +63,12 @@ def striped(photos: list[Array], turn: float, period: float, depth: float) -> li
 
 
 def balanced(photos: list[Array], which: int, gains: Array) -> list[Array]:
-    """One photo's channels times e to these gains (3,)."""
+    """Multiply the channels of photo ``which`` by exp(gains), (3,)."""
     return [p * np.exp(gains) if k == which else p for k, p in enumerate(photos)]
 
 
 def with_noise(photos: list[Array], rng: np.random.Generator, well: float = 20_000) -> list[Array]:
-    """Shot and read noise of a camera; the brightest percent is exposed to white."""
+    """Add shot and read noise. The 99th percentile is exposed to ``well`` electrons."""
     white = max(float(np.percentile(p, 99)) for p in photos)
     out = []
     for p in photos:

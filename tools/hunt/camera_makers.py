@@ -1,4 +1,4 @@
-"""Effects of the camera, of the vocabulary and beyond it."""
+"""Effects of the camera: causes of the diagnosis, and others."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Callable
 import numpy as np
 
 from . import camera_faults
-from .scene import Hidden, Scene, rms, sought
+from .scene import Hidden, Scene, find_size, rms
 
 Array = np.ndarray
 
 
-def _sized(name: str, how: Callable[[list[Array], float], list[Array]], start: float):  # type: ignore[no-untyped-def]
+def _sized(name: str, apply: Callable[[list[Array], float], list[Array]], start: float):  # type: ignore[no-untyped-def]
     def made(scene: Scene) -> Hidden:
-        size = sought(lambda s: rms(how(scene.plain, s), scene.plain), start, scene.strength)
-        photos = how(scene.plain, size)
+        size = find_size(lambda s: rms(apply(scene.plain, s), scene.plain), start, scene.strength)
+        photos = apply(scene.plain, size)
         return Hidden(photos, {name: size}, rms(photos, scene.plain))
 
     return made
@@ -26,37 +26,37 @@ veil = _sized("part", camera_faults.veiled, 0.02)
 
 
 def tone(scene: Scene) -> Hidden:
-    """A power curve was applied."""
+    """The photos have an unknown power curve."""
     sign = scene.rng.choice([-1.0, 1.0])
     return _sized("gamma − 1", lambda p, s: camera_faults.tone(p, 1 + sign * s), 0.05)(scene)
 
 
 def clipping(scene: Scene) -> Hidden:
-    """Highlights end at a plateau that nobody told."""
+    """Highlights are clipped at an unknown level."""
     low, high = 0.02, 1.0
     for _ in range(20):
         level = (low * high) ** 0.5
-        more = rms(camera_faults.clipped(scene.plain, level), scene.plain) > scene.strength
-        low, high = (level, high) if more else (low, level)
+        stronger = rms(camera_faults.clipped(scene.plain, level), scene.plain) > scene.strength
+        low, high = (level, high) if stronger else (low, level)
     photos = camera_faults.clipped(scene.plain, high)
     return Hidden(photos, {"level": high}, rms(photos, scene.plain))
 
 
 def smudge(scene: Scene) -> Hidden:
-    """A smudge on the lens: the same place of every photo is darker."""
+    """A smudge on the lens darkens the same position of every photo."""
     where = scene.rng.uniform(0.35, 0.65, 2)
     wide = scene.rng.uniform(0.06, 0.12)
     return _sized("depth", lambda p, s: camera_faults.smudged(p, where, wide, s), 0.1)(scene)
 
 
 def moire(scene: Scene) -> Hidden:
-    """Stripes that are the sensor's."""
+    """Stripes fixed to the sensor."""
     turn, period = scene.rng.uniform(0, np.pi), scene.rng.uniform(14, 30)
     return _sized("depth", lambda p, s: camera_faults.striped(p, turn, period, s), 0.05)(scene)
 
 
 def white_balance(scene: Scene) -> Hidden:
-    """One photo was balanced differently."""
+    """One photo has another white balance."""
     which = int(scene.rng.integers(len(scene.plain)))
     gains = scene.rng.normal(size=3)
     gains -= gains.mean()

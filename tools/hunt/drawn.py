@@ -1,4 +1,4 @@
-"""What is drawn from a seed: a material, and where cameras and lights are."""
+"""Random material, cameras and lights of a capture, drawn from a seed."""
 
 from __future__ import annotations
 
@@ -14,26 +14,29 @@ from .scene import Shot
 
 Array = np.ndarray
 
-SIZE, FOCAL, DISTANCE = (240, 220), 430.0, 2.2
+SIZE, FOCAL, DISTANCE = (240, 220), 430.0, 2.2  # pixels, pixels, scan units
 PHOTOS, LIGHTS = 8, 4
-AWAY = np.radians([25.0, 60.0, 95.0, 130.0])  # of the lights from the view
+AWAY = np.radians([25.0, 60.0, 95.0, 130.0])  # angles between light and view, radians
 
 
-def any_brdf(basis: Basis, rng: np.random.Generator) -> tuple[int, PrincipalBRDF]:
-    """One that the basis was made of, and whose highlight these small photos can show: at least
-    half as bright 3° beside its middle."""
+def random_brdf(basis: Basis, rng: np.random.Generator) -> tuple[int, PrincipalBRDF]:
+    """Return a random training material of the basis, as (index, BRDF).
+
+    Its highlight must be wide enough for the small photos: at θh = 3° at least half as bright as in
+    its middle.
+    """
     assert basis.training is not None
-    beside = Angles(np.radians([0.2, 3.0]), np.full(2, np.radians(25.0)), np.full(2, np.pi / 2))
+    highlight = Angles(np.radians([0.2, 3.0]), np.full(2, np.radians(25.0)), np.full(2, np.pi / 2))
     while True:
         material = int(rng.integers(len(basis.training) // 3))
         brdf = PrincipalBRDF(basis, basis.training[3 * material : 3 * material + 3])
-        middle, aside = brdf.evaluate(beside).mean(axis=1)
-        if aside > 0.5 * middle:
+        peak, flank = brdf.evaluate(highlight).mean(axis=1)
+        if flank > 0.5 * peak:
             return material, brdf
 
 
-def any_shots(rng: np.random.Generator) -> list[Shot]:
-    """Two photos under each light; cameras about the object."""
+def random_shots(rng: np.random.Generator) -> list[Shot]:
+    """Return PHOTOS shots around the object, two under each of the LIGHTS lights."""
     turn = rng.uniform(0, 2 * np.pi)
     shots = []
     for k in range(PHOTOS):

@@ -1,4 +1,4 @@
-"""One capture of the hunt, made, diagnosed and judged against what was hidden in it."""
+"""Make one capture of the hunt, diagnose it, and compare the result with the hidden effect."""
 
 from __future__ import annotations
 
@@ -22,19 +22,24 @@ from patina.core.jobs.check_job import CheckJob
 from .make import CAPTURE, OUTSIDERS, Truth, make, make_plain
 from .state import state
 
-SURE = 1.96  # standard errors to either side of a 95 % interval
+HALF_WIDTH_95 = 1.96  # standard errors from the centre of a 95 % interval to its ends
 OWN_BRDF = ("second_material", "subsurface", "anisotropy", "outside_basis", "interreflection")
-"""What hides in the material itself, so that the material drawn is not the truth."""
+"""Causes that change the material, so that the BRDF drawn from the seed is not the truth."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """cause, seed, wanted: of the capture; strength: RMS change as it came out. named: causes, best
-    first; ties: those declared of the first. gain: of the first, in standard errors. brdf: error of
-    the second fit over that of a fit to photos without the effect, None where the material is
-    another one; brdf_before: of the first fit, None too where that was not noted yet. over_floor:
-    of left-out parts, after. off: what numbers that the truth says are off by, in standard errors.
-    seconds: making, diagnosing. state: of the code (state.py), "" where that was not noted yet."""
+    """One row of the table. cause, wanted, seed: effect, requested RMS change and seed of the
+    capture; strength: RMS change achieved. named: causes found, best first; ties: causes that
+    explain the photos as well as the first. gain: of the first cause, in standard errors. brdf:
+    BRDF error of the second fit, divided by that of a fit to photos without the effect; None if the
+    effect changes the material. brdf_before: the same of the first fit; None also in rows older
+    than this field. over_floor: error of held-out regions after the second fit, divided by the
+    noise floor. off: errors of the parameters with a known true value, in standard errors. seconds:
+    time of rendering and of the diagnosis. state: version of the code (state.py), "" in rows older
+    than this field.
+
+    The names of the fields are the keys of the stored rows."""
 
     cause: str
     wanted: float
@@ -52,20 +57,20 @@ class Row:
 
     @property
     def hidden(self) -> set[str]:
-        """The causes that are there."""
+        """The causes in the capture."""
         if self.cause == "none":
             return set()
         return {"unknown"} if self.cause in OUTSIDERS else set(self.cause.split("+"))
 
     @property
     def inside(self) -> int:
-        """Of these, how many lie in their 95 % interval."""
-        return sum(abs(each) < SURE for each in self.off)
+        """Number of parameters in ``off`` whose 95 % interval contains the true value."""
+        return sum(abs(each) < HALF_WIDTH_95 for each in self.off)
 
     @property
     def right(self) -> bool:
-        """The cause first; of none nothing, of a pair both and nothing else; beyond the vocabulary
-        ``unknown``, alone or beside others."""
+        """Whether the diagnosis is right: the hidden cause is named first; no cause for none; both
+        causes and no third for a pair; ``unknown``, with or without others, for other effects."""
         if len(self.hidden) != 1:
             return set(self.named) == self.hidden
         if self.hidden == {"unknown"}:
@@ -74,16 +79,16 @@ class Row:
 
     @property
     def wrong_name(self) -> bool:
-        """A single cause for which another one is named first, and not even as a tie."""
+        """Whether another cause is named first, and no hidden cause is declared as its tie."""
         first = set(self.named[:1]) - {"unknown"}
         return not self.right and bool(first - self.hidden) and not self.hidden & set(self.ties)
 
 
 def judged(cause: str, strength: float, seed: int, threads: int | None = None) -> Row:
-    """Make a capture in a folder that is thrown away, and look what is found in it."""
-    of_code = state()
+    """Make a capture in a temporary folder, diagnose it and return its row."""
+    version = state()
     with tempfile.TemporaryDirectory() as folder:
-        since = time.perf_counter()
+        start = time.perf_counter()
         truth = make(Path(folder), cause, strength, seed)
         made = time.perf_counter()
         fit = FitJob(read_capture(Path(folder) / CAPTURE), threads=threads, portable=False)
@@ -94,12 +99,12 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
         assert found is not None and job.checked.context is not None
         assert before is not None and after is not None
         first = found.named[0] if found.named else None
-        of = {trial.effect.cause: trial for trial in found.named}
+        trials = {trial.effect.cause: trial for trial in found.named}
         off = [
             each
             for name in cause.split("+")
-            if name in of
-            for each in _off(of[name], truth.numbers, job.checked.context)
+            if name in trials
+            for each in _parameter_errors(trials[name], truth.parameters, job.checked.context)
         ]
     error = error_before = None
     if not set(cause.split("+")) & set(OWN_BRDF):
@@ -116,15 +121,15 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
         brdf=error,
         over_floor=found.error_after.over_floor,
         off=tuple(off),
-        seconds=(made - since, done - made),
-        state=of_code,
+        seconds=(made - start, done - made),
+        state=version,
         brdf_before=error_before,
     )
 
 
 @lru_cache(maxsize=1)
 def _plain_error(seed: int, threads: int | None) -> float:
-    """Of the BRDF that is fitted to photos without an effect."""
+    """Return the BRDF error of a fit to photos without an effect."""
     with tempfile.TemporaryDirectory() as folder:
         truth = make_plain(Path(folder), seed)
         job = FitJob(read_capture(Path(folder) / CAPTURE), threads=threads, portable=False)
@@ -134,7 +139,7 @@ def _plain_error(seed: int, threads: int | None) -> float:
 
 
 def _brdf_error(result: CaptureResult, truth: Truth) -> float:
-    """RMS of ln(ρ·cosMap + ε) over all directions."""
+    """Return the RMS difference of ln(ρ·cosMap + ε) to the true BRDF over all directions."""
     basis = default_basis()
     assert basis.training is not None
     rows = basis.training[3 * truth.material : 3 * truth.material + 3]
@@ -148,14 +153,16 @@ def _brdf_error(result: CaptureResult, truth: Truth) -> float:
 
 
 def _nearness(inverse: float, light: int, context: DiagnosisContext) -> float:
-    """The object's size over the distance of its middle from a lamp that stands where the capture
-    says the light comes from, at a distance 1 / inverse from the origin."""
+    """Return the object's size divided by the distance of its centre from a lamp, which is in the
+    direction that the capture states, at a distance 1 / inverse from the origin."""
     towards = context.pixels.light[context.light[context.pixels.photo] == light][0]
     return float(context.size / np.linalg.norm(towards / inverse - context.centre))
 
 
-def _off(trial: Trial, truth: Mapping[str, float], context: DiagnosisContext) -> list[float]:
-    """What numbers that the truth says are off by, in standard errors."""
+def _parameter_errors(
+    trial: Trial, truth: Mapping[str, float], context: DiagnosisContext
+) -> list[float]:
+    """Return the errors of the parameters with a known true value, in standard errors."""
     x, deviation = trial.identified, trial.standard_errors
     cause = trial.effect.cause
     if cause == "light_intensity":

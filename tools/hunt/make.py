@@ -1,8 +1,8 @@
 """Make one capture with one hidden effect: `make(folder, causes, strength, seed)`.
 
-The shape, the material, the lights, the cameras and how the effect sits are drawn from the seed.
-Its size is searched for such that the photos change by the wanted RMS. The truth is returned, and
-never written where a diagnosis could read it.
+The shape, the material, the lights, the cameras and the details of the effect are drawn from the
+seed. The size of the effect is chosen such that the photos change by the requested RMS. The truth
+is returned, and never written where a diagnosis could read it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import trimesh
 from patina.core.basis import default_basis
 
 from . import camera_faults, camera_makers, light_makers, surface_makers
-from .drawn import LIGHTS, SIZE, any_brdf, any_shots
+from .drawn import LIGHTS, SIZE, random_brdf, random_shots
 from .scene import IRRADIANCE, Hidden, Scene, Shot
 from .shape import lumpy
 from .studio import HuntStudio
@@ -28,7 +28,7 @@ from .studio import HuntStudio
 Array = np.ndarray
 
 CAPTURE = "hunt.capture.toml"
-PLAIN = "plain"  # photos without an effect
+PLAIN = "plain"  # name of the photos without an effect
 
 MAKERS: dict[str, Callable[[Scene], Hidden]] = {
     "light_direction": light_makers.direction,
@@ -50,44 +50,47 @@ MAKERS: dict[str, Callable[[Scene], Hidden]] = {
     "subsurface": surface_makers.subsurface,
     "outside_basis": surface_makers.outside,
 }
-"""By the words of the vocabulary."""
+"""Cause of the diagnosis → function that hides it."""
 
 OUTSIDERS: dict[str, Callable[[Scene], Hidden]] = {
     "smudge": camera_makers.smudge,
     "moire": camera_makers.moire,
     "white_balance": camera_makers.white_balance,
 }
-"""Beyond the vocabulary: `unknown` is right."""
+"""Effects that are no cause of the diagnosis: `unknown` is the right result."""
 
 ON_PICTURES = ("light_intensity", "camera_response", "clipping", "vignetting", "veiling_glare")
-"""Effects that can be put on photos that hold another one."""
+"""Effects that can be applied to photos with another effect."""
 
 
 @dataclass(frozen=True)
 class Truth:
-    """cause; strength: RMS change of the photos, relative, as it came out; numbers: of the effect.
-    material: number of the training material; seed."""
+    """What is hidden in a capture. strength: relative RMS change of the photos; parameters:
+    true values of the effect; material: index of the training material."""
 
     cause: str
     strength: float
-    numbers: Mapping[str, float]
+    parameters: Mapping[str, float]
     material: int
     seed: int
 
 
 def make(folder: Path, cause: str, strength: float, seed: int) -> Truth:
-    """Write capture, mesh, cameras and photos into ``folder``. cause: "none", a key of MAKERS or
-    OUTSIDERS, or two of them with a + between, the second of ON_PICTURES."""
+    """Write capture file, mesh, cameras and photos to ``folder``, and return the truth.
+
+    cause: "none", a key of MAKERS or OUTSIDERS, or two keys joined by +, the second of ON_PICTURES.
+    strength: requested relative RMS change of the photos.
+    """
     scene, material = _scene(seed)
     scene = replace(scene, plain=scene.once(PLAIN), strength=strength)
     hidden = _hidden(scene, [] if cause == "none" else cause.split("+"))
     photos = camera_faults.with_noise(hidden.photos, scene.rng)
-    _write(folder, hidden.surface or scene.surface, hidden.told or scene.shots, photos)
-    return Truth(cause, hidden.strength, hidden.numbers, material, seed)
+    _write(folder, hidden.surface or scene.surface, hidden.stated_shots or scene.shots, photos)
+    return Truth(cause, hidden.strength, hidden.parameters, material, seed)
 
 
 def make_plain(folder: Path, seed: int) -> Truth:
-    """The same without an effect, and with other noise."""
+    """Write the same capture without an effect, and with other noise."""
     scene, material = _scene(seed)
     noise = np.random.default_rng([seed, 8])
     _write(folder, scene.surface, scene.shots, camera_faults.with_noise(scene.once(PLAIN), noise))
@@ -96,31 +99,31 @@ def make_plain(folder: Path, seed: int) -> Truth:
 
 @lru_cache(maxsize=1)
 def _kept(seed: int) -> dict[str, list[Array]]:
-    """Photos that causes and strengths of one seed share (Scene.once)."""
+    """Cache of the photos that all causes and strengths of a seed share (Scene.once)."""
     return {}
 
 
 def _scene(seed: int) -> tuple[Scene, int]:
-    """What is drawn from a seed, not photographed yet; the number of its material."""
+    """Return the scene of a seed, without photos, and the index of its material."""
     rng = np.random.default_rng([seed, 7])
     studio = HuntStudio()
     surface = lumpy(seed)
     studio.shape(surface)
-    material, brdf = any_brdf(default_basis(), rng)
+    material, brdf = random_brdf(default_basis(), rng)
     studio.dress(studio.measured(brdf))
-    return Scene(studio, surface, brdf, any_shots(rng), [], 0.0, rng, _kept(seed)), material
+    return Scene(studio, surface, brdf, random_shots(rng), [], 0.0, rng, _kept(seed)), material
 
 
 def _hidden(scene: Scene, causes: Sequence[str]) -> Hidden:
-    """One effect after the other."""
+    """Apply one effect after the other."""
     found = Hidden(scene.plain)
     for cause in causes:
         made = {**MAKERS, **OUTSIDERS}[cause](replace(scene, plain=found.photos))
         found = replace(
             made,
-            numbers={**found.numbers, **made.numbers},
+            parameters={**found.parameters, **made.parameters},
             strength=max(found.strength, made.strength),
-            told=made.told or found.told,
+            stated_shots=made.stated_shots or found.stated_shots,
             surface=made.surface or found.surface,
         )
     return found

@@ -1,7 +1,7 @@
-"""`run.py pictures`: docs/images/diagnosis.jpg, three hidden effects and what is found of them.
+"""`run.py pictures`: render docs/images/diagnosis.jpg, the diagnosis of three hidden effects.
 
-A row each, from left to right: a photo, what it shows more or less than the first prediction, the
-same after what was named is in the model, and what that cause changes.
+One row per effect, from left to right: a photo, its residual after the first fit, its residual with
+the accepted cause in the model, and the change that this cause predicts.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..common import ROOT, say
 from ..make_pictures import with_gaps, write
 
 TARGET = ROOT / "docs" / "images" / "diagnosis.jpg"
-SHOWN = (("cast_shadow", 2), ("near_light", 2), ("vignetting", 2))  # and the capture's seed
+SHOWN = (("cast_shadow", 2), ("near_light", 2), ("vignetting", 2))  # (cause, seed)
 STRENGTH = 0.03
 HEIGHT = 220
 
@@ -23,7 +23,7 @@ Array = np.ndarray
 
 
 def make() -> None:
-    """Hide, diagnose, compose."""
+    """Make and diagnose the captures, and write the picture."""
     rows = []
     for cause, seed in SHOWN:
         with tempfile.TemporaryDirectory() as folder:
@@ -67,7 +67,7 @@ def _row(folder: Path, cause: str, seed: int) -> Array:
 
 
 def _sized(cell: Array) -> Array:
-    """HEIGHT high, the nearest pixels."""
+    """Resize to HEIGHT pixels with nearest-neighbour sampling."""
     rows = (np.arange(HEIGHT) + 0.5) * len(cell) / HEIGHT
     columns = np.arange(round(cell.shape[1] * HEIGHT / len(cell))) + 0.5
     return cell[rows.astype(int)][:, (columns * len(cell) / HEIGHT).astype(int)]

@@ -1,13 +1,13 @@
-"""The full table of the hunt: which captures it is made of, 350 of them."""
+"""The 350 captures of the full table of the hunt."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-STRENGTHS = (0.01, 0.03, 0.1)  # RMS change of the photos
-BESIDE = 0.03  # of pairs, each of the two, and of what lies beyond the vocabulary
-SEEDS = 5
-NONES = 40
+STRENGTHS = (0.01, 0.03, 0.1)  # relative RMS change of the photos
+SINGLE_STRENGTH = 0.03  # of each effect of a pair, and of the effects of BEYOND
+SEEDS = 5  # of captures with an effect
+NONES = 40  # seeds of captures without an effect
 
 PAIRS = {
     1: (
@@ -34,8 +34,9 @@ PAIRS = {
         "second_material+camera_response",
     ),
 }  # fmt: skip
-"""By seed, in the order in which light meets them. Seven were chosen by hand, the others drawn such
-that every cause is in one and every effect that can be put on photos is in six or more."""
+"""Seed → pairs of effects, in the order in which they act on the light. Seven were chosen by hand.
+The others were drawn such that every cause is in one pair, and every effect that can be applied to
+photos is in six or more."""
 
 BEYOND = {
     1: ("smudge", "moire", "white_balance"),
@@ -44,11 +45,11 @@ BEYOND = {
     4: ("smudge", "white_balance"),
     5: ("moire",),
 }
-"""By seed: effects that are not of the vocabulary."""
+"""Seed → effects that are no cause of the diagnosis."""
 
 
 def captures(vocabulary: Sequence[str], seeds: Sequence[int]) -> Iterator[tuple[str, float, int]]:
-    """(cause, wanted RMS change, seed), seed by seed: what is the same for one is made once."""
+    """Yield (cause, requested RMS change, seed), by seed so that shared renders are reused."""
     for seed in seeds:
         yield "none", 0.0, seed
         if seed > SEEDS:
@@ -57,4 +58,4 @@ def captures(vocabulary: Sequence[str], seeds: Sequence[int]) -> Iterator[tuple[
             for strength in STRENGTHS:
                 yield cause, strength, seed
         for cause in (*BEYOND[seed], *PAIRS[seed]):
-            yield cause, BESIDE, seed
+            yield cause, SINGLE_STRENGTH, seed

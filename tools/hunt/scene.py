@@ -1,4 +1,4 @@
-"""What is photographed, and how much an effect changes the photos."""
+"""The rendered scene, and the search for the size of an effect with a given RMS change."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from .studio import HuntStudio
 Array = np.ndarray
 
 IRRADIANCE = float(np.pi)
-TOLERANCE = 0.08  # of the wanted strength
+TOLERANCE = 0.08  # relative error of the strength at which the search ends
 TRIES = 6
-OFF = 0.15  # of the wanted strength, beyond which whole photos are made anew
-WHITE = 99.5  # percentile of a photo, black about the object included
+MAX_STRENGTH_ERROR = 0.15  # relative; above it the size is searched for a second time
+WHITE = 99.5  # percentile of a photo, including the black background
 
 
 @dataclass(frozen=True)
 class Shot:
-    """camera; light: (3,) surface → light."""
+    """One photo: its camera, and the unit vector (3,) from the surface to the light."""
 
     camera: Camera
     light: Array
 
     @property
     def small(self) -> Shot:
-        """Half as wide and high a photo."""
+        """The same photo with half the width and height."""
         one = self.camera
         width, height = one.size
         camera = replace(
@@ -45,8 +45,8 @@ class Shot:
 
 @dataclass(frozen=True)
 class Scene:
-    """plain: the photos without an effect; strength: the wanted RMS change of them; kept: photos
-    that do not depend on it, by what they show."""
+    """plain: photos without an effect; strength: requested relative RMS change; kept: cache of
+    photos that do not depend on the strength, by name."""
 
     studio: HuntStudio
     surface: Surface
@@ -58,13 +58,16 @@ class Scene:
     kept: dict[str, list[Array]] = field(default_factory=dict)
 
     def once(self, name: str) -> list[Array]:
-        """Photos of the studio as it is, which is the same whatever the wanted strength is."""
+        """Render the studio in its present state, or return the cached photos of this name.
+
+        For photos that do not depend on the requested strength.
+        """
         if name not in self.kept:
             self.kept[name] = self.photographed()
         return self.kept[name]
 
     def photographed(self, shots: list[Shot] | None = None) -> list[Array]:
-        """Photos of the studio as it is."""
+        """Render the studio in its present state."""
         out = []
         for shot in self.shots if shots is None else shots:
             self.studio.light(shot.light, IRRADIANCE)
@@ -73,104 +76,117 @@ class Scene:
 
     @cached_property
     def small(self) -> Scene:
-        """The same in photos of half the size, where the strength of an effect is searched for."""
+        """The same scene with photos of half the size, which the search for a size uses."""
         shots = [shot.small for shot in self.shots]
         return replace(self, shots=shots, plain=[_halved(p) for p in self.plain])
 
-    def made(
+    def at_strength(
         self,
         photos: Callable[[Scene, float], list[Array]],
         start: float,
         power: float = 1.0,
         most: float = np.inf,
     ) -> tuple[float, list[Array], float]:
-        """(size, photos of (scene, size), their change) of the wanted strength, sought in small
-        photos. Outlines and edges of shadows, which do not count, are a larger part of these: where
-        whole ones change otherwise, the size is sought once more."""
+        """Find the size that gives the requested strength. Return (size, photos, RMS change).
+
+        The search uses small photos. Outlines and shadow edges, which are ignored, are a larger
+        part of these; if the change of the full photos differs too much, the search is repeated.
+
+        photos: renders (scene, size). start, power, most: as for ``find_size``.
+        """
         small = self.small
 
         def change(size: float) -> float:
             return rms(photos(small, size), small.plain)
 
-        size = sought(change, start, self.strength, power, most)
+        size = find_size(change, start, self.strength, power, most)
         found = photos(self, size)
         changed = rms(found, self.plain)
-        off = changed / self.strength
-        if abs(off - 1) < OFF or (size >= most and off < 1):
+        excess = changed / self.strength
+        if abs(excess - 1) < MAX_STRENGTH_ERROR or (size >= most and excess < 1):
             return size, found, changed
-        size = sought(change, size / off ** (1 / power), self.strength / off, power, most)
+        size = find_size(change, size / excess ** (1 / power), self.strength / excess, power, most)
         found = photos(self, size)
         return size, found, rms(found, self.plain)
 
     def in_part(self, whole: list[Array], name: str, most: float) -> Hidden:
-        """Of light that adds up, as much as changes the photos by the wanted RMS."""
+        """Blend with the photos ``whole`` such that the photos change by the requested RMS.
+
+        For effects that are linear in the light. most: largest fraction of ``whole``.
+        """
         base = self.plain
         size = min(most, self.strength / max(rms(whole, base), 1e-9))
-        photos = mixed(base, whole, size)
+        photos = blended(base, whole, size)
         return Hidden(photos, {name: size}, rms(photos, base))
 
 
 @dataclass(frozen=True)
 class Hidden:
-    """photos with an effect in them; numbers: of the effect; strength: RMS change as it came out.
-    told, surface: what the capture says of shots and mesh, None: the truth."""
+    """Photos with an effect. parameters: true values of the effect; strength: RMS change achieved.
+    stated_shots, surface: wrong shots and mesh in the capture file, None: the true ones."""
 
     photos: list[Array]
-    numbers: Mapping[str, float] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
     strength: float = 0.0
-    told: list[Shot] | None = None
+    stated_shots: list[Shot] | None = None
     surface: Surface | None = None
 
 
 def _halved(photo: Array) -> Array:
-    """Means over squares of two pixels."""
+    """Average blocks of 2 × 2 pixels."""
     height, width, channels = photo.shape
     return photo.reshape(height // 2, 2, width // 2, 2, channels).mean(axis=(1, 3))
 
 
-def mixed(base: list[Array], other: list[Array], part: float) -> list[Array]:
-    """Photos of which a part is of the other."""
+def blended(base: list[Array], other: list[Array], part: float) -> list[Array]:
+    """Blend two lists of photos; part: fraction of ``other``."""
     return [(1 - part) * b + part * o for b, o in zip(base, other, strict=True)]
 
 
 def rms(photos: list[Array], plain: list[Array]) -> float:
-    """Of all photos at once, relative; up to what a camera would expose to white, and away from
-    outlines, where two renders of one thing differ by their sampling."""
+    """Return the relative RMS difference over all photos.
+
+    Values are clipped at the white level of the exposure. Pixels near outlines are ignored, where
+    two renders of the same scene differ by their sampling.
+    """
     white = max(float(np.percentile(b, WHITE)) for b in plain)
-    missed = size = 0.0
+    difference = size = 0.0
     for photo, other in zip(photos, plain, strict=True):
         a, b = np.minimum(photo, white), np.minimum(other, white)
         level = b.max(axis=2)
         high, low = maximum_filter(level, 3), minimum_filter(level, 3)
-        calm = ~maximum_filter((high - low > 0.3 * high) & (high > 0.02 * white), 5)
-        missed += float(np.sum((a - b)[calm] ** 2))
-        size += float(np.sum(b[calm] ** 2))
-    return (missed / size) ** 0.5
+        inside = ~maximum_filter((high - low > 0.3 * high) & (high > 0.02 * white), 5)
+        difference += float(np.sum((a - b)[inside] ** 2))
+        size += float(np.sum(b[inside] ** 2))
+    return (difference / size) ** 0.5
 
 
-def sought(
+def find_size(
     rms_of: Callable[[float], float],
     start: float,
     wanted: float,
     power: float = 1.0,
     most: float = np.inf,
 ) -> float:
-    """The size at which the photos change by ``wanted``; rms grows about with a power of it, which
-    is learnt on the way."""
+    """Return the size (at most ``most``) at which the photos change by ``wanted``.
+
+    Assumes that the RMS change is proportional to a power of the size. ``power`` is its initial
+    exponent, which is updated from the last two evaluations.
+    """
     size, last = start, None
     for _ in range(TRIES):
         found = max(rms_of(size), 1e-9)
         if abs(found / wanted - 1) < TOLERANCE or (size >= most and found < wanted):
             break
         if last is not None and abs(np.log(size / last[0])) > 0.02:
-            learnt = np.log(found / last[1]) / np.log(size / last[0])
-            power = float(np.clip(learnt, 0.4, 3.0))
+            exponent = np.log(found / last[1]) / np.log(size / last[0])
+            power = float(np.clip(exponent, 0.4, 3.0))
         last = (size, found)
         size *= float(np.clip((wanted / found) ** (1 / power), 0.1, 10))
         size = min(size, most)
     return size
 
 
-def moved(shot: Shot, light: Array) -> Shot:
-    """With another direction of light."""
+def with_light(shot: Shot, light: Array) -> Shot:
+    """Return the shot with another direction of the light."""
     return replace(shot, light=light / np.linalg.norm(light))

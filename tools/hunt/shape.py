@@ -1,5 +1,5 @@
-"""An object drawn from a seed: a lumpy solid with a waist and two horns, so that it shades and
-lights itself."""
+"""A random lumpy object with a waist and two horns, so that it has cast shadows and
+interreflection."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import trimesh
 
 from ..demo_shape import Surface, vertex_normals
 
-LUMPS = 7
-BUMPS = 12
+LUMPS = 7  # of the object
+BUMPS = 12  # sine waves of a bump field
 
 
 def lumpy(seed: int, subdivisions: int = 6) -> Surface:
-    """About 80,000 triangles around the origin, radius about 0.5, outward."""
+    """Return a mesh of about 80,000 outward triangles around the origin, of radius about 0.5."""
     rng = np.random.default_rng(seed)
     ball = trimesh.creation.icosphere(subdivisions=subdivisions)
     p = np.asarray(ball.vertices, np.float64)
@@ -40,7 +40,10 @@ def _direction(rng: np.random.Generator) -> np.ndarray:
 
 
 def bumpy(surface: Surface, height: float, wave: float, seed: int) -> Surface:
-    """The same with bumps along its normals; wave: 1/length, of the coarsest."""
+    """Return the surface with bumps along its normals.
+
+    height: amplitude, scan units; wave: frequency of the bumps, 1 / scan unit.
+    """
     rng = np.random.default_rng(seed)
     p = surface.points
     rise = np.zeros(len(p))

@@ -1,4 +1,4 @@
-"""Which code found a row: rows of other states say less of the present one."""
+"""Hash of the code that computed a row: rows of other versions may not be valid for this one."""
 
 from __future__ import annotations
 
@@ -7,22 +7,24 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
-ROOMS = ("patina.core.", "tools.hunt.")
-TOLD_ONLY = tuple(f"tools.hunt.{name}" for name in ("table", "plan", "picture", "state"))
+PACKAGES = ("patina.core.", "tools.hunt.")
+OUTPUT_ONLY = tuple(f"tools.hunt.{name}" for name in ("table", "plan", "picture", "state"))
 LENGTH = 8
 
 
 @cache
 def state() -> str:
-    """Hexadecimal digits of all files of ``core/`` and of the hunt that judging a row imports
-    (the first time it is asked: some are imported only when they are needed)."""
+    """Return a hash, in hexadecimal digits, of all imported files of ``core/`` and of the hunt.
+
+    Computed at the first call, because some files are imported only when they are needed.
+    """
     from . import judged
 
     assert judged.__file__ is not None
     found = {
         name: Path(module.__file__)
         for name, module in sys.modules.items()
-        if name.startswith(ROOMS) and name not in TOLD_ONLY and module.__file__ is not None
+        if name.startswith(PACKAGES) and name not in OUTPUT_ONLY and module.__file__ is not None
     }
     digest = sha256()
     for name in sorted(found):

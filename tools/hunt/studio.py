@@ -1,4 +1,4 @@
-"""The hunt's photographs: Cycles, path tracing the material as OSL or with closures of its own."""
+"""Renders of the hunt: Cycles path tracing with Patina's OSL material or Blender's closures."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from patina.scene.material.lamp_inputs import update_lamps
 from ..demo_render import Array, Camera, Studio
 from ..demo_shape import Surface
 
-BOUNCES = 4
-SAMPLES = 16
+BOUNCES = 4  # of light
+SAMPLES = 16  # per pixel
 
 
 class HuntStudio(Studio):
-    """One object under one sun, or under a lamp that stands somewhere."""
+    """One object under a sun or a point lamp."""
 
     def __init__(self, samples: int = SAMPLES) -> None:
         super().__init__(samples)
@@ -29,17 +29,17 @@ class HuntStudio(Studio):
         self.disc: bpy.types.Object | None = None
 
     def shape(self, surface: Surface) -> None:
-        """Put the object there."""
+        """Replace the object."""
         self.show(surface, np.zeros(len(surface.points)))
 
     def measured(self, brdf: PrincipalBRDF) -> bpy.types.Material:
-        """The BRDF itself, as Patina's OSL material."""
+        """Return the BRDF as Patina's OSL material."""
         files = osl_files.ensure_files(brdf)
         fit = fit_principled(brdf.evaluate, coat=False, nodes=(12, 6, 4))
         return material_nodes.create_material("measured", brdf, fit, files)
 
     def near(self, position: Array, irradiance: float, centre: Array) -> None:
-        """A lamp without size at a place, as bright at ``centre`` as a sun of this irradiance."""
+        """Use a point lamp at ``position``, as bright at ``centre`` as a sun of this irradiance."""
         if self.point is None:
             lamp = bpy.data.lights.new("near", "POINT")
             lamp.shadow_soft_size = 0.0
@@ -52,7 +52,7 @@ class HuntStudio(Studio):
         self.lamp.hide_render = True
 
     def dress_part(self, material: bpy.types.Material, where: Array) -> None:
-        """Another material where points (v,) are true; the first stays elsewhere."""
+        """Assign another material to the faces whose vertices are all true in ``where``, (v,)."""
         mesh = self.body.data
         mesh.materials.append(material)
         corner = np.empty(len(mesh.loops), np.int32)
@@ -61,11 +61,11 @@ class HuntStudio(Studio):
         mesh.polygons.foreach_set("material_index", index)
 
     def matte(self, colour: Array) -> bpy.types.Material:
-        """A Lambertian one."""
+        """Return a Lambertian material."""
         return self._shader("ShaderNodeBsdfDiffuse", {"Color": (*colour, 1.0)})
 
     def translucent(self, colour: Array, reach: float) -> bpy.types.Material:
-        """Light goes under the surface, scan units."""
+        """Return a material with subsurface scattering; reach: scale in scan units."""
         material = self._shader(
             "ShaderNodeSubsurfaceScattering",
             {"Color": (*colour, 1.0), "Scale": reach, "Radius": (1.0, 0.6, 0.4)},
@@ -74,7 +74,7 @@ class HuntStudio(Studio):
         return material
 
     def brushed(self, roughness: float, anisotropy: float) -> bpy.types.Material:
-        """A brushed metal, turned about the z axis."""
+        """Return a brushed metal, with tangents around the z axis."""
         material = self._shader(
             "ShaderNodeBsdfAnisotropic",
             {"Color": (0.7, 0.65, 0.6, 1.0), "Roughness": roughness, "Anisotropy": anisotropy},
@@ -101,7 +101,7 @@ class HuntStudio(Studio):
         return material
 
     def occluder(self, at: Array, towards: Array, wide: float, high: float) -> None:
-        """A disc that casts a shadow and is not in the photos."""
+        """Place an elliptical disc at ``at``, facing ``towards``, that only casts a shadow."""
         if self.disc is None:
             mesh = bpy.data.meshes.new("occluder")
             turn = np.linspace(0, 2 * np.pi, 48, endpoint=False)
@@ -115,11 +115,11 @@ class HuntStudio(Studio):
         self.disc.location, self.disc.scale = at, (wide, high, 1.0)
 
     def room(self, radiance: float) -> None:
-        """Even light from all around."""
+        """Set uniform ambient light."""
         self._world(lambda nodes: None, radiance)
 
     def window(self, direction: Array, radiance: float, width: float) -> None:
-        """A bright spot of the room, radians wide, and nothing else."""
+        """Set an environment that is black except for a bright spot; width: radians."""
 
         def spot(nodes: bpy.types.Nodes) -> bpy.types.NodeSocket:
             tree = nodes.id_data
@@ -137,8 +137,8 @@ class HuntStudio(Studio):
         self._world(spot, radiance)
 
     def _world(self, made, radiance: float) -> None:  # type: ignore[no-untyped-def]
-        # a measured material sends a part of the sky's light through portals: Cycles takes what
-        # these see for the background, and a transparent film would lose it
+        # a measured material passes a part of the environment light through portals; Cycles treats
+        # this part as background, so that a transparent film would remove it
         self.scene.render.film_transparent = False
         tree = self.scene.world.node_tree
         tree.nodes.clear()
@@ -153,18 +153,18 @@ class HuntStudio(Studio):
             background.inputs["Color"].default_value = (1, 1, 1, 1)
 
     def bounce(self, count: int) -> None:
-        """How often light may bounce."""
+        """Set the largest number of bounces of light."""
         cycles = self.scene.cycles
         cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = count
         cycles.transparent_max_bounces = 16
 
     def noise_free(self, samples: int) -> None:
-        """More samples, for light that Cycles draws at random."""
+        """Set the number of samples per pixel, for light that is sampled randomly."""
         self.scene.cycles.samples = samples
 
     def photo(self, camera: Camera) -> Array:
-        """(h, w, 3) linear radiance, 0 beside the object."""
-        bpy.context.view_layer.update()  # lamps are read from their evaluated places
+        """Render (h, w, 3) linear radiance, 0 outside the object."""
+        bpy.context.view_layer.update()  # update_lamps reads the evaluated transforms
         update_lamps(self.scene)
         if self.scene.render.film_transparent:
             return self.photograph(camera)[..., :3]
@@ -172,14 +172,14 @@ class HuntStudio(Studio):
         return self.photograph(camera)[..., :3] - sky
 
     def _sky(self, camera: Camera) -> Array:
-        """(h, w, 3) without the object."""
+        """Render (h, w, 3) without the object."""
         self.body.hide_render = True
         sky = self.photograph(camera)[..., :3]
         self.body.hide_render = False
         return sky
 
     def _cover(self, camera: Camera) -> Array:
-        """(h, w, 1) how much of a pixel shows the object."""
+        """Render (h, w, 1), the fraction of a pixel that shows the object."""
         self.scene.render.film_transparent, layer = True, bpy.context.view_layer
         layer.material_override = self.matte(np.zeros(3))
         cover = self.photograph(camera)[..., 3:]

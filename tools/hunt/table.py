@@ -1,6 +1,6 @@
 """`run.py hunt`: diagnose captures with a hidden effect (docs/notebook/hidden-effects.md).
 
-Rows are kept in a file as they are found, so that the table can be made in pieces.
+Every row is stored in a file when it is computed, so that the table can be made in several runs.
 """
 
 from __future__ import annotations
@@ -24,59 +24,59 @@ if TYPE_CHECKING:
 
 
 def main() -> int:
-    """Make and diagnose captures; prints a row each, then how many were right."""
+    """Make and diagnose captures; print one line per capture, then the tables."""
     load_patina()
     from .judged import judged
     from .make import MAKERS, ON_PICTURES, OUTSIDERS
 
     parser = argparse.ArgumentParser(prog="run.py hunt", description=__doc__)
-    parser.add_argument("causes", nargs="*", help=f"of none, {', '.join((*MAKERS, *OUTSIDERS))}, "
-                        f"or two with a + between, the second of {', '.join(ON_PICTURES)}; "
+    parser.add_argument("causes", nargs="*", help=f"none, {', '.join((*MAKERS, *OUTSIDERS))}, "
+                        f"or two joined by +, the second of {', '.join(ON_PICTURES)}; "
                         "default: the full table")  # fmt: skip
     parser.add_argument("--strengths", type=float, nargs="+", default=STRENGTHS, metavar="RMS",
-                        help="of the causes that are given")  # fmt: skip
+                        help="RMS changes of the photos, for the given causes")  # fmt: skip
     parser.add_argument("--seeds", type=int, nargs="+",
-                        help=f"default: 1 to {SEEDS}, of the full table to {NONES}")  # fmt: skip
-    parser.add_argument("--rows", type=Path, metavar="FILE", help="rows found before (JSON lines): "
-                        "they are not looked for again, and new ones are added")  # fmt: skip
+                        help=f"default: 1 to {SEEDS}, in the full table 1 to {NONES}")  # fmt: skip
+    parser.add_argument("--rows", type=Path, metavar="FILE", help="stored rows (JSON lines): "
+                        "these are not computed again, and new ones are added")  # fmt: skip
     parser.add_argument("--threads", type=int, metavar="N")
-    parser.add_argument("--only-print", action="store_true", help="the rows of --rows, no hunt")
-    told = parser.parse_args()
+    parser.add_argument("--only-print", action="store_true", help="print the stored rows only")
+    arguments = parser.parse_args()
     known = {"none", *MAKERS, *OUTSIDERS}
-    unknown = [c for c in told.causes if not known.issuperset(c.split("+"))]
+    unknown = [c for c in arguments.causes if not known.issuperset(c.split("+"))]
     if unknown:
-        parser.error(f"nothing hides {unknown[0]!r}; there are none, {', '.join(MAKERS)}")
-    rows = read_rows(told.rows)
-    wanted = [] if told.only_print else list(_wanted(told, tuple(MAKERS)))
+        parser.error(f"found {unknown[0]!r}, expected none, {', '.join(MAKERS)}")
+    rows = read_rows(arguments.rows)
+    wanted = [] if arguments.only_print else list(_wanted(arguments, tuple(MAKERS)))
     for cause, strength, seed in wanted:
         if any((r.cause, r.wanted, r.seed) == (cause, strength, seed) for r in rows):
             continue
-        row = judged(cause, strength, seed, told.threads)
+        row = judged(cause, strength, seed, arguments.threads)
         rows.append(row)
         named = ", ".join(row.named) or "none"
         say(f"{cause} at {100 * strength:.0f} %, seed {seed}: {named}")
-        if told.rows is not None:
-            with told.rows.open("a", encoding="utf-8") as file:
+        if arguments.rows is not None:
+            with arguments.rows.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(asdict(row)) + "\n")
     print(table(rows))
     return 0
 
 
 def _wanted(
-    told: argparse.Namespace, vocabulary: Sequence[str]
+    arguments: argparse.Namespace, vocabulary: Sequence[str]
 ) -> Iterator[tuple[str, float, int]]:
-    """Seed by seed: what is the same for one is made once."""
-    if not told.causes:
-        yield from captures(vocabulary, told.seeds or range(1, NONES + 1))
+    """Yield (cause, strength, seed), ordered by seed so that shared renders are reused."""
+    if not arguments.causes:
+        yield from captures(vocabulary, arguments.seeds or range(1, NONES + 1))
         return
-    for seed in told.seeds or range(1, SEEDS + 1):
-        for cause in told.causes:
-            for strength in told.strengths if cause != "none" else (0.0,):
+    for seed in arguments.seeds or range(1, SEEDS + 1):
+        for cause in arguments.causes:
+            for strength in arguments.strengths if cause != "none" else (0.0,):
                 yield cause, strength, seed
 
 
 def read_rows(path: Path | None) -> list[Row]:
-    """Of a file that may not be there yet."""
+    """Read the stored rows; none if the file does not exist."""
     from .judged import Row
 
     if path is None or not path.exists():
@@ -91,12 +91,15 @@ def read_rows(path: Path | None) -> list[Row]:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Markdown: every row, how many were right, and what was named for what. An effect that cannot
-    be as strong as wanted makes one capture for two strengths: that counts once."""
-    rows = _apart(rows)
+    """Return Markdown tables: all rows, the counts of right results, and the confusions.
+
+    If an effect cannot be as strong as requested, two strengths share one capture, which counts
+    once.
+    """
+    rows = _distinct(rows)
     lines = [
-        "| hidden | RMS change | seed | named | gain | BRDF error ÷ without | error ÷ floor | in "
-        "interval | made | diagnosed | state |",
+        "| hidden | RMS change | seed | named | gain | BRDF error ÷ without effect | error ÷ floor "
+        "| in interval | made | diagnosed | state |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in sorted(rows, key=lambda r: (r.cause, r.wanted, r.seed)):
@@ -116,8 +119,8 @@ def table(rows: Sequence[Row]) -> str:
     return "\n".join([*lines, "", *_sums(rows), "", *_confusion(rows)])
 
 
-def _apart(rows: Sequence[Row]) -> list[Row]:
-    """Without rows whose capture is that of a smaller wanted strength."""
+def _distinct(rows: Sequence[Row]) -> list[Row]:
+    """Return the rows without those that repeat the capture of a smaller requested strength."""
     kept: dict[tuple[str, int, float], Row] = {}
     for row in sorted(rows, key=lambda r: r.wanted):
         kept.setdefault((row.cause, row.seed, row.strength), row)
@@ -128,7 +131,7 @@ def _sums(rows: Sequence[Row]) -> list[str]:
     groups: dict[str, list[Row]] = defaultdict(list)
     for row in rows:
         if row.cause == "none":
-            group = "none: nothing named"
+            group = "none: no cause named"
         elif row.hidden == {"unknown"}:
             group = "unlisted effects: `unknown`"
         elif "+" in row.cause:
@@ -140,33 +143,33 @@ def _sums(rows: Sequence[Row]) -> list[str]:
     for group, mine in sorted(groups.items()):
         right, wrong = sum(r.right for r in mine), sum(r.wrong_name for r in mine)
         lines.append(f"| {group} | {right} of {len(mine)} | {wrong} |")
-    told = sum(len(row.off) for row in rows)
-    if told:
+    count = sum(len(row.off) for row in rows)
+    if count:
         inside = sum(row.inside for row in rows)
-        lines.append(f"| parameters within their 95 % interval | {inside} of {told} | |")
+        lines.append(f"| parameters within their 95 % interval | {inside} of {count} | |")
     ratios = sorted(row.brdf for row in rows if row.brdf is not None and row.right)
     if ratios:
         within = sum(ratio <= 1.2 for ratio in ratios)
-        said = f"{within} of {len(ratios)} (median {ratios[len(ratios) // 2]:.2f})"
-        lines.append(f"| BRDF error ÷ without the effect ≤ 1.2, where right | {said} | |")
+        text = f"{within} of {len(ratios)} (median {ratios[len(ratios) // 2]:.2f})"
+        lines.append(f"| BRDF error ÷ without the effect ≤ 1.2, where right | {text} | |")
     within = sum(row.over_floor <= 1.1 for row in rows)
     lines.append(f"| error of held-out regions ÷ noise floor ≤ 1.1 | {within} of {len(rows)} | |")
     present = state()
     mine = sum(row.state == present for row in rows)
-    lines.append(f"| rows of the present state, {present} | {mine} of {len(rows)} | |")
+    lines.append(f"| rows computed by the current code, {present} | {mine} of {len(rows)} | |")
     return lines
 
 
 def _confusion(rows: Sequence[Row]) -> list[str]:
-    """Hidden against named first, single causes of all strengths."""
+    """Count which cause is named first for each single hidden cause, over all strengths."""
     counts: dict[str, Counter[str]] = defaultdict(Counter)
     for row in rows:
         if "+" not in row.cause:
             counts[row.cause][(row.named or ("none",))[0]] += 1
     lines = ["| hidden | named first |", "|---|---|"]
     for cause, found in sorted(counts.items()):
-        said = ", ".join(f"{name} {count}" for name, count in found.most_common())
-        lines.append(f"| {cause} | {said} |")
+        text = ", ".join(f"{name} {count}" for name, count in found.most_common())
+        lines.append(f"| {cause} | {text} |")
     return lines
 
 

@@ -1,8 +1,8 @@
-"""Blender script: an artist's session in a real window, from an empty file to finished materials on
-the demo capture, with a photograph of each stage. Strokes are drags of a real mouse (xdotool).
+"""Blender script: an artist's session in a real window, from an empty file to finished materials of
+the demo capture, with a screenshot of each stage. Strokes are drags of a real mouse (xdotool).
 
 blender --factory-startup --addons bl_ext.user_default.patina -P tools/window/session.py -- OUT
-(`.ci/real_blender.sh session DIR OUT` does it on a virtual screen, and fails where this does.)
+(`.ci/real_blender.sh session DIR OUT` runs it on a virtual screen, and fails if it fails.)
 """
 
 from __future__ import annotations
@@ -24,60 +24,60 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 OUT = Path(sys.argv[sys.argv.index("--") + 1])
 PACKAGE = "bl_ext.user_default.patina"
 STAGES = ["scan", "photos", "masks", "fit", "check", "material"]
-HEADER, FIRST = 25, 18  # pixels: from one closed panel's header to the next, to the first's middle
-PATIENCE = 1500  # seconds for all of it (real_blender.sh kills what goes on longer)
-DRAWN = 2.0  # seconds until a window has surely been drawn
+HEADER, FIRST = 25, 18  # pixels: between headers of closed panels; from the top to the first header
+TIMEOUT = 1500  # seconds for the session (real_blender.sh ends it soon after)
+REDRAW_DELAY = 2.0  # seconds after which a window has been redrawn
 found: dict[str, object] = {}
-drawn: set[str] = set()  # stages whose panels were open when the sidebar was drawn
+drawn: set[str] = set()  # stages whose panels were open at the last redraw of the sidebar
 
 
 def window() -> bpy.types.Window:
-    """The only one."""
+    """Return the only window."""
     return bpy.context.window_manager.windows[0]
 
 
 def area_of(kind: str) -> bpy.types.Area:
-    """The first one of a kind."""
+    """Return the first area of a type."""
     return next(a for a in window().screen.areas if a.type == kind)
 
 
 def region_of(area: bpy.types.Area, kind: str = "WINDOW") -> bpy.types.Region:
-    """Of an area: what is worked in, or the sidebar ("UI")."""
+    """Return the main region of an area, or its sidebar ("UI")."""
     return next(r for r in area.regions if r.type == kind)
 
 
 def press(operator: str, how: str = "EXEC_DEFAULT", **settings: object) -> None:
-    """As its button does."""
+    """Call an operator as its button does."""
     area = area_of("VIEW_3D")
-    room, name = operator.split(".")
+    module_name, name = operator.split(".")
     with bpy.context.temp_override(window=window(), area=area, region=region_of(area)):
-        outcome = getattr(getattr(bpy.ops, room), name)(how, **settings)
+        outcome = getattr(getattr(bpy.ops, module_name), name)(how, **settings)
     assert outcome & {"FINISHED", "RUNNING_MODAL"}, (operator, outcome)
 
 
 def part(name: str):
-    """A module of the installed extension."""
+    """Return a module of the installed extension."""
     return importlib.import_module(f"{PACKAGE}.{name}")
 
 
 def photograph(name: str) -> None:
-    """The whole screen: Blender's own screenshot is black where there is no graphics card."""
+    """Save a screenshot; that of Blender is black without a graphics card."""
     subprocess.run(["import", "-window", "root", str(OUT / f"{name}.png")], check=True)
 
 
 def on_screen(region: bpy.types.Region, x: float, y: float) -> tuple[int, int]:
-    """Of a place in a region, from the screen's top left corner."""
+    """Convert a position in a region to screen coordinates (origin at the top left)."""
     return round(region.x + x), round(window().height - (region.y + y))
 
 
 def mouse(*words: object) -> None:
-    """Let a mouse do something while Blender goes on."""
-    said = [str(word) for word in words]
-    subprocess.Popen(["xdotool", *said], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    """Run a mouse action in the background."""
+    arguments = [str(word) for word in words]
+    subprocess.Popen(["xdotool", *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 def drag(places: list[tuple[int, int]]) -> float:
-    """Press at the first place, go on to the last; seconds that it takes."""
+    """Drag the mouse along the positions; return the duration in seconds."""
     words: list[object] = ["mousemove", *places[0], "sleep", 0.4, "mousedown", 1, "sleep", 0.2]
     for place in places[1:]:
         words += ["mousemove", *place, "sleep", 0.05]
@@ -86,38 +86,38 @@ def drag(places: list[tuple[int, int]]) -> float:
 
 
 def open_panel(stage: str) -> Iterator[float]:
-    """Click headers until this panel is open and no other: a click, then what was drawn tells."""
+    """Click headers until only this panel is open, checking after each click what was drawn."""
     area = area_of("VIEW_3D")
     region, shading = region_of(area, "UI"), area.spaces.active.shading
-    look, shading.type = shading.type, "SOLID"  # a click waits for a viewport that is slow to draw
+    look, shading.type = shading.type, "SOLID"  # a slow viewport would delay the clicks
     for _ in range(12):
         drawn.clear()
         area.tag_redraw()
-        yield DRAWN
+        yield REDRAW_DELAY
         if drawn == {stage}:
             break
-        # headers down to that of the topmost open panel are where they are with all closed
+        # headers above the contents of the topmost open panel do not move
         number = STAGES.index(min(drawn or {stage}, key=STAGES.index))
         x, y = on_screen(region, 90, region.height - FIRST - HEADER * number)
-        # a region has to feel the mouse come before it takes a click
+        # a region only accepts a click after the mouse has entered it
         mouse("mousemove", x - 5, y, "sleep", 0.4, "mousemove", x, y, "sleep", 0.4, "click", 1)
         yield 1.5
     else:
         raise AssertionError(f"the panel of {stage} did not open: {drawn}")
     shading.type = look
-    yield DRAWN
+    yield REDRAW_DELAY
 
 
 def until_done() -> Iterator[float]:
-    """While a job runs."""
+    """Wait until the running job ends."""
     running = part("scene.session.running_job").running
-    yield DRAWN
+    yield REDRAW_DELAY
     while running(bpy.context.scene) is not None:
         yield 0.5
 
 
 def note_ticks() -> None:
-    """How long Blender stands still for what runs, by stage: seconds of the longest tick."""
+    """Record the longest tick of each stage in seconds, during which Blender is blocked."""
     stepped = part("operators.stepped").Stepped
     plain, longest = stepped.modal, found.setdefault("longest tick", {})
 
@@ -132,26 +132,28 @@ def note_ticks() -> None:
 
 
 def begin() -> Iterator[float]:
-    """An empty file; the sidebar at the tab."""
+    """Start with an empty file and show the tab in the sidebar."""
     note_ticks()
     bpy.context.preferences.view.show_splash = False
     for item in list(bpy.data.objects):
         bpy.data.objects.remove(item)
     area = area_of("VIEW_3D")
     area.spaces.active.show_region_ui = True
-    yield DRAWN  # tabs are known once they were drawn
+    yield REDRAW_DELAY  # tabs exist after the first redraw
     region_of(area, "UI").active_panel_category = "Patina"
     area.tag_redraw()
-    mouse("mousemove", 700, 12, "sleep", 0.3, "click", 1)  # the first click only wakes the window
-    yield DRAWN
+    mouse(
+        "mousemove", 700, 12, "sleep", 0.3, "click", 1
+    )  # the first click only activates the window
+    yield REDRAW_DELAY
     photograph("1_empty")
 
 
 def scan_and_photos() -> Iterator[float]:
-    """The demo capture; a lit photo looked through."""
+    """Import the demo capture and view a lit photo."""
     press("patina.import_demo")
     press("view3d.view_center_camera")
-    yield DRAWN
+    yield REDRAW_DELAY
     photograph("2_scan")
     bpy.context.scene.patina_photos.active = 4
     yield from open_panel("photos")
@@ -159,7 +161,7 @@ def scan_and_photos() -> Iterator[float]:
 
 
 def materials_and_masks() -> Iterator[float]:
-    """Proposed; a stroke on the mesh, which is wrong there, and mended on a photo."""
+    """Propose materials, paint a wrong stroke on the mesh, and correct it on a photo."""
     scene = bpy.context.scene
     mesh = scene.patina.mesh
     yield from open_panel("masks")
@@ -167,13 +169,13 @@ def materials_and_masks() -> Iterator[float]:
     yield from until_done()
     photograph("4_proposed")
     slots, paints = (
-        part("scene.paint.paint_kinds").worn_slots,
+        part("scene.paint.paint_kinds").slots_of_faces,
         part("scene.paint.paint_kinds").paints,
     )
     before = slots(mesh)
     press("patina.paint_mesh")
     press("patina.pick_paint", number=1)
-    yield DRAWN
+    yield REDRAW_DELAY
     area = area_of("VIEW_3D")
     region = region_of(area)
     corners = [mesh.matrix_world @ v.co for v in list(mesh.data.vertices)[::997]]
@@ -190,11 +192,11 @@ def materials_and_masks() -> Iterator[float]:
     press("object.mode_set", mode="OBJECT")
     press("patina.pick_paint", number=0)
     press("patina.paint_photo")
-    yield DRAWN
+    yield REDRAW_DELAY
     editor = area_of("IMAGE_EDITOR")
     with bpy.context.temp_override(window=window(), area=editor, region=region_of(editor)):
         bpy.ops.image.view_all(fit_view=True)
-    yield DRAWN
+    yield REDRAW_DELAY
     view = region_of(editor)
 
     def across(left: float, right: float, height: float) -> list[tuple[int, int]]:
@@ -206,7 +208,7 @@ def materials_and_masks() -> Iterator[float]:
     yield drag(across(0.3, 0.7, 0.2))
     photograph("6_painted_photo")
     press("patina.take_paint")
-    yield DRAWN
+    yield REDRAW_DELAY
     photograph("7_taken")
     found["faces painted on a photo"] = int((slots(mesh) != before).sum())
     masks = part("scene.paint.mask_images")
@@ -219,27 +221,27 @@ def materials_and_masks() -> Iterator[float]:
     }
     with bpy.context.temp_override(window=window(), area=editor, region=region_of(editor)):
         bpy.ops.screen.area_close()
-    yield DRAWN
+    yield REDRAW_DELAY
 
 
 def views() -> Iterator[float]:
-    """Of the fit, in an Image Editor."""
+    """Show views of the fit in an Image Editor."""
     yield from open_panel("check")
     press("patina.show_chart", kind="highlight")
-    yield DRAWN
+    yield REDRAW_DELAY
     photograph("10_highlight")
     press("patina.look_at_photo", "INVOKE_DEFAULT", kind="comparison")
     yield from until_done()
-    yield DRAWN
+    yield REDRAW_DELAY
     photograph("11_prediction")
     editor = area_of("IMAGE_EDITOR")
     with bpy.context.temp_override(window=window(), area=editor, region=region_of(editor)):
         bpy.ops.screen.area_close()
-    yield DRAWN
+    yield REDRAW_DELAY
 
 
 def fit_and_check() -> Iterator[float]:
-    """To finished materials, marked as assets."""
+    """Fit, diagnose, and mark the materials as assets."""
     yield from open_panel("fit")
     area_of("VIEW_3D").spaces.active.shading.type = "MATERIAL"
     press("patina.fit", "INVOKE_DEFAULT")
@@ -255,7 +257,7 @@ def fit_and_check() -> Iterator[float]:
     photograph("12_checked")
     yield from open_panel("material")
     press("patina.mark_assets")
-    yield DRAWN
+    yield REDRAW_DELAY
     photograph("13_material")
     stored = part("scene.session.scene_properties")
     result = stored.stored_result(stored.capture_path(bpy.context.scene))
@@ -263,12 +265,12 @@ def fit_and_check() -> Iterator[float]:
     scene = bpy.context.scene
     found["photos"] = len(scene.patina_photos.photos)
     found["lamps"] = sum(o.type == "LIGHT" for o in scene.objects)
-    slots = part("scene.paint.paint_kinds").worn_slots(scene.patina.mesh)
+    slots = part("scene.paint.paint_kinds").slots_of_faces(scene.patina.mesh)
     found["faces"] = np.bincount(slots).tolist()
 
 
 def judge() -> None:
-    """What a session has to leave."""
+    """Check the results of the session and save the file."""
     assert found["faces painted on the mesh"] > 20, found
     assert found["faces painted on a photo"] > 20, found
     assert found["pixels ignored"]["ignore"] > 100, found
@@ -277,7 +279,7 @@ def judge() -> None:
 
 
 def session() -> Iterator[float]:
-    """All of it; seconds to wait after each step."""
+    """Run all stages; yields the seconds to wait after each step."""
     for stage in (begin, scan_and_photos, materials_and_masks, fit_and_check):
         print("session:", stage.__name__, flush=True)
         yield from stage()
@@ -285,7 +287,7 @@ def session() -> Iterator[float]:
 
 
 def end(code: int) -> None:
-    """Say what was found, and leave Blender."""
+    """Write and print the results, and quit Blender."""
     (OUT / "session.json").write_text(json.dumps(found, indent=1), "utf-8")
     print("session:", "failed" if code else "done", found, flush=True)
     os._exit(code)
@@ -295,7 +297,7 @@ STEPS = session()
 
 
 def tick() -> float | None:
-    """The next step; whatever goes wrong ends the session."""
+    """Run the next step; any exception ends the session."""
     try:
         wait = next(STEPS)
     except StopIteration:
@@ -304,19 +306,19 @@ def tick() -> float | None:
         traceback.print_exc()
         photograph("failed")
         end(1)
-    if wait >= DRAWN:
+    if wait >= REDRAW_DELAY:
         area_of("VIEW_3D").tag_redraw()
     return wait
 
 
 def too_long() -> None:
-    """A job that never ends must not hold up whoever waits."""
-    print(f"session: not done in {PATIENCE} s", flush=True)
+    """End the session after the timeout."""
+    print(f"session: not finished after {TIMEOUT} s", flush=True)
     end(1)
 
 
 def noting(panel: type[bpy.types.Panel]) -> None:
-    """Let a panel tell that it is open: Blender draws the inside of those only."""
+    """Record that a panel is open: Blender only draws the contents of open panels."""
     draw, stage = panel.draw, panel.stage
 
     def noted(self: bpy.types.Panel, context: bpy.types.Context) -> None:
@@ -327,12 +329,12 @@ def noting(panel: type[bpy.types.Panel]) -> None:
 
 
 def close_panels() -> None:
-    """All of them, before they were ever drawn: headers are then where a click expects them."""
+    """Close all panels before the first redraw, so that the positions of headers are known."""
     panels = [c for c in bpy.types.Panel.__subclasses__() if c.__name__.startswith("PATINA_PT_")]
     panels += [c for c in part("panels.sidebar").CLASSES if c.__name__.startswith("PATINA_PT_")]
     panels = list(dict.fromkeys(panels))
     inner = [panel for panel in panels if getattr(panel, "bl_parent_id", "")]
-    outer = [panel for panel in panels if getattr(panel, "stage", "")]  # menus of presets have none
+    outer = [panel for panel in panels if getattr(panel, "stage", "")]  # preset menus have no stage
     for panel in (*inner, *outer):
         bpy.utils.unregister_class(panel)
     outer.sort(key=lambda panel: STAGES.index(panel.stage))
@@ -346,8 +348,8 @@ def close_panels() -> None:
 OUT.mkdir(parents=True, exist_ok=True)
 try:
     close_panels()
-except BaseException:  # Blender itself would print it and stay open
+except BaseException:  # otherwise Blender prints the error and stays open
     traceback.print_exc()
     end(1)
 bpy.app.timers.register(tick, first_interval=3)
-bpy.app.timers.register(too_long, first_interval=PATIENCE)
+bpy.app.timers.register(too_long, first_interval=TIMEOUT)

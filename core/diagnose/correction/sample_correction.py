@@ -28,20 +28,20 @@ from .sample_pixels import nearest
 
 Array = NDArray[np.floating]
 
-CHUNK = 20_000  # samples at a time: what each sees around itself takes a kilobyte
-SIGHTS = 20  # directions: what is off in one sample is not in the next
-NUDGE = 1e-2  # of the prediction
-LEAST_RESPONSE = 0.2  # ∂ ln recorded/∂ ln light: less is a plateau, or the veil of another place
-STEPS = 4  # of Newton, where the prediction is beyond a plateau
-AT_PLATEAU = 0.03  # so near, relative, is at it
-LEAST_COS, LEAST_LIGHT = 0.05, 0.5  # θi; part of the lamp's light that arrives
+CHUNK = 20_000  # samples at a time: the surroundings of each take a kilobyte
+RAY_COUNT = 20  # rays per sample; their errors are independent between samples
+STEP = 1e-2  # of the prediction, for difference quotients
+MIN_RESPONSE = 0.2  # ∂ ln recorded/∂ ln light; below it is a plateau, or the veil of another place
+NEWTON_STEPS = 4  # where the prediction is beyond a plateau
+AT_PLATEAU = 0.03  # relative distance from a plateau that counts as clipped
+MIN_COS, MIN_LIGHT = 0.05, 0.5  # cosines of θi and θo; fraction of the lamp's light that arrives
 
 
 @dataclass(frozen=True)
 class CorrectedSamples:
-    """table: samples (m,) that can be corrected; light: for each photo the RMS of what it tells of
-    the lamp's light on those, as it shows it, over that of all that it shows of them; blur: of
-    their highlights, None where there is none."""
+    """table: the samples (m,) that can be corrected. light: photo → RMS of the recorded radiance of
+    the lamp on these samples, divided by the RMS of their whole recorded radiance. blur: of their
+    highlights, None where there is none."""
 
     table: SampleTable
     light: Mapping[int, float]
@@ -51,9 +51,10 @@ class CorrectedSamples:
 def correct_samples(
     table: SampleTable, pixels: Pixels, model: Model, context: DiagnosisContext, tilt: float = 0.0
 ) -> Generator[float, None, CorrectedSamples]:
-    """Of samples (n,), photo by photo; yields the fraction done.
-    pixels: of the samples (sample_pixels.py); model: with the effects, at its optimum; context: of
-    the diagnosis; tilt: radians along each tangent that the scan's normals are off by."""
+    """Correct samples (n,), photo by photo; yields the fraction done.
+
+    pixels: of the samples (sample_pixels.py). model: with the effects, at its optimum. context: of
+    the diagnosis. tilt: radians along each tangent, standard deviation of the scan's normals."""
     parts, wide = [], list[BlurredPhoto]()
     blur = widens_highlights(model)
     near = nearest(pixels, context.pixels, context.size)
@@ -61,12 +62,12 @@ def correct_samples(
     for rows in _chunks(pixels, near, context):
         yield done / len(pixels)
         done += len(rows)
-        here = replace(context, pixels=pixels.select(rows), brdfs=model.brdfs, ray_count=SIGHTS)
-        moved = model_at_pixels(model, here, near.select(rows))
-        *part, good = _corrected(table.select(rows), moved, tilt)
+        here = replace(context, pixels=pixels.select(rows), brdfs=model.brdfs, ray_count=RAY_COUNT)
+        local = model_at_pixels(model, here, near.select(rows))
+        *part, good = _correct_chunk(table.select(rows), local, tilt)
         parts.append(part)
         if blur:
-            wide.append(blurred_photo(int(table.photo[rows[0]]), moved, good))
+            wide.append(blurred_photo(int(table.photo[rows[0]]), local, good))
     if not parts:
         return CorrectedSamples(SampleTable.empty(), {}, None)
     tables, left, whole = zip(*parts, strict=True)
@@ -80,7 +81,8 @@ def correct_samples(
 def _chunks(
     pixels: Pixels, near: NearestPixels, context: DiagnosisContext
 ) -> Iterator[NDArray[np.intp]]:
-    """Of one photo each. Of a photo that the diagnosis did not look at nothing is known."""
+    """Indices of samples of one photo at a time. Photos that are not in the diagnosis are
+    skipped."""
     known = context.pixels.photo[near.photo] == pixels.photo
     for photo in np.unique(pixels.photo[known]):
         rows = np.flatnonzero(known & (pixels.photo == photo))
@@ -89,21 +91,21 @@ def _chunks(
 
 
 def model_at_pixels(model: Model, context: DiagnosisContext, near: NearestPixels) -> Model:
-    """The same model for the context's pixels; near: of the model's own the nearest."""
+    """The same model for the pixels of ``context``; near: the nearest pixels of the model."""
     effects, x = [], []
-    for effect, numbers in zip(model.effects, model.x, strict=True):
-        moved = effect.at_pixels(context, near)
-        if moved is not None:
-            effects.append(moved)
-            x.append(effect.identified(numbers))
+    for effect, values in zip(model.effects, model.x, strict=True):
+        local = effect.at_pixels(context, near)
+        if local is not None:
+            effects.append(local)
+            x.append(effect.identified(values))
     return Model(context.pixels, model.brdfs, tuple(effects), tuple(x))
 
 
-def _corrected(
+def _correct_chunk(
     table: SampleTable, model: Model, tilt: float
 ) -> tuple[SampleTable, Array, Array, NDArray[np.intp]]:
-    """(samples, squares of their radiance as the photos show it, 0 of what they do not tell, and of
-    all that they show, the rows that they are of)."""
+    """(samples, weighted squares of the recorded radiance of the lamp, 0 where it is clipped, the
+    same of the whole recorded radiance, indices of the samples in ``table``)."""
     now = model.shading()
     lamps = model.lamp_parts(now)
     reflected = model.reflected(lamps)
@@ -111,21 +113,21 @@ def _corrected(
     added = predicted - reflected
     plateau = plateau_of(model, now, np.maximum(predicted, table.radiance))
     clipped = table.radiance > (1 - AT_PLATEAU) * plateau
-    # where only the prediction is beyond the plateau, the photo says how much light arrived
+    # where only the prediction is beyond the plateau, the photo determines how much light arrived
     below = ~clipped & (predicted > (1 - AT_PLATEAU) * plateau)
     entering = np.where(below, np.minimum(table.radiance, predicted), predicted)
     recorded, response = _response(model, now, entering)
-    for _ in range(STEPS if below.any() else 0):
-        nearer = entering + (table.radiance - recorded) / np.maximum(response, LEAST_RESPONSE)
+    for _ in range(NEWTON_STEPS if below.any() else 0):
+        nearer = entering + (table.radiance - recorded) / np.maximum(response, MIN_RESPONSE)
         entering = np.where(below, np.clip(nearer, entering / 2, predicted), entering)
         recorded, response = _response(model, now, entering)
     relative = response * entering / np.where(recorded > 0, recorded, np.inf)
-    good = ((relative > LEAST_RESPONSE) | clipped).all(axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):  # of what is not good
+    good = ((relative > MIN_RESPONSE) | clipped).all(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):  # not used where ``good`` is false
         arrived = entering + (table.radiance - recorded) / response
     at = np.where(clipped, plateau, np.inf)
     drawn = impute_clipped(model, now, added, at, arrived, tilt)
-    if widens_highlights(model):  # what is drawn is of a point, not stretched
+    if widens_highlights(model):  # the imputed radiance is of a point lamp and isotropic
         point = model.brdfs.reflected(replace(now, stretch=None))
         drawn *= reflected / np.maximum(point, 1e-30)
     radiance = np.where(clipped, drawn, arrived - added)
@@ -133,11 +135,11 @@ def _corrected(
     lamp = response * radiance
     cos_i = dot(now.normal, now.light)
     cos_o = dot(now.normal, table.view)
-    good &= (cos_i > LEAST_COS) & (cos_o > LEAST_COS) & (now.visible > LEAST_LIGHT)
+    good &= (cos_i > MIN_COS) & (cos_o > MIN_COS) & (now.visible > MIN_LIGHT)
     good &= np.isfinite(radiance).all(axis=1)
     irradiance = (now.irradiance * now.visible[:, None]).astype(np.float32)
     angles = half_difference(now.normal, now.light, table.view)
-    rho = radiance / np.maximum(irradiance * np.maximum(cos_i, LEAST_COS)[:, None], 1e-30)
+    rho = radiance / np.maximum(irradiance * np.maximum(cos_i, MIN_COS)[:, None], 1e-30)
     rows = np.flatnonzero(good)
     found = replace(
         table,
@@ -153,13 +155,13 @@ def _corrected(
         light=np.asarray(now.light, np.float32),
         response=(table.response * response).astype(np.float32),
     ).select(rows)
-    # what is clipped is shown as it is predicted: no miss, but a part of what the photo shows
+    # clipped channels have no residual, but are part of the whole radiance
     left, whole = (found.weight * np.sum(e[rows] ** 2, axis=1) for e in (lamp, table.radiance))
     return found, left * found.read, whole, rows
 
 
 def _response(model: Model, now: ShadingState, entering: Array) -> tuple[Array, Array]:
-    """(n, 3) what photos show of this light, and how much more of a little more."""
+    """(n, 3) recorded radiance of this light, and (n, 3) its derivative."""
     recorded = model.recorded(entering, now)
-    step = NUDGE * np.maximum(entering, 1e-12)
+    step = STEP * np.maximum(entering, 1e-12)
     return recorded, (model.recorded(entering + step, now) - recorded) / step

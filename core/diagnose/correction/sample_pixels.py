@@ -1,4 +1,4 @@
-"""The pixels of a fit's samples, as a diagnosis' effects want them."""
+"""The pixels of a fit's samples, in the form that the effects of a diagnosis need."""
 
 from __future__ import annotations
 
@@ -18,22 +18,21 @@ from ..forward.pixels import Pixels
 from ..pixels.image_cells import centred_coordinates, separated_positions
 from ..pixels.pixel_selection import REACH, photo_slopes, photo_veil
 
-SIDE = 0.02  # of the object's size, that surfaces at right angles count as farther apart
+SIDE = 0.02  # of the object's size: weight of a difference of normals in the distance
 
 
 def pixels_of_samples(
     table: SampleTable, material: int, capture: Capture, scan: Scan, photos: LitPhotos, read: bool
 ) -> Generator[float, None, Pixels]:
-    """Of every sample (n,), all of one material; yields the fraction done. read: whether photos
-    are, for ``slope`` and ``veil``, which are 0 otherwise, as ``turn``, ``step`` and ``block``
-    always are.
-    Raises InputError for a photo that is no longer there."""
+    """Pixels of samples (n,) of one material; yields the fraction done. read: whether photos are
+    read for ``slope`` and ``veil``, which are 0 otherwise. ``turn``, ``step`` and ``block`` are
+    always 0. Raises InputError for a photo that no longer exists."""
     n = len(table)
     x, y = np.zeros(n, np.float32), np.zeros(n, np.float32)
     slope, veil = np.zeros((n, 2, 3), np.float32), np.zeros((n, 2, 3), np.float32)
-    numbers = np.unique(table.photo)
-    for done, place in enumerate(numbers.tolist()):
-        yield done / len(numbers)
+    photo_indices = np.unique(table.photo)
+    for done, place in enumerate(photo_indices.tolist()):
+        yield done / len(photo_indices)
         rows = np.flatnonzero(table.photo == place)
         camera = capture_data.camera_of(capture, scan, place)
         pixel = table.pixel[rows]
@@ -53,12 +52,13 @@ def pixels_of_samples(
     )  # fmt: skip
 
 
-def nearest(pixels: Pixels, looked_at: Pixels, size: float) -> NearestPixels:
-    """Of each pixel (n,) those of the others that are nearest in the same photo (where it has none,
-    in another one) and on the surface, the two sides of a thin wall apart; size: of the object."""
+def nearest(pixels: Pixels, candidates: Pixels, size: float) -> NearestPixels:
+    """For each pixel (n,) the nearest of ``candidates`` in the same photo (in another one if that
+    has none), and the nearest on the surface, with the two sides of a thin wall separated. size: of
+    the object, scan units."""
     return NearestPixels(
-        _nearest(*(separated_positions(p.photo, p.x, p.y) for p in (looked_at, pixels))),
-        _nearest(*(_on_surface(p, size) for p in (looked_at, pixels))),
+        _nearest(*(separated_positions(p.photo, p.x, p.y) for p in (candidates, pixels))),
+        _nearest(*(_on_surface(p, size) for p in (candidates, pixels))),
     )
 
 

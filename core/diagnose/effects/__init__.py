@@ -1,4 +1,4 @@
-"""All effects, one a file, by the words of the vocabulary."""
+"""All effects, one in each file, by their cause names."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ EFFECTS: tuple[type[Effect], ...] = (
 )
 
 
-def made_for(context: DiagnosisContext) -> list[Effect]:
-    """All effects that may be there."""
+def effects_for(context: DiagnosisContext) -> list[Effect]:
+    """All effects that can occur in the capture."""
     made = [kind.of(context) for kind in EFFECTS]
     return [effect for effect in made if effect is not None]

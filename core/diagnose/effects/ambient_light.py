@@ -1,4 +1,4 @@
-"""The room was not dark: light came from everywhere, not from the lamp alone."""
+"""Ambient light: light reached the object from all directions, not only from the lamp."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from .base.parameters import Parameters
 
 @dataclass(frozen=True)
 class AmbientLight(AddsRadiance, BuiltFromBRDFs):
-    """numbers: radiance of the room over the lamp's irradiance / π, red, green, blue. reflected:
-    (n, 3) of a room of that radiance 1, where the object does not hide it."""
+    """Parameters: radiance of the room divided by (irradiance of the lamp / π), for red, green and
+    blue. reflected: (n, 3) light that the surface reflects if that ratio is 1, where the object
+    itself does not block the room."""
 
     reflected: Array
     cause = "ambient_light"
@@ -41,6 +42,6 @@ class AmbientLight(AddsRadiance, BuiltFromBRDFs):
 
     def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         return (
-            "the room was not dark: light from all around reached the object, "
-            f"{100 * float(np.mean(x)):.1f} % of what the lamp gives a surface that faces it"
+            "Ambient light reached the object from all directions: "
+            f"{100 * float(np.mean(x)):.1f} % of the light of the lamp on a surface that faces it."
         )

@@ -1,4 +1,4 @@
-"""The surface is brushed or woven: it reflects along one direction more widely than across."""
+"""Anisotropic reflection: highlights of a brushed or woven surface are wider in one direction."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ from .base.parameters import Parameters
 
 @dataclass(frozen=True)
 class Anisotropy(ChangesShading, WidensHighlights):
-    """numbers: for each of the scan's axes how much ln tan θh grows where the half vector lies
-    along that axis' direction on the surface. axes: (n, 3, 3) these directions, unit."""
+    """Parameters: for each axis of the scan, the increase of ln tan θh where the half vector is
+    tilted along the projection of that axis onto the surface. axes: (n, 3, 3) these projections,
+    unit vectors."""
 
     axes: Array
     cause = "anisotropy"
@@ -44,7 +45,7 @@ class Anisotropy(ChangesShading, WidensHighlights):
     def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         k = int(np.argmax(np.abs(x)))
         return (
-            "the surface reflects along one direction more widely than across it (brushed, woven "
-            f"or turned), about the scan's {'xyz'[k]} axis: highlights are "
-            f"{np.exp(abs(x[k])):.2f} times as long as wide"
+            "Reflection is anisotropic (brushed, woven or turned surface) with respect to the "
+            f"{'xyz'[k]} axis of the scan: highlights are {np.exp(abs(x[k])):.2f} times as long "
+            "as they are wide."
         )

@@ -1,4 +1,4 @@
-"""The lamp has a size: highlights are wider, shadows end softly."""
+"""The lamp has a size: it widens highlights and softens the edges of shadows."""
 
 from __future__ import annotations
 
@@ -17,18 +17,19 @@ from .base.effect import Array
 from .base.image_formation import ExtendsLamp
 from .base.parameters import Parameters
 
-RADII = np.radians([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 13.0])  # about the lamp's middle, of shadow rays
-TURNS = 7  # of RAYS, from the direction of one ray to that of the next: all of them, in no order
-LEAST = np.radians(1.0)  # the sun itself is half a degree wide
-USUAL = np.radians(6.0)
+RADII = np.radians([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 13.0])  # of shadow rays, about the lamp's centre
+TURNS = 7  # of RAYS: step in azimuth from one ray to the next, so that all are used, unordered
+MIN_DIAMETER = np.radians(1.0)  # reported above this; the sun itself is half a degree wide
+PRIOR_SCALE = np.radians(6.0)  # standard deviation of the prior
 STARTS = {np.radians(3.0): 12, np.radians(12.0): 24}
-"""Where the search begins, and how many parts stand for the lamp then: what a wide one does to the
-photos is no larger piece of what a narrow one does."""
+"""Starting value of the angular diameter (radians) → number of points that represent the lamp. Two
+are tried because the effect of a wide lamp is not a multiple of that of a narrow one."""
 
 
 def _disc(count: int) -> NDArray[np.float64]:
-    """(count, 2) points spread over a disc of radius 1, whose mean and second moments are the
-    disc's: a sunflower's own mean lies beside the middle, as if the lamp stood elsewhere."""
+    """(count, 2) points of a sunflower pattern on a disc of radius 1, corrected so that their mean
+    and second moments equal those of the disc. The mean of the plain pattern is not at the centre,
+    which would act like a displaced lamp."""
     turn = np.pi * (3 - np.sqrt(5)) * np.arange(count)
     out = np.sqrt((np.arange(count) + 0.5) / count)
     points = np.stack([out * np.cos(turn), out * np.sin(turn)], axis=1)
@@ -42,9 +43,10 @@ DISCS = {start: _disc(count) for start, count in STARTS.items()}
 
 @dataclass(frozen=True)
 class AreaLight(ExtendsLamp, WidensHighlights):
-    """numbers: the lamp's angular diameter. first, other: (n, 3) unit, across the light; free:
-    (n, r) part of a disc of RADII about its middle that the mesh does not hide; distant: (n,);
-    start: where the search begins."""
+    """Parameter: the angular diameter of the lamp, radians. first, other: (n, 3) unit vectors
+    perpendicular to the light direction. free: (n, r) fraction of a disc of each of RADII about
+    the lamp's centre that the mesh does not occlude. distant: (n,) whether the light is distant.
+    start: starting value of the parameter, radians."""
 
     first: Array
     other: Array
@@ -53,7 +55,7 @@ class AreaLight(ExtendsLamp, WidensHighlights):
     start: float = min(STARTS)
     cause = "area_light"
     deciding_photo = "a photo of the lamp from where the object stands"
-    systematic_error = 0.02  # a dozen points or two stand for it
+    systematic_error = 0.02  # 12 or 24 points represent the lamp
 
     @classmethod
     def of(cls, context: DiagnosisContext) -> AreaLight | None:
@@ -72,9 +74,10 @@ class AreaLight(ExtendsLamp, WidensHighlights):
                 aside = np.tan(radius) * (np.cos(turn) * first + np.sin(turn) * other)
                 return (pixels.light + aside) * np.float32(np.cos(radius))
 
-            # as the light of a point was: else the edges' pixels alone would ask for a lamp's size
+            # computed like the visibility of the point lamp; otherwise the pixels at shadow edges
+            # alone would suggest a lamp with a size
             ring[:, k] = partial_visibility(context.rays, pixels, towards, parts=parts)
-        # of a disc: the integral of rings, linear between them
+        # disc: integral over rings, linear between them
         middle = 0.5 * (ring[:, 1:] + ring[:, :-1]) * np.diff(RADII**2)
         free = ring.copy()
         free[:, 1:] = np.cumsum(middle, axis=1) / RADII[1:] ** 2
@@ -87,7 +90,13 @@ class AreaLight(ExtendsLamp, WidensHighlights):
     @property
     def parameters(self) -> Parameters:
         return Parameters.alike(
-            ["angular diameter"], "rad", USUAL, 0.0, 2 * RADII[-1], step=2e-3, start=self.start
+            ["angular diameter"],
+            "rad",
+            PRIOR_SCALE,
+            0.0,
+            2 * RADII[-1],
+            step=2e-3,
+            start=self.start,
         )
 
     @property
@@ -95,7 +104,7 @@ class AreaLight(ExtendsLamp, WidensHighlights):
         return [replace(self, start=start) for start in STARTS]
 
     def is_relevant(self, x: np.ndarray) -> bool:
-        return bool(x[0] > LEAST)
+        return bool(x[0] > MIN_DIAMETER)
 
     def lamp_parts(self, state: ShadingState, x: np.ndarray) -> list[ShadingState]:
         radius = np.clip(x[0] / 2, 0, RADII[-1])
@@ -116,7 +125,7 @@ class AreaLight(ExtendsLamp, WidensHighlights):
 
     def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         return (
-            f"the lamp is not a point: it is {np.degrees(x[0]):.1f}° wide as the object sees it, "
-            "so that highlights are wider and the edges of shadows softer than the material makes "
-            "them"
+            f"The lamp is not a point: its angular diameter is {np.degrees(x[0]):.1f}° seen from "
+            "the object, so highlights are wider and the edges of shadows softer than under a "
+            "point lamp."
         )

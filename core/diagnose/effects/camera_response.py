@@ -1,4 +1,4 @@
-"""The photos are not linear: numbers do not grow with light."""
+"""A nonlinear camera response: pixel values are not proportional to radiance."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from .base.effect import Array
 from .base.image_formation import CameraEffect
 from .base.parameters import Parameters
 
-USUAL = 0.15
-WHITE = 99.0  # percentile
-DARKEST = 1e-4  # of white, where the curve's logarithm is cut off
+PRIOR_SCALE = 0.15  # of the exponent, standard deviation of the prior
+WHITE = 99.0  # percentile of the photos' radiance that counts as white
+DARKEST = 1e-4  # of the mean radiance; the logarithm of darker values is clamped
 
 
 @dataclass(frozen=True)
 class CameraResponse(CameraEffect):
-    """numbers: what the exponent is off by, and how it changes over a factor e of brightness; both
-    about ``grey``, the photos' mean radiance, which stays as it is: how bright the whole is, no
-    photo tells of its own curve."""
+    """Parameters: the exponent minus 1, and its change over a factor e of brightness. The curve
+    keeps ``grey``, the mean radiance of the photos, because the overall brightness carries no
+    information about the curve."""
 
     grey: float
     cause = "camera_response"
@@ -39,7 +39,7 @@ class CameraResponse(CameraEffect):
     @property
     def parameters(self) -> Parameters:
         return Parameters(
-            ("gamma − 1", "its change"), ("", "1/ln"), np.array([USUAL, 0.03]),
+            ("gamma − 1", "its change"), ("", "1/ln"), np.array([PRIOR_SCALE, 0.03]),
             np.array([-0.7, -0.15]), np.array([1.5, 0.15]), np.array([1e-3, 1e-3]),
         )  # fmt: skip
 
@@ -50,6 +50,6 @@ class CameraResponse(CameraEffect):
     def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         way = "flatter" if x[0] < 0 else "steeper"
         return (
-            f"the photos are not linear: they follow light to the power {1 + x[0]:.2f}, {way} than "
-            "what a linear photo does (a tone curve was applied, or the wrong one was undone)"
+            f"The photos are not linear: their values follow radiance to the power {1 + x[0]:.2f}, "
+            f"which is {way} than linear (a tone curve was applied, or the wrong one was removed)."
         )

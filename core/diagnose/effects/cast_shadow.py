@@ -1,4 +1,4 @@
-"""Something that is not in the mesh cast a shadow: a tripod, a wall, what was not scanned."""
+"""Shadows of things that are not in the mesh: a tripod, a wall, parts that were not scanned."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from .base.parameters import Parameters
 from .base.patch_effect import PatchEffect
 from .base.surface_patches import median_of
 
-USUAL = 0.6
-DARK = 0.2  # of the light, lost, from which a spot counts as shadowed
+PRIOR_SCALE = 0.6  # of the light, standard deviation of the prior
+DARK = 0.2  # fraction of the light that is lost, above which a spot counts as shadowed
 
 
 @dataclass(frozen=True)
 class CastShadow(PatchEffect, ChangesShading, JudgedByPixel):
-    """numbers: for each dark spot of a photo the part of the light that is lost there, negative.
-    photo: (n,)."""
+    """Parameters: for each dark spot of a photo, minus the fraction of the light that is lost.
+    photo: (n,) number of each pixel's photo."""
 
     photo: NDArray[np.int16]
     cause = "cast_shadow"
     deciding_photo = "a photo of everything that stands about the object, from the lamp"
-    systematic_error = 0.01  # pixels at the edge of a spot lose less
+    systematic_error = 0.01  # pixels at the edge of a spot lose less light
 
     @classmethod
     def of(cls, context: DiagnosisContext) -> CastShadow | None:
         pixels = context.pixels
         spot = unexplained_shadows(pixels, direct_radiance(pixels, context.brdfs))
-        return None if (spot < 0).all() else cls(spot, (USUAL,), pixels.photo)
+        return None if (spot < 0).all() else cls(spot, (PRIOR_SCALE,), pixels.photo)
 
     def at_pixels(self, context: DiagnosisContext, nearest: NearestPixels) -> CastShadow:
         return replace(self, patch=self.patch[nearest.photo], photo=self.photo[nearest.photo])
@@ -55,7 +55,7 @@ class CastShadow(PatchEffect, ChangesShading, JudgedByPixel):
         return bool((-x > DARK).any())
 
     def lost(self, x: np.ndarray) -> Array:
-        """(n,) part of the light that does not arrive."""
+        """(n,) fraction of the light that does not arrive."""
         return -self.at_patch(x)[:, 0]
 
     def shading(self, state: ShadingState, x: np.ndarray) -> ShadingState:
@@ -67,8 +67,8 @@ class CastShadow(PatchEffect, ChangesShading, JudgedByPixel):
         part = np.bincount(self.photo, dark, len(count)) / np.maximum(count, 1)
         worst = int(np.argmax(part))
         return (
-            "something that the mesh does not hold cast a shadow on the object: "
-            f"{100 * part[worst]:.2g} % of what photo {worst + 1} shows, in "
-            f"{int(np.sum(part > 0))} of {int(np.sum(count > 0))} photos, {100 * -x.min():.0f} % "
-            "of the light where it is darkest"
+            "Something that is not in the mesh cast a shadow on the object in "
+            f"{int(np.sum(part > 0))} of {int(np.sum(count > 0))} photos. It removes up to "
+            f"{100 * -x.min():.0f} % of the light and covers up to {100 * part[worst]:.2g} % of "
+            f"the checked pixels of a photo (photo {worst + 1})."
         )

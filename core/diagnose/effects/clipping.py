@@ -1,4 +1,4 @@
-"""Photos are clipped where nobody said so: highlights end at a plateau."""
+"""Undeclared clipping: highlights of the photos end at a plateau."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from .base.effect import Array
 from .base.image_formation import CameraEffect
 from .base.parameters import Parameters
 
-SOFT = 0.01  # of the plateau, over which the end is rounded
-CROWD, BESIDE = 12, 0.03  # values that photos show so near, relative, to a plateau
+SOFT = 0.01  # fraction of the plateau over which the transition is smooth
+# values of a channel near a plateau that confirm it; relative distance that counts as near
+MIN_VALUES, NEAR_PLATEAU = 12, 0.03
 
 
 @dataclass(frozen=True)
 class Clipping(CameraEffect, AffectsHighlightsOnly, JudgedByPixel):
-    """numbers: how far the plateau lies below ``top``, the brightest that a channel shows, as a
-    logarithm, for each channel. observed: (n, 3)."""
+    """Parameters: for each channel, ln(8 top / plateau). top: (3,) the largest value of each
+    channel. observed: (n, 3) radiance."""
 
     top: Array
     observed: Array
@@ -37,7 +38,7 @@ class Clipping(CameraEffect, AffectsHighlightsOnly, JudgedByPixel):
 
     @property
     def parameters(self) -> Parameters:
-        # far above the brightest there is no effect: so 0 is a plateau at 8 times the brightest
+        # a plateau far above the largest value has no effect; at 0 it is at 8 times that value
         return Parameters.alike(
             ["red", "green", "blue"], "ln", 2.0, 0.0, 4.0, step=5e-3, start=np.log(8.0)
         )
@@ -47,8 +48,8 @@ class Clipping(CameraEffect, AffectsHighlightsOnly, JudgedByPixel):
         return self.top * 8.0 * np.exp(-x)
 
     def is_relevant(self, x: np.ndarray) -> bool:
-        near = np.abs(self.observed / self.plateau(x) - 1) < BESIDE
-        return bool((near.sum(axis=0) >= CROWD).any())
+        near = np.abs(self.observed / self.plateau(x) - 1) < NEAR_PLATEAU
+        return bool((near.sum(axis=0) >= MIN_VALUES).any())
 
     def recorded(self, radiance: Array, state: ShadingState, x: np.ndarray) -> Array:
         plateau = self.plateau(x)
@@ -57,7 +58,7 @@ class Clipping(CameraEffect, AffectsHighlightsOnly, JudgedByPixel):
 
     def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         return (
-            "highlights are clipped: no photo exceeds "
-            f"{', '.join(f'{v:.3g}' for v in self.plateau(x))} (red, green, blue), though the "
-            "surface would"
+            "Highlights are clipped: no photo exceeds a radiance of "
+            f"{', '.join(f'{v:.3g}' for v in self.plateau(x))} (red, green, blue), although the "
+            "surface is brighter."
         )

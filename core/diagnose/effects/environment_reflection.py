@@ -1,4 +1,4 @@
-"""The object mirrors its surroundings: a window, a softbox, a white wall."""
+"""Reflections of the surroundings: a window, a softbox, a white wall."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from .base.effect import Array
 from .base.image_formation import AddsRadiance
 from .base.parameters import Parameters
 
-LOBES = 64  # directions that the surroundings are described by
-SHARP = 21.0  # of each: half as bright 15° from its middle; the next is 24° away
-FINER = 8  # times as many directions are looked into where it is bright, so much sharper,
-MOST = 128  # no more of them than that,
-DIM = 0.1  # of the brightest: is not
+LOBES = 64  # lobes that describe the radiance of the surroundings
+SHARP = 21.0  # sharpness of a lobe: half as bright 15° from its axis; the next axis is 24° away
+FINER = 8  # factor in number and sharpness of the lobes that are added where it is bright
+MAX_FINE_LOBES = 128  # added lobes at most
+DIM = 0.1  # of the largest radiance; no lobes are added where it is darker
 
 
 @dataclass(frozen=True)
 class EnvironmentReflection(AddsRadiance, BuiltFromBRDFs):
-    """numbers: how bright the surroundings are about each of ``directions`` (l, 3), radiance over
-    the lamp's irradiance / π; sharp: (l,) of each. reflected: (l, n, 3) of a radiance of 1
-    there."""
+    """Parameters: radiance of the surroundings in the lobe about each of ``directions`` (l, 3),
+    divided by (irradiance of the lamp / π). sharp: (l,) sharpness of each lobe. reflected:
+    (l, n, 3) light that the surface reflects of a lobe whose parameter is 1."""
 
     directions: Array
     sharp: Array
@@ -57,11 +57,11 @@ class EnvironmentReflection(AddsRadiance, BuiltFromBRDFs):
         return self._towards(context, self.directions, self.sharp)
 
     def rebuilt(self, context: DiagnosisContext, x: np.ndarray) -> EnvironmentReflection:
-        """With more and sharper directions about what is bright: the edge of a window, mirrored, is
-        sharp, and what is too soft here would be taken by a tone curve."""
+        """With more and sharper lobes where the surroundings are bright. The reflected edge of a
+        window is sharp; if the lobes were too wide, a tone curve would explain the rest."""
         finer = _evenly(FINER * LOBES)
         radiance = self.radiance(finer, x)
-        brightest = np.argsort(-radiance)[:MOST]
+        brightest = np.argsort(-radiance)[:MAX_FINE_LOBES]
         brightest = brightest[radiance[brightest] > DIM * radiance.max()]
         directions = np.concatenate([_evenly(LOBES), finer[brightest]])
         sharp = np.repeat([SHARP, FINER * SHARP], [LOBES, len(brightest)])
@@ -83,10 +83,10 @@ class EnvironmentReflection(AddsRadiance, BuiltFromBRDFs):
         radiance = self.radiance(self.directions, x)
         bright = self.directions[int(np.argmax(radiance))]
         return (
-            "the object mirrors its surroundings, brightest towards "
+            "The object reflects its surroundings. They are brightest in the direction "
             f"({bright[0]:.1f}, {bright[1]:.1f}, {bright[2]:.1f}) of the scan's frame: "
-            f"{100 * float(radiance.max()):.0f} % of the light a white wall under the lamp would "
-            "send"
+            f"{100 * float(radiance.max()):.0f} % of the radiance of a white wall lit by the "
+            "lamp."
         )
 
 

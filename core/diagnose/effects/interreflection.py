@@ -1,4 +1,4 @@
-"""Light bounced from one part of the object to another."""
+"""Interreflection: light reflected from one part of the object onto another."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ from .base.parameters import Parameters
 
 @dataclass(frozen=True)
 class Interreflection(AddsRadiance, BuiltFromBRDFs):
-    """numbers: the bounced light over what the fitted materials bounce. reflected: (n, 3) that
-    light; radiosity: by photo, (f, 3) what every face of the mesh sends off."""
+    """Parameter: the interreflected light divided by the light predicted with the fitted
+    materials. reflected: (n, 3) that predicted light; radiosity: photo → (f, 3) radiance that
+    every face of the mesh emits after all bounces."""
 
     reflected: Array
     radiosity: dict[int, Array]
@@ -49,16 +50,16 @@ class Interreflection(AddsRadiance, BuiltFromBRDFs):
         return self.reflected * x[0]
 
     def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
-        most = 100 * float(np.percentile(x[0] * self.reflected.mean(axis=1), 99))
+        most = float(np.percentile(x[0] * self.reflected.mean(axis=1), 99))
         return (
-            "light bounced from one part of the object to another: folds are brighter than the "
-            f"lamp makes them ({x[0]:.1f} times what the fitted material would bounce; up "
-            f"to {most:.2g} in units of 1/100 radiance)"
+            "Light is reflected from one part of the object onto another, so folds are brighter "
+            f"than under the lamp alone: {x[0]:.1f} times the interreflection predicted with the "
+            f"fitted materials, a radiance of up to {most:.2g}."
         )
 
 
 def _bounced(context: DiagnosisContext, radiosity: Mapping[int, Array]) -> Array:
-    """(n, 3) reflected of what the faces that each pixel sees send off, 0 in shadow."""
+    """(n, 3) light that each pixel's surface reflects of the radiosity of the faces it sees."""
     around, pixels = context.surroundings, context.pixels
     reflected = np.zeros((len(pixels), 3), np.float32)
     for photo in np.unique(pixels.photo):

@@ -1,4 +1,4 @@
-"""The lamps stood elsewhere than the capture says: each direction is off by two angles."""
+"""Errors of the light directions: each is off by two angles."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ from .base.effect import Array
 from .base.image_formation import ChangesShading
 from .base.parameters import Parameters, parameter_columns
 
-USUAL = np.radians(3.0)
-FARTHEST = np.radians(25.0)
+PRIOR_SCALE = np.radians(3.0)  # standard deviation of the prior
+MAX_TILT = np.radians(25.0)  # bound of either angle
 
 
 @dataclass(frozen=True)
 class LightDirection(ChangesShading, TracesRays):
-    """numbers: for each distant light the tangents of two angles, radians, about ``aside`` and
-    ``other``, (lights, 3) unit vectors across its direction. light: (n,) of each pixel, −1 for
-    one that is not distant. shadows: of where the lamps were found to be."""
+    """Parameters: for each distant light the tangents of two angles, towards ``aside`` and
+    ``other``, (lights, 3) unit vectors perpendicular to its direction. light: (n,) number of each
+    pixel's light, −1 where it is not distant. shadows: traced for the directions that were
+    found."""
 
     names: tuple[str, ...]
     aside: Array
@@ -32,10 +33,9 @@ class LightDirection(ChangesShading, TracesRays):
     light: NDArray[np.intp]
     shadows: DisplacedShadows | None = None
     cause = "light_direction"
-    deciding_photo = "a mirror ball beside the object in one photo under each light"
-    systematic_error = (
-        0.02  # facets of a mesh on which it grazes, and shadows cast away from where it was
-    )
+    deciding_photo = "a mirror ball next to the object in one photo under each light"
+    # facets of the mesh under grazing light, and displaced shadows
+    systematic_error = 0.02
 
     @classmethod
     def of(cls, context: DiagnosisContext) -> LightDirection | None:
@@ -59,10 +59,10 @@ class LightDirection(ChangesShading, TracesRays):
     @property
     def parameters(self) -> Parameters:
         names = [f"{name}, {way}" for name in self.names for way in ("first", "second")]
-        return Parameters.alike(names, "rad", USUAL, -FARTHEST, FARTHEST)
+        return Parameters.alike(names, "rad", PRIOR_SCALE, -MAX_TILT, MAX_TILT)
 
     @property
-    def columns(self) -> NDArray[np.intp]:
+    def parameter_index(self) -> NDArray[np.intp]:
         return parameter_columns(self.light, 2)
 
     def with_rays(self, context: DiagnosisContext, x: np.ndarray) -> LightDirection:
@@ -77,5 +77,5 @@ class LightDirection(ChangesShading, TracesRays):
 
     def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         angle = np.degrees(np.arctan(np.hypot(x[0::2], x[1::2])))
-        said = ", ".join(f"{n} by {a:.1f}°" for n, a in zip(self.names, angle, strict=True))
-        return f"the light came from elsewhere than the capture says: {said}"
+        errors = ", ".join(f"{n} by {a:.1f}°" for n, a in zip(self.names, angle, strict=True))
+        return f"Light directions are off: {errors}."

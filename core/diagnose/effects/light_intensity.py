@@ -1,4 +1,4 @@
-"""The lamp drifted, or an exposure is wrong: every photo has a brightness of its own."""
+"""Drift of the lamp, or wrong exposures: every photo has its own gain."""
 
 from __future__ import annotations
 
@@ -12,18 +12,19 @@ from ..forward.shading_state import ShadingState
 from .base.image_formation import ChangesShading
 from .base.parameters import Parameters, mean_removal, parameter_columns
 
-USUAL = 0.1  # of the logarithm
+PRIOR_SCALE = 0.1  # of ln gain, standard deviation of the prior
 
 
 @dataclass(frozen=True)
 class LightIntensity(ChangesShading):
-    """numbers: ln of each photo's gain; what they have in common is the BRDF's, and the prior
-    keeps their mean at 0. photo: (n,) place of each pixel's among ``photos``, their numbers."""
+    """Parameters: ln of each photo's gain. A common factor belongs to the BRDF; the prior keeps the
+    mean at 0. photo: (n,) index of each pixel's photo in ``photos``, which holds their
+    numbers."""
 
     photos: tuple[int, ...]
     photo: NDArray[np.intp]
     cause = "light_intensity"
-    deciding_photo = "a grey card beside the object in every photo"
+    deciding_photo = "a grey card next to the object in every photo"
 
     @classmethod
     def of(cls, context: DiagnosisContext) -> LightIntensity | None:
@@ -36,10 +37,10 @@ class LightIntensity(ChangesShading):
     @property
     def parameters(self) -> Parameters:
         names = [f"photo {p + 1}" for p in self.photos]
-        return Parameters.alike(names, "ln", USUAL, -1.5, 1.5)
+        return Parameters.alike(names, "ln", PRIOR_SCALE, -1.5, 1.5)
 
     @property
-    def columns(self) -> NDArray[np.intp]:
+    def parameter_index(self) -> NDArray[np.intp]:
         return parameter_columns(self.photo, 1)
 
     @property
@@ -54,7 +55,7 @@ class LightIntensity(ChangesShading):
         gain = np.exp(x - x.mean())
         low, high = int(np.argmin(gain)), int(np.argmax(gain))
         return (
-            "the light (or the exposure) changed between photos: photo "
-            f"{self.photos[high] + 1} is {100 * (gain[high] - 1):+.0f} %, photo "
-            f"{self.photos[low] + 1} {100 * (gain[low] - 1):+.0f} % against the mean"
+            "The brightness of the lamp (or the exposure) differs between photos: relative to the "
+            f"mean, photo {self.photos[high] + 1} has {100 * (gain[high] - 1):+.0f} % and photo "
+            f"{self.photos[low] + 1} has {100 * (gain[low] - 1):+.0f} %."
         )

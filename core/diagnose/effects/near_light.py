@@ -1,4 +1,4 @@
-"""The lamp was near: its direction and irradiance differ over the object."""
+"""A near lamp: its direction and irradiance vary over the object."""
 
 from __future__ import annotations
 
@@ -16,19 +16,21 @@ from .base.image_formation import ChangesShading
 from .base.parameters import Parameters, mean_removal, parameter_columns
 from .light_direction import LightDirection
 
-USUAL = 0.3  # sizes of the object over the distance
-NEAREST = 1.2  # the lamp is not within the object: sizes of it from the centre
-ASIDE, BRIGHTER = np.radians(1.0), 0.05  # what may be measured elsewhere than at the centre
-EACH = 4
-START = 0.15  # of the nearness: away from its bound, where steps are cut short
+NEARNESS_SCALE = 0.3  # size of the object / distance, standard deviation of the prior
+MIN_DISTANCE = 1.2  # of the lamp from the centre, in sizes: it is not inside the object
+# radians and ln gain, of the prior: the light may have been measured away from the centre
+ANGLE_SCALE, GAIN_SCALE = np.radians(1.0), 0.05
+EACH = 4  # parameters of a light
+START = 0.15  # of the nearness: away from its bound 0, where steps would be cut short
 
 
 @dataclass(frozen=True)
 class NearLight(ChangesShading, TracesRays):
-    """numbers: for each distant light the object's size over the lamp's distance, then two angles
-    and ln of a gain: where direction and irradiance were measured, a near lamp's are others than at
-    the object's centre. from_afar: the same lights as distant ones; offset: (n, 3) from the centre,
-    in sizes. shadows: of where the lamps were found to be."""
+    """Parameters: for each distant light the size of the object divided by the distance of the
+    lamp, two angles, and ln of a gain. The angles and the gain are there because direction and
+    irradiance of a near lamp may have been measured at another place than the object's centre.
+    from_afar: the same lights as distant ones; offset: (n, 3) from the centre, in sizes of the
+    object. shadows: traced for the lamp positions that were found."""
 
     from_afar: LightDirection
     offset: Array
@@ -58,15 +60,15 @@ class NearLight(ChangesShading, TracesRays):
         count = len(self.from_afar.names)
         return Parameters(
             tuple(names), tuple(units),
-            np.tile([USUAL, ASIDE, ASIDE, BRIGHTER], count),
+            np.tile([NEARNESS_SCALE, ANGLE_SCALE, ANGLE_SCALE, GAIN_SCALE], count),
             np.tile([0.0, -0.2, -0.2, -0.5], count),
-            np.tile([1 / NEAREST, 0.2, 0.2, 0.5], count),
+            np.tile([1 / MIN_DISTANCE, 0.2, 0.2, 0.5], count),
             np.full(EACH * count, 1e-3),
             np.tile([START, 0.0, 0.0, 0.0], count),
         )  # fmt: skip
 
     @property
-    def columns(self) -> NDArray[np.intp]:
+    def parameter_index(self) -> NDArray[np.intp]:
         return parameter_columns(self.from_afar.light, EACH)
 
     @property
@@ -74,7 +76,7 @@ class NearLight(ChangesShading, TracesRays):
         return mean_removal(len(self.from_afar.names), EACH, EACH - 1)
 
     def nearness(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(lights,) sizes of the object over the distance."""
+        """(lights,) size of the object divided by the distance of the lamp."""
         return x[::EACH]
 
     def with_rays(self, context: DiagnosisContext, x: np.ndarray) -> NearLight:
@@ -85,7 +87,7 @@ class NearLight(ChangesShading, TracesRays):
         angles = np.stack([x[1::EACH], x[2::EACH]], axis=1).ravel()
         state = self.from_afar.shading(state, angles)
         light = self.from_afar.light
-        # a lamp at light / nearness, in sizes: seen from a point it is at light − nearness · offset
+        # a lamp at light / nearness, in sizes: direction from a point: light − nearness · offset
         inverse = np.where(light >= 0, x[::EACH][light], 0.0).astype(np.float32)
         gain = np.where(light >= 0, np.exp(x[3::EACH])[light], 1.0).astype(np.float32)
         towards = state.light - inverse[:, None] * self.offset
@@ -99,12 +101,13 @@ class NearLight(ChangesShading, TracesRays):
         half = min(nearness / 2, 0.9)
         unevenness = 100 * (((1 + half) / (1 - half)) ** 2 - 1)
         return (
-            f"the lamp ({self.from_afar.names[nearest]}) stood near, about "
-            f"{self.size / nearness:.3g} scan units away ({1 / nearness:.1f} times the object's "
-            f"size): the near side gets up to {unevenness:.0f} % more light than the far one"
+            f"The lamp {self.from_afar.names[nearest]!r} was near: its distance is about "
+            f"{self.size / nearness:.3g} scan units ({1 / nearness:.1f} times the size of the "
+            f"object), so the near side gets up to {unevenness:.0f} % more light than the far "
+            "side."
         )
 
 
 def _offset(context: DiagnosisContext) -> Array:
-    """(n, 3) from the centre, in sizes."""
+    """(n, 3) position relative to the centre, in sizes of the object."""
     return ((context.pixels.point - context.centre) / context.size).astype(np.float32)

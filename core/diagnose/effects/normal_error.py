@@ -1,7 +1,7 @@
-"""The mesh is smoother or rougher than the surface: its normals are off, patch by patch.
+"""Errors of the mesh's normals, patch by patch: the mesh is smoother or rougher than the surface.
 
-A patch is tilted, and bends: bumps are round, and what mere steps from patch to patch would leave
-of deep ones is more than noise.
+Each patch is tilted and curved. Bumps are round; constant tilts per patch would leave residuals
+above the noise where they are high.
 """
 
 from __future__ import annotations
@@ -19,18 +19,19 @@ from .base.parameters import Parameters
 from .base.patch_effect import PatchEffect
 from .base.surface_patches import ACROSS, surface_patches
 
-USUAL = np.radians(2.0)
-BENT = np.radians(1.0)  # over half a patch
+TILT_SCALE = np.radians(2.0)  # standard deviation of the prior of a tilt
+CURVATURE_SCALE = np.radians(1.0)  # the same of its change over half a patch
 WAYS = ("first", "second", "bent along", "bent across", "bent aside")
-FARTHEST = np.radians(25.0)
+MAX_TILT = np.radians(25.0)  # bound of every parameter
 
 
 @dataclass(frozen=True)
 class NormalError(PatchEffect, ChangesShading):
-    """numbers: for each patch of the surface the tangents of two angles that its normal is tilted
-    by, along ``first`` and ``other``, (n, 3) unit, and what these grow by over half its width: the
-    first along first, each along the other's, the second along other. middle: (P, 3) of each
-    patch; place: (n, 2) of a pixel from there, along both, in half widths."""
+    """Parameters: for each patch of the surface the tangents of the two angles by which its normal
+    is tilted, along ``first`` and ``other``, (n, 3) unit vectors, and their changes over half the
+    width of the patch: of the first along first, of each along the other's direction, of the second
+    along other. middle: (P, 3) centre of each patch; place: (n, 2) position of a pixel relative to
+    it, along both directions, in half widths."""
 
     first: Array
     other: Array
@@ -50,7 +51,7 @@ class NormalError(PatchEffect, ChangesShading):
         first, other = (v[patch].astype(np.float32) for v in tangents(mean))
         middle = _means(patch[known], context.pixels.point[known])
         place = _place(context, middle[patch], first, other)
-        return cls(patch, (USUAL,) * 2 + (BENT,) * 3, first, other, middle, place)
+        return cls(patch, (TILT_SCALE,) * 2 + (CURVATURE_SCALE,) * 3, first, other, middle, place)
 
     def at_pixels(self, context: DiagnosisContext, nearest: NearestPixels) -> NormalError:
         at = nearest.surface
@@ -61,7 +62,7 @@ class NormalError(PatchEffect, ChangesShading):
     @property
     def parameters(self) -> Parameters:
         names = [f"patch {k + 1}, {way}" for k in range(self.count) for way in WAYS]
-        alike = Parameters.alike(names, "rad", 1.0, -FARTHEST, FARTHEST)
+        alike = Parameters.alike(names, "rad", 1.0, -MAX_TILT, MAX_TILT)
         return replace(alike, deviation=self.deviation)
 
     def shading(self, state: ShadingState, x: np.ndarray) -> ShadingState:
@@ -76,23 +77,23 @@ class NormalError(PatchEffect, ChangesShading):
         tilt = x.reshape(-1, len(WAYS))[:, :2]
         angle = np.degrees(np.hypot(*tilt.T))
         return (
-            "the mesh does not follow the surface: its normals are off by "
-            f"{np.median(angle):.1f}° in the median and {np.percentile(angle, 95):.1f}° in the "
-            "worst twentieth (too smooth a mesh, or a noisy one)"
+            "The normals of the mesh are off by "
+            f"{np.median(angle):.1f}° (median over patches; 95th percentile "
+            f"{np.percentile(angle, 95):.1f}°). The mesh is too smooth or noisy."
         )
 
 
 def _means(patch: np.ndarray, values: Array) -> np.ndarray:
-    """(P, 3) of values (n, 3) by patch (n,)."""
+    """(P, 3) means of values (n, 3) over each patch; patch: (n,) its number."""
     count = np.maximum(np.bincount(patch), 1)
     sums = [np.bincount(patch, values[:, k].astype(np.float64)) for k in range(3)]
     return np.stack(sums, axis=1) / count[:, None]
 
 
 def _place(context: DiagnosisContext, middle: Array, first: Array, other: Array) -> Array:
-    """(n, 2) of the context's pixels from the middles (n, 3) of their patches, in half widths of
-    one; a patch that is the nearest to what it does not hold bends no further than a little beyond
-    its edge."""
+    """(n, 2) positions of the context's pixels relative to the centres (n, 3) of their patches, in
+    half widths, clipped to ±1.5: a pixel outside its nearest patch does not extrapolate the
+    curvature far beyond the edge."""
     away = (context.pixels.point - middle) / (0.5 * context.size / ACROSS)
     place = np.stack([np.sum(away * along, axis=1) for along in (first, other)], axis=1)
     return np.clip(place, -1.5, 1.5).astype(np.float32)

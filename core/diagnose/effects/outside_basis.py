@@ -1,4 +1,4 @@
-"""The material reflects as no mixture of the measured ones does."""
+"""A material outside the basis: no mixture of the measured materials reflects like it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from .base.parameters import Parameters
 
 @dataclass(frozen=True)
 class OutsideBasis(RelaxesBRDFs):
-    """No numbers of its own: the slack beside the basis may be large."""
+    """No parameters of its own: the prior of the additional basis functions (basis_slack.py) is
+    widened."""
 
     cause = "outside_basis"
     deciding_photo = "photos with light and camera at more angles to each other"
@@ -34,12 +35,12 @@ class OutsideBasis(RelaxesBRDFs):
 
     def relaxed(self, brdfs: MaterialBRDFs) -> MaterialBRDFs:
         variance = brdfs.variance.copy()
-        variance[-basis_slack.COUNT :] = basis_slack.MUCH**2
+        variance[-basis_slack.COUNT :] = basis_slack.WIDE_SCALE**2
         return replace(brdfs, variance=variance)
 
     def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         return (
-            "the material is outside the basis: no mixture of the measured materials has its "
-            "highlight; the fit bends them to it, and predicts directions that no photo saw less "
-            "surely"
+            "This material's highlight is unlike any mixture of the measured materials. The fit "
+            "approximates it; predictions for directions that no photo shows are less "
+            "certain."
         )

@@ -1,4 +1,4 @@
-"""Some parts of the surface are of another material: brighter, darker or of another colour."""
+"""A second material: parts of the surface are brighter, darker or of another colour."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from .base.parameters import Parameters
 from .base.patch_effect import PatchEffect
 from .base.surface_patches import median_of, surface_patches
 
-ACROSS = 10  # patches over the object's size: small ones are predicted by few others
-USUAL = (0.1, 0.05, 0.05, 0.05)
-LIT = 0.2  # of the lamp's light, from which a pixel says what a patch reflects
-OTHER = 0.03  # more, or albedo more, than the rest: a patch of another material
-EACH = 4
+ACROSS = 10  # patches over the object's size; few other pixels predict a smaller one
+PRIOR_SCALES = (0.1, 0.05, 0.05, 0.05)  # of a patch's parameters, standard deviations
+LIT = 0.2  # of the 90th percentile of irradiance; darker pixels do not determine a patch's start
+OTHER = 0.03  # difference in scale or albedo from the median patch that makes another material
+EACH = 4  # parameters of a patch
 
 
 @dataclass(frozen=True)
 class SecondMaterial(PatchEffect, ChangesShading, AddsRadiance):
-    """numbers: for each patch of the surface how much more it reflects of what the material does,
-    as a part, and how much more it scatters evenly, albedo, red, green, blue. (Linear, so that a
-    patch that is left out, and falls back to 0, is predicted by a Newton step as well as by the
-    model itself.) received: (n, 3) irradiance at each pixel."""
+    """Parameters: for each patch of the surface the relative change of the material's reflectance,
+    and an added diffuse albedo for red, green and blue. (All are linear, so that a Newton step
+    predicts a held-out patch, whose parameters return to 0, as well as the model itself.)
+    received: (n, 3) irradiance at each pixel."""
 
     received: Array
     cause = "second_material"
@@ -38,7 +38,7 @@ class SecondMaterial(PatchEffect, ChangesShading, AddsRadiance):
         parts = surface_patches(context, ACROSS)
         if not (parts >= 0).any():
             return None
-        return cls(parts, USUAL, ShadingState.of(context.pixels).received)
+        return cls(parts, PRIOR_SCALES, ShadingState.of(context.pixels).received)
 
     def at_pixels(self, context: DiagnosisContext, nearest: NearestPixels) -> SecondMaterial:
         received = ShadingState.of(context.pixels).received
@@ -76,7 +76,7 @@ class SecondMaterial(PatchEffect, ChangesShading, AddsRadiance):
         share = 100 * float(other.mean())
         factor, even = (float(v[other].mean()) if other.any() else 0.0 for v in (more, albedo))
         return (
-            f"there is more than one material: {share:.0f} % of the surface reflects otherwise, "
-            f"{100 * factor:+.0f} % of what the rest does and an albedo of {even:+.3f} beside it "
-            "(paint a mask of it)"
+            f"There is more than one material: {share:.0f} % of the surface differs from the rest "
+            f"by {100 * factor:+.0f} % in reflectance and {even:+.3f} in diffuse albedo. "
+            "Paint a mask of it."
         )

@@ -1,4 +1,4 @@
-"""Light enters the surface and leaves it elsewhere: shadows' edges and folds radiosity."""
+"""Subsurface scattering: light enters the surface and leaves it elsewhere, at shadow edges too."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ from .base.effect import Array
 from .base.image_formation import AddsRadiance
 from .base.parameters import Parameters
 
-RADII = (0.015, 0.04, 0.1)  # of the object's size, over which light spreads
-CUT = 2.5  # radii
-NEIGHBOURS = 100  # points within reach of a pixel
-MOST = 20_000
-NEAREST = 160  # points of a pixel that are looked up at most
+RADII = (0.015, 0.04, 0.1)  # scattering distances, fractions of the object's size
+CUT = 2.5  # radii beyond which the kernel is cut off
+NEIGHBOURS = 100  # points within that distance of a pixel, about
+MAX_POINTS = 20_000  # on the surface
+MAX_NEIGHBOURS = 160  # points that are looked up for a pixel at most
 
 
 @dataclass(frozen=True)
 class Subsurface(AddsRadiance):
-    """numbers: the part of the light that enters and spreads over each of RADII, red, green, blue.
-    spread: (r, n, 3) radiance that a white surface gains or loses by it, parts of 1."""
+    """Parameters: the fraction of the light that scatters over each of RADII, for red, green and
+    blue. spread: (r, n, 3) radiance that a white surface gains or loses where that fraction is 1.
+    size: of the object, scan units."""
 
     spread: Array
     size: float
@@ -44,7 +45,7 @@ class Subsurface(AddsRadiance):
         areas = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) / 2
         area = float(areas.sum()) / context.size**2
         for k, radius in enumerate(RADII):
-            count = int(min(MOST, NEIGHBOURS * area / (np.pi * (CUT * radius) ** 2)))
+            count = int(min(MAX_POINTS, NEIGHBOURS * area / (np.pi * (CUT * radius) ** 2)))
             points, faces = _spread(corners, areas, max(count, 200), seed=k)
             normals = mesh.face_normals[faces].astype(np.float32)
             mixing = _mixing(pixels.point, points, radius * context.size)
@@ -69,14 +70,14 @@ class Subsurface(AddsRadiance):
         part = x.reshape(-1, 3).mean(axis=1)
         far = float(np.sum(part * np.array(RADII)) / max(float(part.sum()), 1e-9))
         return (
-            "light enters the surface and leaves it elsewhere (marble, wax, skin): about "
-            f"{100 * part.sum():.0f} % of it spreads over {far * self.size:.2g} scan units, so "
-            "that shadows' edges radiosity"
+            "The material scatters light below its surface (marble, wax, skin): about "
+            f"{100 * part.sum():.0f} % of the light spreads over {far * self.size:.2g} scan "
+            "units, so light leaks across the edges of shadows."
         )
 
 
 def _spread(corners: Array, areas: Array, count: int, seed: int) -> tuple[Array, Array]:
-    """(points (count, 3), their faces) evenly over a surface of triangles (f, 3, 3)."""
+    """(points (count, 3), their faces) uniformly distributed on triangles (f, 3, 3)."""
     rng = np.random.default_rng(seed)
     steps = np.cumsum(areas)
     evenly = (np.arange(count) + rng.random(count)) / count * steps[-1]
@@ -87,9 +88,9 @@ def _spread(corners: Array, areas: Array, count: int, seed: int) -> tuple[Array,
 
 
 def _mixing(pixels: Array, points: Array, radius: float) -> csr_array:
-    """(n, m) weights of points about each pixel, by exp(−distance/radius); rows sum to 1."""
+    """(n, m) weights exp(−distance / radius) of the points near each pixel; rows sum to 1."""
     near, which = cKDTree(points).query(
-        pixels, min(NEAREST, len(points)), distance_upper_bound=CUT * radius
+        pixels, min(MAX_NEIGHBOURS, len(points)), distance_upper_bound=CUT * radius
     )
     weight = np.where(np.isfinite(near), np.exp(-np.minimum(near / radius, 50)), 0.0)
     weight /= np.maximum(weight.sum(axis=1, keepdims=True), 1e-30)

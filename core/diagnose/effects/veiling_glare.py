@@ -1,4 +1,4 @@
-"""Light that scatters in the lens lies over the photo like a veil."""
+"""Veiling glare: light that scatters in the lens is spread over the photo."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from .base.parameters import Parameters
 
 @dataclass(frozen=True)
 class VeilingGlare(CameraEffect, NeedsPhoto):
-    """numbers: the part of the light that scatters, and how much more of it stays about where the
-    photo is bright than goes all over it (1: all of it, −1: none). veil: (n, 2, 3) the photo
-    blurred widely, and its mean."""
+    """Parameters: the fraction of the light that scatters, and the balance between scattering near
+    bright areas and over the whole photo (1: near only, −1: uniform only). veil: (n, 2, 3) the
+    photo under a wide blur, and its mean."""
 
     veil: Array
     cause = "veiling_glare"
-    systematic_error = 0.03  # the veil lies over the photo that it is taken from
+    systematic_error = 0.03  # the veil is computed from photos that contain it
     deciding_photo = "one photo with a hood on the lens and black behind the object"
 
     @classmethod
@@ -47,6 +47,6 @@ class VeilingGlare(CameraEffect, NeedsPhoto):
 
     def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         return (
-            f"the lens scatters {100 * x[0]:.1f} % of the light over the photo (veiling glare): "
-            "dark parts beside bright ones are too bright"
+            f"The lens scatters {100 * x[0]:.1f} % of the light over the photo (veiling glare): "
+            "dark areas near bright ones are too bright."
         )

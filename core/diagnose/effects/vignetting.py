@@ -1,4 +1,4 @@
-"""The lens darkens the corners."""
+"""Vignetting: the lens darkens the corners of the photos."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from .base.parameters import Parameters
 
 @dataclass(frozen=True)
 class Vignetting(CameraEffect):
-    """numbers: a, b of the gain 1 + a r² + b r⁴, r (n,) from the photo's centre, 1 in a corner."""
+    """Parameters: a, b of the gain 1 + a r² + b r⁴, where r is the distance from the photo's
+    centre, 1 in a corner. r2: (n,) r²."""
 
     r2: Array
     cause = "vignetting"
@@ -33,7 +34,7 @@ class Vignetting(CameraEffect):
         )  # fmt: skip
 
     def gain(self, x: np.ndarray) -> Array:
-        """(n,) what the lens lets through."""
+        """(n,) relative transmission of the lens, at least 0.05."""
         return np.maximum(1 + x[0] * self.r2 + x[1] * self.r2**2, 0.05)
 
     def recorded(self, radiance: Array, state: ShadingState, x: np.ndarray) -> Array:
@@ -42,7 +43,7 @@ class Vignetting(CameraEffect):
     def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         gain = self.gain(x)
         return (
-            "the lens is not equally bright everywhere (vignetting): where the object reaches "
-            f"farthest out, photos are {100 * (gain[np.argmax(self.r2)] - 1):+.0f} % against their "
-            "centre"
+            "The brightness of the photos varies with the distance from their centre (vignetting): "
+            f"by {100 * (gain[np.argmax(self.r2)] - 1):+.0f} % at the outermost pixels of the "
+            "object, relative to the centre."
         )

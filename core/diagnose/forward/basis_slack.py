@@ -1,10 +1,10 @@
-"""Room for what no mixture of measured materials makes: hats over θh and θd beside the components.
+"""Slack of the basis: hat functions over θh and θd in addition to the principal components.
 
-Every material is a little outside the basis. Without some slack whatever bends a BRDF's shape (a
-tone curve, a narrow lamp) would be taken up for the material's sake, and named as a cause. A little
-is always there; ``outside_basis`` is named where much more is asked for. How bright a material is
-as a whole is no shape: the brightest one that was measured sends back a third of the light, and a
-white wall, which is brighter at all angles alike, is not outside for that.
+Every material is slightly outside the basis. Without slack, any effect that changes the shape of a
+BRDF (a tone curve, a narrow lamp) could compensate for that and would be reported as a cause. A
+little slack is always present; ``outside_basis`` is reported where much more is needed. The overall
+brightness is free: the brightest of the measured materials reflects a third of the light, and a
+white wall, which is brighter at all angles alike, is not outside the basis for that reason.
 """
 
 from __future__ import annotations
@@ -19,13 +19,14 @@ from ...basis import Basis
 THETA_H = np.radians([0.0, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0, 13.0, 17.0, 22.0, 30.0, 50.0, 90.0])
 THETA_D = np.radians([0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0])
 COUNT = len(THETA_H) * len(THETA_D)
-BRIGHTER = 1.0  # of ln(ρ·cosMap + ε), at all nodes alike
-TINY, LITTLE, MUCH = 0.003, 0.05, 0.5  # of ln(ρ·cosMap + ε), at each node
+LEVEL_SCALE = 1.0  # prior standard deviation of ln(ρ·cosMap + ε), common to all nodes
+# the same at each node: nearly no slack; the default; for outside_basis
+TIGHT_SCALE, DEFAULT_SCALE, WIDE_SCALE = 0.003, 0.05, 0.5
 
 
 def with_slack(basis: Basis) -> Basis:
-    """The basis with components more: one that is 1 everywhere, and COUNT hats, 1 at a node and
-    linear to the next ones."""
+    """The basis with additional components: one that is 1 everywhere, and COUNT hat functions, each
+    1 at its node and linear to 0 at the next nodes."""
     nodes = basis.grid.nodes()
     h, d = _hats(THETA_H, nodes.theta_h), _hats(THETA_D, nodes.theta_d)
     hats = np.einsum("ihdp,jhdp->ijhdp", h, d).reshape(COUNT, *basis.grid.shape)
@@ -35,11 +36,12 @@ def with_slack(basis: Basis) -> Basis:
 
 
 def variances(basis: Basis, slack: float) -> NDArray[np.float64]:
-    """(k + 1 + COUNT,) of the coefficients of with_slack(basis) before a photo is seen."""
+    """(k + 1 + COUNT,) prior variances of the coefficients of with_slack(basis). slack: standard
+    deviation at each node."""
     own = np.full(basis.count, basis.coefficient_variance)
-    return np.concatenate([own, [BRIGHTER**2], np.full(COUNT, slack**2)])
+    return np.concatenate([own, [LEVEL_SCALE**2], np.full(COUNT, slack**2)])
 
 
 def _hats(nodes: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(nodes, …) weights of each at every angle."""
+    """(nodes, …) values of the hat function of each node at angles ``at`` (…)."""
     return np.stack([np.interp(at, nodes, row) for row in np.eye(len(nodes))])

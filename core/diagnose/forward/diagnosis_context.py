@@ -1,4 +1,4 @@
-"""What a diagnosis knows of a capture: pixels, fitted BRDFs, scan and lights."""
+"""The input of a diagnosis: pixels, fitted BRDFs, scan and lights of a capture."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ Array = NDArray[np.floating]
 
 @dataclass(frozen=True)
 class DiagnosisContext:
-    """What effects are built from.
+    """The data that effects are built from.
 
     pixels: the pixels of all photos that the diagnosis uses. brdfs: of the fit without effects.
     rays: the scanned mesh. light: (photos,) index of the light of each photo. lights: their names;
-    distant: (lights,) whether each is distant. centre: (3,) of what the photos show; size: its
+    distant: (lights,) whether each is distant. centre: (3,) of the visible surface; size: its
     extent, both in scan units. level: median irradiance. scale: (materials,) factor by which each
     material's reflectance was multiplied and the irradiance on it divided, where the irradiance is
     unknown. materials: their names. ray_count: rays per pixel and sampling strategy
@@ -52,17 +52,17 @@ class DiagnosisContext:
 
     @cached_property
     def surroundings(self) -> Surroundings:
-        """What the surface point of every pixel sees around itself."""
+        """The surroundings of the surface point of every pixel."""
         return Surroundings.of(self.pixels, self.brdfs, self.rays, self.ray_count)
 
     @cached_property
     def visible_faces(self) -> NDArray[np.int32]:
-        """(f, directions) faces of the mesh that each face sees (radiosity.py)."""
+        """(f, directions) faces of the mesh that are visible from each face (radiosity.py)."""
         return visible_faces(self.rays)
 
     def face_radiosity(self, photo: int) -> Array:
-        """(f, 3) radiance of every face of the mesh in a photo: a matte surface of the same albedo,
-        lit by the lamp and by the other faces."""
+        """(f, 3) radiance of every face of the mesh in a photo: a diffuse surface of the same
+        albedo, lit by the lamp and by the other faces."""
         return face_radiosity(
             self.pixels, self.brdfs, self.rays, self.scale, self.visible_faces, photo
         )

@@ -1,4 +1,4 @@
-"""What the photos would show of the lamp's light alone, without any effect."""
+"""Predicted radiance with the direct light of the lamp only, without any effect."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every face of the mesh sends off under the lamp, however often light bounced before."""
+"""Radiance that every face of the mesh emits under the lamp after all bounces."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from .radiosity import bounced_radiance
 
 Array = NDArray[np.floating]
 
-OBLIQUE = np.radians(45.0)  # the angle whose albedo stands for all
-NEAREST = 8  # pixels that say what a face is made of
+OBLIQUE = np.radians(45.0)  # angle whose directional albedo is used for all
+NEIGHBOURS = 8  # nearest pixels, whose median gives the material of a face
 
 
 def face_radiosity(
@@ -27,8 +27,9 @@ def face_radiosity(
     visible: NDArray[np.int32],
     photo: int,
 ) -> Array:
-    """(f, 3) radiance; a face's material is that of the nearest pixels, its light that of the
-    photo's pixels (a distant lamp's is the same everywhere) and of other faces."""
+    """(f, 3) radiance in one photo. The material of a face is that of the nearest pixels. The lamp
+    is treated as distant, with the light of one of the photo's pixels. visible: (f, r) of
+    radiosity.visible_faces. scale: (m,) of the samples of each material."""
     mesh = rays.mesh
     centre = mesh.vertices[mesh.faces].mean(axis=1)
     normal = mesh.face_normals
@@ -49,11 +50,11 @@ def face_radiosity(
     if len(albedo) == 1:
         material = np.zeros(len(centre), np.int64)
     else:
-        near = cKDTree(pixels.point).query(centre, NEAREST)[1]
+        near = cKDTree(pixels.point).query(centre, NEIGHBOURS)[1]
         material = np.round(np.median(pixels.material[near], axis=1)).astype(np.int64)
     irradiance = pixels.irradiance[one] * scale[pixels.material[one]]
     light = irradiance * np.where(dark, 0, cosine)[:, None]
-    # what the lamp gives is in the photos' unit; from then on an albedo is a part of the light
+    # the lamp's light is in the unit of the photos; for later bounces an albedo is a plain fraction
     factor = scale[material][:, None]
     own = np.asarray(albedo[material], np.float32)
     return bounced_radiance(own / (np.pi * factor) * light, own, visible)

@@ -1,4 +1,4 @@
-"""The BRDFs of all materials of a capture, and how what they reflect changes with coefficients."""
+"""The BRDFs of all materials of a capture, and their derivatives by the coefficients."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = NDArray[np.floating]
 @dataclass(frozen=True)
 class MaterialBRDFs:
     """coefficients: (m, 3, k) of m materials in a basis with slack (basis_slack.py). variance: (k,)
-    of their prior."""
+    prior variances of the coefficients."""
 
     basis: Basis
     coefficients: NDArray[np.float64]
@@ -31,7 +31,7 @@ class MaterialBRDFs:
     def of(cls, brdfs: Sequence[PrincipalBRDF]) -> MaterialBRDFs:
         """Fitted BRDFs of one basis, with a little slack."""
         basis = brdfs[0].basis
-        variance = basis_slack.variances(basis, basis_slack.LITTLE)
+        variance = basis_slack.variances(basis, basis_slack.DEFAULT_SCALE)
         coefficients = np.zeros((len(brdfs), 3, len(variance)))
         for index, brdf in enumerate(brdfs):
             coefficients[index, :, : brdf.coefficients.shape[1]] = brdf.coefficients
@@ -39,25 +39,25 @@ class MaterialBRDFs:
 
     @classmethod
     def without_slack(cls, brdf: PrincipalBRDF) -> MaterialBRDFs:
-        """One BRDF as it is, to be predicted with and not fitted."""
+        """One BRDF for prediction only; it cannot be fitted."""
         variance = np.zeros(brdf.coefficients.shape[1])
         return cls(brdf.basis, brdf.coefficients[None], variance)
 
     def tight(self) -> MaterialBRDFs:
-        """The same with nearly no slack; what it held is left out."""
+        """The same BRDFs with nearly no slack, whose coefficients are set to 0."""
         variance = self.variance.copy()
-        variance[-basis_slack.COUNT :] = basis_slack.TINY**2
+        variance[-basis_slack.COUNT :] = basis_slack.TIGHT_SCALE**2
         coefficients = self.coefficients.copy()
         coefficients[..., -basis_slack.COUNT :] = 0
         return replace(self, coefficients=coefficients, variance=variance)
 
     @cached_property
     def tables(self) -> tuple[LogTable, ...]:
-        """One a material."""
+        """One for each material."""
         return tuple(LogTable.of(self.basis, c) for c in self.coefficients)
 
     def evaluate(self, angles: Angles, material: NDArray[np.integer]) -> Array:
-        """ρ (n, 3) in 1/sr at n directions, each of the material that its pixel shows."""
+        """ρ (n, 3), 1/sr, of the paper's equation (3), at n directions; material: (n,) of each."""
         out = np.zeros((len(material), 3), np.float32)
         for index, table in enumerate(self.tables):
             rows = np.flatnonzero(material == index)
@@ -66,7 +66,7 @@ class MaterialBRDFs:
         return out
 
     def reflected(self, state: ShadingState) -> Array:
-        """(n, 3) radiance of the lamp's light."""
+        """(n, 3) reflected radiance of the lamp."""
         return self.evaluate(state.angles, state.pixels.material) * state.received
 
     def log_derivative(self, state: ShadingState) -> Array:
@@ -74,7 +74,7 @@ class MaterialBRDFs:
         return self.reflected(state) + _offset(state)
 
     def reflected_with_derivative(self, state: ShadingState) -> Array:
-        """(n, 6) both."""
+        """(n, 6) reflected radiance and log_derivative."""
         reflected = self.reflected(state)
         return np.concatenate([reflected, reflected + _offset(state)], axis=1)
 
@@ -84,5 +84,5 @@ class MaterialBRDFs:
 
 
 def _offset(state: ShadingState) -> Array:
-    """(n, 3) radiance of a BRDF ε / cosMap: what the mapping adds before it takes the logarithm."""
+    """(n, 3) reflected radiance of a BRDF ε / cosMap, the offset of the logarithmic mapping."""
     return (mapping.EPSILON / mapping.cos_map(state.angles))[:, None] * state.received

@@ -1,8 +1,8 @@
-"""How much of the lamp's light the mesh lets through to a pixel: from rays through parts of it.
+"""Partial visibility: the fraction of the lamp's light that reaches a pixel, from several rays.
 
-One ray from its middle says all or nothing. What it then errs by is no noise: of the pixels that
-are called lit those beside the edge of a shadow are darker, all of them. Where light grazes the
-object nearly every lit pixel is beside one, and the photo would seem darker than it is.
+A single ray from the centre gives 0 or 1, and its error is not noise: of the pixels that it counts
+as lit, all near the edge of a shadow are darker. Under grazing light nearly every lit pixel is near
+an edge, and the photo would seem too dark.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from .pixels import Pixels
 
 Array = NDArray[np.floating]
 
-SIDE = 4  # rays a side of a pixel
+SIDE = 4  # rays along each side of a pixel
 RAYS = SIDE**2
-REACH = 2.0  # steps from a pixel to the next that its surface may lie before or behind its plane
+REACH = 2.0  # pixel spacings that the surface may lie in front of or behind the pixel's plane
 
 
 def pixel_part_points(rays: RayScene, pixels: Pixels) -> NDArray[np.float64]:
-    """(RAYS, n, 3) points of the mesh that each pixel shows. Its plane at the pixel's middle is no
-    surface: in a hollow it lies under the mesh, in the dark."""
+    """(RAYS, n, 3) points of the mesh that each pixel shows. Points on the tangent plane would not
+    do: in a hollow it lies below the mesh, in the dark."""
     reach = REACH * np.linalg.norm(pixels.step, axis=2).max(axis=1, keepdims=True)
     found = np.empty((RAYS, len(pixels), 3))
     for ray in range(RAYS):
@@ -45,9 +45,9 @@ def partial_visibility(
     distance: Array | None = None,
     parts: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float32]:
-    """(n,) part of the irradiance of a pixel's surface that arrives; 1 where it is turned away.
-    towards: (n, 3) unit, to the lamp, or for each of RAYS rays to another part of it; distance:
-    (n,) to it, None: it is far. parts: ``parts_of`` the pixels, where they are known."""
+    """(n,) fraction of the irradiance on a pixel's surface that arrives; 1 where it is turned away.
+    towards: (n, 3) unit, to the lamp, or a function that gives it for each of RAYS rays. distance:
+    (n,) of the lamp, scan units; None: distant. parts: ``pixel_part_points``, if known already."""
     parts = pixel_part_points(rays, pixels) if parts is None else parts
     full, through = np.zeros((2, len(pixels)))
     for ray in range(RAYS):
@@ -66,6 +66,6 @@ def partial_visibility(
 
 
 def _aside(ray: int) -> tuple[float, float]:
-    """Pixels right of and below its middle."""
+    """(right, down) offset of a ray from the centre of a pixel, pixels."""
     down, right = ((k + 0.5) / SIDE - 0.5 for k in divmod(ray, SIDE))
     return right, down

@@ -1,4 +1,4 @@
-"""What a pixel's own extent does: it shows a piece of surface whose normal turns."""
+"""The footprint of a pixel: it shows a piece of surface over which the normal changes."""
 
 from __future__ import annotations
 
@@ -16,26 +16,31 @@ from .shading_state import ShadingState
 
 Array = NDArray[np.floating]
 
-AT = 0.5 / np.sqrt(3)  # of a pixel: Gauss's two points
-CORNERS = ((-AT, -AT), (AT, AT), (-AT, AT), (AT, -AT))
-LEAST = np.radians(0.15)  # turn of the normal over a pixel
-NEAR = np.radians(15.0)  # θh: beyond, no BRDF changes over so small a turn
+GAUSS_POINT = 0.5 / np.sqrt(3)  # pixels from the centre: two-point Gaussian quadrature
+CORNERS = (
+    (-GAUSS_POINT, -GAUSS_POINT),
+    (GAUSS_POINT, GAUSS_POINT),
+    (-GAUSS_POINT, GAUSS_POINT),
+    (GAUSS_POINT, -GAUSS_POINT),
+)
+MIN_TURN = np.radians(0.15)  # change of the normal over a pixel that matters
+HIGHLIGHT = np.radians(15.0)  # θh beyond which BRDFs hardly change within a pixel
 
 
 @dataclass(frozen=True)
 class Footprint:
-    """Of the pixels of a diagnosis; what does not depend on any number is kept."""
+    """Of the pixels of a diagnosis. Values that do not depend on any parameter are cached."""
 
     pixels: Pixels
 
     @cached_property
     def wide(self) -> NDArray[np.intp]:
-        """Places of the pixels over which the highlight changes, or a part of which is turned away
+        """Indices of the pixels within which the highlight changes, or which are partly turned away
         from the light."""
         turn = np.linalg.norm(self.pixels.turn, axis=2).sum(axis=1)
         state = ShadingState.of(self.pixels)
         ends = np.abs(dot(state.normal, state.light)) < turn
-        return np.flatnonzero((turn > LEAST) & ((state.angles.theta_h < NEAR) | ends))
+        return np.flatnonzero((turn > MIN_TURN) & ((state.angles.theta_h < HIGHLIGHT) | ends))
 
     @cached_property
     def part(self) -> Pixels:
@@ -43,17 +48,17 @@ class Footprint:
         return self.pixels.select(self.wide)
 
     def mean(self, state: ShadingState, of: Callable[[ShadingState], Array]) -> Array:
-        """(w, 3) means over the corners of each wide pixel."""
+        """(w, 3) means of ``of`` over the corners of each wide pixel."""
         part = state.select(self.wide, self.part)
         return np.asarray(sum(of(at_corner(part, k)) for k in range(len(CORNERS))) / len(CORNERS))
 
     @cached_property
     def rows(self) -> dict[int, Array]:
-        """Rows of a basis at the directions that the capture says, by the number of columns."""
+        """Cache: number of columns → rows of the basis at the directions of the capture."""
         return {}
 
     def capture_rows(self, brdfs: MaterialBRDFs, state: ShadingState) -> Array:
-        """BRDFs.rows of a situation in which no direction is another one than the capture says."""
+        """MaterialBRDFs.rows for a state whose directions are those of the capture, cached."""
         count = brdfs.coefficients.shape[2]
         if count not in self.rows:
             self.rows[count] = brdfs.rows(state.angles)
@@ -61,7 +66,7 @@ class Footprint:
 
 
 def at_corner(state: ShadingState, corner: int) -> ShadingState:
-    """With the normals at one corner of the pixels."""
+    """The state with the normals at one corner of each pixel."""
     right, down = CORNERS[corner]
     turn = state.pixels.turn
     normal = state.normal + np.float32(right) * turn[:, 0] + np.float32(down) * turn[:, 1]

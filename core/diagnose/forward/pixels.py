@@ -1,4 +1,4 @@
-"""The pixels that a diagnosis looks at: some thousands of every photo, lit ones and shadowed."""
+"""The pixels of a diagnosis: some thousands of every photo, lit and shadowed."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ class Pixels:
     photo, material: (n,) int16 numbers in the capture. pixel: (n,) int32 flat index in the photo.
     x, y: (n,) float32 from the photo's centre, 1 at half its diagonal. point: (n, 3) float64;
     normal, view, light: (n, 3) unit; scan frame. irradiance: (n, 3) at normal incidence. visible:
-    (n,) part of the light that the mesh lets through, 0 in its cast shadow. edge: (n,) pixels to
-    the next edge of a shadow, at most REACH. curvature: (n,) 1/pixel, NaN unknown. observed: (n, 3)
-    radiance; noise: (n, 3) its variance by the photo's own noise. slope: (n, 2, 3) what the photo
-    shows more a pixel to the right and a pixel down; veil: (n, 2, 3) the photo blurred widely, and
-    its mean. turn, step: (n, 2, 3) what normal and point are more a pixel to the right and a pixel
-    down. usable: (n,) not clipped. block: (n,) int32 the part of its photo each is in.
+    (n,) fraction of the light that the mesh does not block, 0 in its cast shadow. edge: (n,) pixels
+    to the next edge of a shadow, at most REACH. curvature: (n,) 1/pixel, NaN unknown. observed: (n,
+    3) radiance; noise: (n, 3) its variance by the photo's own noise. slope: (n, 2, 3) change of the
+    observed radiance per pixel to the right and per pixel down; veil: (n, 2, 3) the photo under a
+    wide blur, and its mean. turn, step: (n, 2, 3) change of normal and point per pixel to the right
+    and per pixel down. usable: (n,) not clipped. block: (n,) int32 number of the held-out region.
     """
 
     photo: NDArray[np.int16]
@@ -55,7 +55,7 @@ class Pixels:
 
     @staticmethod
     def join(parts: Sequence[Pixels]) -> Pixels:
-        """One after the other (at least one)."""
+        """Concatenation of at least one part."""
         return Pixels(
             **{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Pixels)}
         )

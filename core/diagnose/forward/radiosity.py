@@ -1,8 +1,9 @@
-"""What the faces of a mesh see of one another: light that goes to and fro between them.
+"""Radiosity: light that is reflected between the faces of a mesh (Goral, Torrance, Greenberg and
+Battaile 1984).
 
-Radiosity (Goral, Torrance, Greenberg and Battaile 1984), its form factors summed by rays that are
-drawn by the cosine: as many a face as keep their number the same for every mesh. A coarse sum for
-each of a million faces is a fine one over all of them that a pixel sees.
+Form factors are estimated with rays drawn by the cosine. The total number of rays is the same for
+every mesh. With a million faces the estimate of a single face is coarse, but a pixel averages over
+many faces.
 """
 
 from __future__ import annotations
@@ -17,20 +18,20 @@ from ...scan import Mesh
 
 Array = NDArray[np.floating]
 
-RAYS = 1_500_000  # of all faces
-MOST = 24  # of a face
-BOUNCES = 6  # of light, the first one included; white folds still give a percent at the fifth
-OPEN, BEHIND = -1, -2  # what a ray meets that meets no face from before
+RAYS = 1_500_000  # of all faces together
+MAX_RAYS_PER_FACE = 24
+BOUNCES = 6  # of light, the first one included; the fifth still adds a percent in white folds
+OPEN, BEHIND = -1, -2  # of rays that hit nothing, or a face from behind
 
 
 def visible_faces(rays: RayScene) -> NDArray[np.int32]:
-    """(f, each) faces that each face of the mesh sees in directions drawn by their cosine, from
-    before; negative for the open and for what is seen from behind."""
+    """(f, r) faces that r rays from each face of the mesh hit from the front, in directions drawn
+    by the cosine; OPEN or BEHIND for the others."""
     mesh = rays.mesh
     count = len(mesh.faces)
-    real = mesh.face_normals.any(axis=1)  # faces without area see nothing
+    real = mesh.face_normals.any(axis=1)  # faces without area have no visible faces
     normal = np.where(real[:, None], mesh.face_normals, (0.0, 0.0, 1.0))
-    each = int(np.clip(RAYS // max(count, 1), 1, MOST))
+    each = int(np.clip(RAYS // max(count, 1), 1, MAX_RAYS_PER_FACE))
     rng = np.random.default_rng(0)
     start = mesh.vertices[mesh.faces].mean(axis=1) + SHADOW_LIFT * mesh.size * normal
     frame = tangents(normal)
@@ -48,8 +49,8 @@ def visible_faces(rays: RayScene) -> NDArray[np.int32]:
 
 
 def front_faces(mesh: Mesh, face: NDArray[np.integer], towards: Array) -> NDArray[np.integer]:
-    """Faces (n,) that rays ``towards`` (n, 3) hit, BEHIND for those hit from behind: where a scan
-    has a hole, what is seen through it is its inside, which is no surface and sends off nothing."""
+    """Faces (n,) that rays ``towards`` (n, 3) hit, BEHIND for those hit from behind: through a hole
+    in a scan its inside is visible, which is not a surface and emits nothing."""
     hit = np.flatnonzero(face >= 0)
     behind = dot(mesh.face_normals[face[hit]], towards[hit]) > 0
     face = face.copy()
@@ -58,8 +59,8 @@ def front_faces(mesh: Mesh, face: NDArray[np.integer], towards: Array) -> NDArra
 
 
 def bounced_radiance(sent: Array, albedo: Array, seen: NDArray[np.int32]) -> NDArray[np.float32]:
-    """(f, 3) radiance that matte faces send off after all bounces. sent: after the first one, of
-    the lamp's light; albedo: (f, 3); seen: of ``faces_seen``."""
+    """(f, 3) radiance that diffuse faces emit after all bounces. sent: (f, 3) after the first one,
+    of the lamp's light; albedo: (f, 3); seen: (f, r) of ``visible_faces``."""
     total = last = np.asarray(sent, np.float32)
     for _ in range(BOUNCES - 1):
         arriving = np.zeros_like(total)

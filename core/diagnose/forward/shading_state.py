@@ -1,4 +1,4 @@
-"""What surface and light do at every pixel of a diagnosis, as effects change it."""
+"""Surface and light at every pixel of a diagnosis, which effects change."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ Array = NDArray[np.floating]
 @dataclass(frozen=True)
 class ShadingState:
     """At n pixels. normal, light: (n, 3) unit. irradiance: (n, 3) at normal incidence. visible:
-    (n,) part of the light that arrives. stretch: (n,) what ln tan θh grows by where the surface
-    reflects along one direction more widely than across it. None: nowhere."""
+    (n,) fraction of the light that arrives. stretch: (n,) increase of ln tan θh by anisotropic
+    reflection; None: the surface is isotropic."""
 
     pixels: Pixels
     normal: Array
@@ -30,11 +30,11 @@ class ShadingState:
 
     @classmethod
     def of(cls, pixels: Pixels) -> ShadingState:
-        """As the capture says."""
+        """The state without effects."""
         return cls(pixels, pixels.normal, pixels.light, pixels.irradiance, pixels.visible)
 
     def select(self, rows: NDArray[np.intp], pixels: Pixels) -> ShadingState:
-        """At some of the pixels, which are given too."""
+        """The state at some pixels. rows: their indices; pixels: the same pixels."""
         return ShadingState(
             pixels, self.normal[rows], self.light[rows], self.irradiance[rows], self.visible[rows],
             None if self.stretch is None else self.stretch[rows],
@@ -42,18 +42,18 @@ class ShadingState:
 
     @property
     def differs_from_capture(self) -> bool:
-        """Whether any direction is another one than the capture says."""
-        told = self.normal is self.pixels.normal and self.light is self.pixels.light
-        return not told or self.stretch is not None
+        """Whether a normal, light direction or stretch differs from the capture's."""
+        same = self.normal is self.pixels.normal and self.light is self.pixels.light
+        return not same or self.stretch is not None
 
     @property
     def cos_i(self) -> Array:
-        """(n,) never below 0."""
+        """(n,) cosine of the angle of incidence, at least 0."""
         return np.maximum(dot(self.normal, self.light), 0)
 
     @cached_property
     def angles(self) -> Angles:
-        """Of every pixel, radians; below the horizon they mean nothing."""
+        """Of every pixel, radians; undefined below the horizon."""
         found = half_difference(self.normal, self.light, self.pixels.view)
         if self.stretch is None:
             return found

@@ -1,8 +1,8 @@
-"""What every pixel's surface point sees around itself: open sky, or the object's own surface.
+"""The surroundings of every pixel's surface point: open directions, or the object's own surface.
 
-Half of the directions are drawn towards the surface's hemisphere by their cosine, half about the
-mirrored view as a lobe of medium width reflects; each counts by the balance heuristic (Veach and
-Guibas 1995), so that matte and glossy parts of a BRDF are both summed well.
+Half of the directions are drawn by the cosine over the hemisphere, half from a lobe of medium width
+about the mirrored view. They are weighted by the balance heuristic (Veach and Guibas 1995), so that
+diffuse and glossy parts of a BRDF are both integrated well.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from .radiosity import OPEN, front_faces
 
 Array = NDArray[np.floating]
 
-ALPHA = 0.15  # of the lobe that the second half is drawn from
-ACCURACY = 0.02  # of what such sums say of the light about an object
+ALPHA = 0.15  # roughness of the lobe from which the second half is drawn
+ACCURACY = 0.02  # relative error of such sums
 CHUNK = 2048  # pixels at a time
 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """towards: (n, d, 3) unit, float32. share: (n, d) what each direction counts in an integral
+    """towards: (n, d, 3) unit, float32. share: (n, d) weight of each direction in an integral
     over the hemisphere, cosθ/density, 0 below the horizon. face: (n, d) int32 of the mesh that is
-    seen there, OPEN or BEHIND (radiosity.py). reflected: (n, d, 3) what ρ makes of it: ρ·share."""
+    seen there, OPEN or BEHIND (radiosity.py). reflected: (n, d, 3) ρ·share."""
 
     towards: NDArray[np.float32]
     share: NDArray[np.float32]
@@ -43,7 +43,7 @@ class Surroundings:
     def of(
         cls, pixels: Pixels, brdfs: MaterialBRDFs, rays: RayScene, ray_count: int
     ) -> Surroundings:
-        """Of all pixels of a diagnosis, the BRDFs as they were before any effect."""
+        """Of all pixels of a diagnosis. brdfs: before any effect; ray_count: half of d."""
         parts = [
             _part(pixels.select(rows), brdfs, rays, ray_count, seed)
             for seed, rows in enumerate(_chunks(len(pixels)))
@@ -52,11 +52,12 @@ class Surroundings:
 
     @property
     def open(self) -> NDArray[np.bool_]:
-        """(n, d) whether nothing of the object is there."""
+        """(n, d) whether the object does not block the direction."""
         return self.face == OPEN
 
     def reflected_light(self, radiance: Array) -> Array:
-        """(n, 3) what is reflected of light (n, d) or (n, d, 3) from each direction."""
+        """(n, 3) reflected radiance of incident radiance (n, d) or (n, d, 3) from each
+        direction."""
         if radiance.ndim == 2:
             return np.einsum("ndc,nd->nc", self.reflected, radiance)
         return np.einsum("ndc,ndc->nc", self.reflected, radiance)

@@ -1,4 +1,4 @@
-"""Every photo cut into squares over what it shows of the object."""
+"""Square cells over the image of the object in every photo."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.floating]
 
-APART = 1e3  # between two photos, in the unit of x and y
+SEPARATION = 1e3  # between two photos along a third axis, in the unit of x and y
 
 
 def centred_coordinates(
     pixel: NDArray[np.integer], width: int, height: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """((n,), (n,)) x and y of flat places (n,) in a photo, from its centre, 1 at half the
-    diagonal."""
+    """((n,), (n,)) x and y relative to the centre of a photo, 1 at half the diagonal. pixel: (n,)
+    flat indices."""
     row, column = np.divmod(pixel, width)
     half = 0.5 * np.hypot(width, height)
     x, y = (column + 0.5 - width / 2) / half, (row + 0.5 - height / 2) / half
@@ -22,13 +22,14 @@ def centred_coordinates(
 
 
 def separated_positions(photo: NDArray, x: Array, y: Array) -> NDArray[np.float64]:
-    """(n, 3) places in which no pixel of another photo is near."""
-    return np.stack([x, y, APART * photo.astype(np.float64)], axis=1)
+    """(n, 3) positions, such that pixels of different photos are far apart. photo: (n,); x, y:
+    (n,)."""
+    return np.stack([x, y, SEPARATION * photo.astype(np.float64)], axis=1)
 
 
 def cell_coordinates(photo: NDArray, x: Array, y: Array, across: int) -> tuple[Array, Array]:
-    """((n,), (n,)) columns and rows as numbers from 0 to ``across``, which is the longer side of
-    what a photo shows. photo: (n,); x, y: (n,) any unit."""
+    """((n,), (n,)) column and row of each pixel in cells, 0 to ``across`` along the longer side of
+    the image of the object. photo: (n,); x, y: (n,) in any unit."""
     column, row = np.zeros(len(x)), np.zeros(len(x))
     for number in np.unique(photo):
         mine = np.flatnonzero(photo == number)
@@ -39,7 +40,7 @@ def cell_coordinates(photo: NDArray, x: Array, y: Array, across: int) -> tuple[A
 
 
 def cell_numbers(photo: NDArray, x: Array, y: Array, across: int) -> NDArray[np.int32]:
-    """(n,) a number for each photo's each square."""
+    """(n,) number of the cell of each pixel, unique over all photos."""
     column, row = (
         np.minimum(v.astype(np.int32), across - 1) for v in cell_coordinates(photo, x, y, across)
     )

@@ -1,9 +1,10 @@
-"""Choose the pixels of a diagnosis from every photo, a band of rows at a time.
+"""Selection of the pixels of a diagnosis from every photo, a band of rows at a time.
 
-Half of a photo's share is drawn evenly from everything that shows the object, shadows too; the
-other half where causes betray themselves: beside the edges of shadows and about the highlight. The
-choice looks at geometry alone, never at what a pixel shows, so it does not bias any fit; only where
-the first fit misses light over a whole spot some more are chosen, since a shadow may be small.
+Half of the pixels of a photo are drawn uniformly from the image of the object, shadows included.
+The other half is drawn where causes have a large effect: near the edges of shadows and in the
+highlight. The selection depends on geometry only, not on observed radiance, so it does not bias any
+fit. The exception is a few more pixels around spots that are darker than the first fit predicts,
+since a shadow may be small.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from ...errors import FitError
 from ...geometry import PixelRays, RayScene, SurfaceView, Window, bands, edges, view_window
 from ...inputs import capture_data
 from ...inputs.lights import Lights
+from ...inputs.material_pixels import material_pixels
 from ...inputs.photos import LitPhoto, LitPhotos
 from ...light import Light
 from ...samples.reservoir import sample_hash
@@ -38,17 +40,17 @@ from .refined_pixels import grid_step, on_grid, pixels_near_unexplained_shadows
 Array = NDArray[np.float32]
 
 COUNT = 24_000  # pixels of all photos
-AHEAD = 2  # photos in memory beside the one that is waited for
-REACH = 8  # pixels from the edge of a shadow that are told apart
-HIGHLIGHT = np.radians(15.0)  # θh
-MORE = 0.2  # of a photo's share, at most, about dark spots
-BLOCKS = 6  # parts of a photo along the longer side of what it shows of the object
-BESIDE = 1.5  # pixels from the edge of a shadow that may be lit in part
-OUTLINE = 2  # pixels beside it that belong to no surface surely
-LEAST_COS_O = 0.15  # beyond 81° a pixel sees too much surface
-VEIL = 0.2  # of the diagonal
-STENCIL = np.array([-2, -1, 0, 1, 2])  # derivative of a Gaussian about these
-WIDTH = 1.0  # pixels, of that Gaussian
+AHEAD = 2  # photos in memory in addition to the current one
+REACH = 8  # pixels from the edge of a shadow up to which distances are computed
+HIGHLIGHT = np.radians(15.0)  # θh within which a lit pixel counts as in the highlight
+MAX_SPOT_FRACTION = 0.2  # of a photo's pixels that are added around dark spots
+BLOCKS = 6  # held-out regions along the longer side of the image of the object
+PENUMBRA = 1.5  # pixels from the edge of a shadow that may be partially lit
+OUTLINE = 2  # pixels from an outline that may show another surface
+MIN_COS_O = 0.15  # beyond 81° a pixel covers too much surface
+VEIL = 0.2  # standard deviation of the wide blur, fraction of the diagonal
+STENCIL = np.array([-2, -1, 0, 1, 2])  # pixels, for the derivative of a Gaussian
+WIDTH = 1.0  # pixels, standard deviation of that Gaussian
 
 
 def select_pixels(
@@ -63,8 +65,8 @@ def select_pixels(
     count: int = COUNT,
 ) -> Generator[float, None, Pixels]:
     """Yields the fraction done. brdfs: of the first fit, scale: (m,) of its samples. pool: threads
-    that look at photos side by side. Raises InputError for photos and masks that cannot be read,
-    FitError where no photo shows a material."""
+    that process photos in parallel. count: pixels of all photos together, about. Raises InputError
+    for photos and masks that cannot be read, FitError where no photo shows a material."""
     each = max(200, count // max(len(capture.photos), 1))
 
     def of_photo(place: int) -> Pixels | None:
@@ -76,7 +78,9 @@ def select_pixels(
         found += [] if part is None else [part]
         yield (place + 1) / len(places)
     if not found:
-        raise FitError("no photo shows a material, in light or in shadow: expected one that does")
+        raise FitError(
+            "no photo shows a material, lit or in shadow; expected at least one that does"
+        )
     return Pixels.join(found)
 
 
@@ -91,7 +95,7 @@ def _of_photo(
     place: int,
     count: int,
 ) -> Pixels | None:
-    """None where nothing of the object is in the photo."""
+    """The selected pixels of one photo; None where the object is not in it."""
     camera = capture_data.camera_of(capture, scan, place)
     masks = capture_data.photo_masks(capture, place)
     photo = photos.read_with_noise(place)
@@ -105,16 +109,18 @@ def _of_photo(
         grid.append(part.select(on_grid(part.pixel, camera.width, step)))
     if not parts:
         return None
-    chosen, dense = _thinned(Pixels.join(parts), count), Pixels.join(grid)
+    selected, dense = _thinned(Pixels.join(parts), count), Pixels.join(grid)
     all_over = replace(
         dense,
         observed=photo.radiance.reshape(-1, 3).take(dense.pixel, axis=0),
         irradiance=dense.irradiance / scale[dense.material, None],
     )
-    rows = pixels_near_unexplained_shadows(all_over, brdfs, camera.width, step, int(MORE * count))
-    more = rows[~np.isin(dense.pixel[rows], chosen.pixel)]
-    chosen = Pixels.join([chosen, dense.select(more)])
-    return _with_photo(_part_lit(chosen, rays, light, camera), photo)
+    rows = pixels_near_unexplained_shadows(
+        all_over, brdfs, camera.width, step, int(MAX_SPOT_FRACTION * count)
+    )
+    more = rows[~np.isin(dense.pixel[rows], selected.pixel)]
+    selected = Pixels.join([selected, dense.select(more)])
+    return _with_photo(_with_partial_visibility(selected, rays, light, camera), photo)
 
 
 def _of_band(
@@ -128,7 +134,8 @@ def _of_band(
     masks: Mapping[str, NDArray[np.bool_]],
     window: Window,
 ) -> Pixels:
-    """All of a band that shows a material and no outline; what the photo says comes later."""
+    """All pixels of a band that show a material and are not near an outline. The fields that need
+    the photo are filled in later (_with_photo)."""
     view = view_window(rays, lines, window)
     lighting = light_surface(rays, view, light, lines.camera)
     facing = lighting.cos_i > 0
@@ -138,7 +145,7 @@ def _of_band(
     far = np.minimum(distance_transform_edt(~edge), REACH) if edge.any() else np.full(
         view.shape, REACH
     )  # fmt: skip
-    where, painted = capture_data.material_pixels(capture, scan, view, place, masks)
+    where, painted = material_pixels(capture, scan, view, masks)
     material = np.full(len(view.pixel), -1, np.int16)
     for index, entry in enumerate(capture.materials):
         material[where[entry.name]] = index
@@ -146,7 +153,7 @@ def _of_band(
     wanted = np.zeros(len(view.pixel), bool)
     wanted[view.wanted] = True
     outline = view.at(edges.widen(view.silhouette, OUTLINE - 1))
-    rows = np.flatnonzero(wanted & (material >= 0) & ~outline & (cos_o > LEAST_COS_O) & ~painted)
+    rows = np.flatnonzero(wanted & (material >= 0) & ~outline & (cos_o > MIN_COS_O) & ~painted)
     incidence = lighting.incidence.select(rows)
     n, camera = len(rows), lines.camera
     pixel = view.pixel.take(rows)
@@ -178,22 +185,23 @@ def _of_band(
 
 
 def _thinned(pixels: Pixels, count: int) -> Pixels:
-    """At most ``count``: half drawn from all, half from those beside shadows and in the highlight.
-    What is drawn of a whole photo does not depend on its bands."""
+    """At most ``count`` pixels: half drawn from all, half from those near shadow edges or in the
+    highlight. The selection does not depend on how a photo is divided into bands."""
     if len(pixels) <= count:
         return pixels
     number = sample_hash(pixels.photo, pixels.pixel)
     theta_h = half_difference(pixels.normal, pixels.light, pixels.view).theta_h
-    telling = (pixels.edge < REACH) | ((theta_h < HIGHLIGHT) & (pixels.visible > 0))
-    chosen = np.zeros(len(pixels), bool)
-    rows = np.flatnonzero(telling)
-    chosen[rows[np.argsort(number[rows])[: count // 2]]] = True
-    chosen[np.argsort(number)[: count - int(chosen.sum())]] = True
-    return pixels.select(chosen)
+    informative = (pixels.edge < REACH) | ((theta_h < HIGHLIGHT) & (pixels.visible > 0))
+    selected = np.zeros(len(pixels), bool)
+    rows = np.flatnonzero(informative)
+    selected[rows[np.argsort(number[rows])[: count // 2]]] = True
+    selected[np.argsort(number)[: count - int(selected.sum())]] = True
+    return pixels.select(selected)
 
 
 def _with_photo(pixels: Pixels, photo: LitPhoto) -> Pixels:
-    """What the photo shows at the pixels, and which part of it they are in."""
+    """The pixels with observed radiance, noise, gradient and veil of the photo, and with the
+    numbers of their held-out regions."""
     flat = photo.radiance.reshape(-1, 3)
     seen = flat.take(pixels.pixel, axis=0)
     assert photo.variance is not None
@@ -208,9 +216,11 @@ def _with_photo(pixels: Pixels, photo: LitPhoto) -> Pixels:
     )
 
 
-def _part_lit(pixels: Pixels, rays: RayScene, light: Light, camera: Camera) -> Pixels:
-    """What is lit in part beside the edges of shadows."""
-    rows = np.flatnonzero(pixels.edge < BESIDE)
+def _with_partial_visibility(
+    pixels: Pixels, rays: RayScene, light: Light, camera: Camera
+) -> Pixels:
+    """The pixels with partial visibility near the edges of shadows."""
+    rows = np.flatnonzero(pixels.edge < PENUMBRA)
     if not len(rows):
         return pixels
     some, visible = pixels.select(rows), pixels.visible.copy()
@@ -220,7 +230,7 @@ def _part_lit(pixels: Pixels, rays: RayScene, light: Light, camera: Camera) -> P
 
 
 def _steps(view: SurfaceView, values: NDArray[np.floating]) -> Array:
-    """(n, 2, 3) what normals or points (n, 3) are more a pixel to the right and down; 0 at
+    """(n, 2, 3) change of normals or points (n, 3) per pixel to the right and down; 0 at
     outlines."""
     image = view.image(np.asarray(values, np.float32))
     out = np.zeros((*image.shape[:2], 2, 3), np.float32)
@@ -230,8 +240,8 @@ def _steps(view: SurfaceView, values: NDArray[np.floating]) -> Array:
 
 
 def photo_slopes(radiance: Array, pixel: NDArray[np.int32]) -> Array:
-    """(n, 2, 3) derivatives to the right and down, of a photo (h, w, 3) under a narrow Gaussian, at
-    flat places (n,)."""
+    """(n, 2, 3) derivatives to the right and down of a photo (h, w, 3) under a narrow Gaussian, per
+    pixel. pixel: (n,) flat indices."""
     height, width = radiance.shape[:2]
     flat = radiance.reshape(-1, 3)
     row, column = np.divmod(pixel, width)
@@ -250,7 +260,7 @@ def photo_slopes(radiance: Array, pixel: NDArray[np.int32]) -> Array:
 
 
 def photo_veil(radiance: Array, pixel: NDArray[np.int32]) -> Array:
-    """(n, 2, 3) a photo (h, w, 3) blurred widely, at flat places (n,), and its mean."""
+    """(n, 2, 3) a photo (h, w, 3) under a wide blur, and its mean. pixel: (n,) flat indices."""
     height, width = radiance.shape[:2]
     step = max(1, max(height, width) // 128)
     small = np.stack([_shrunk(radiance[..., c], step) for c in range(3)], axis=-1)
@@ -265,7 +275,7 @@ def photo_veil(radiance: Array, pixel: NDArray[np.int32]) -> Array:
 
 
 def _shrunk(channel: Array, step: int) -> Array:
-    """Means over squares of ``step`` pixels."""
+    """Means of a channel (h, w) over squares of ``step`` × ``step`` pixels."""
     height, width = (side // step * step for side in channel.shape)
     if step == 1:
         return channel

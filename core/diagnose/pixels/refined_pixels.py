@@ -1,4 +1,4 @@
-"""Dark spots in all that a photo shows: chosen pixels are too far apart to tell of small ones."""
+"""Dark spots on a dense grid of pixels: the selected pixels are too far apart for small spots."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from ...samples.reservoir import sample_hash
 from ..forward.material_brdfs import MaterialBRDFs
 from ..forward.pixels import Pixels
 from ..forward.shading_state import ShadingState
-from .unexplained_shadows import FEWEST, unexplained_shadows
+from .unexplained_shadows import MIN_SPOT_PIXELS, unexplained_shadows
 
-MOST = 250_000  # pixels of a photo that are looked through
-PART = 0.003  # of what the photo shows: a smaller spot may be a fold that the mesh does not have
-RING = 3.0  # steps of the grid about a spot, which tell where it ends
+MAX_GRID_PIXELS = 250_000  # of a photo
+MIN_SPOT_FRACTION = 0.003  # of the grid; a smaller spot may be a fold that the mesh does not have
+RING = 3.0  # grid steps around a spot that are included, so that its edge is known
 
 
 def grid_step(width: int, height: int) -> int:
-    """Pixels between those of a photo that are looked through."""
-    return max(1, int(np.ceil(np.sqrt(width * height / MOST))))
+    """Spacing of the grid in a photo, pixels."""
+    return max(1, int(np.ceil(np.sqrt(width * height / MAX_GRID_PIXELS))))
 
 
 def on_grid(pixel: NDArray[np.integer], width: int, step: int) -> NDArray[np.intp]:
-    """Which of flat places (n,) are looked through."""
+    """Indices of the pixels that lie on the grid. pixel: (n,) flat indices; step: of the grid."""
     row, column = np.divmod(pixel, width)
     return np.flatnonzero((row % step == 0) & (column % step == 0))
 
@@ -31,10 +31,12 @@ def on_grid(pixel: NDArray[np.integer], width: int, step: int) -> NDArray[np.int
 def pixels_near_unexplained_shadows(
     pixels: Pixels, brdfs: MaterialBRDFs, width: int, step: int, most: int
 ) -> NDArray[np.intp]:
-    """At most so many of the pixels of one photo: those of dark spots and about them. step: of
-    their grid; irradiance as the BRDFs want it."""
+    """Indices of at most ``most`` pixels of one photo in dark spots and around them. pixels: on a
+    grid of this step, with irradiance in the unit of the BRDFs."""
     shown = brdfs.reflected(ShadingState.of(pixels))
-    spot = unexplained_shadows(pixels, shown, max(FEWEST, int(PART * len(pixels))))
+    spot = unexplained_shadows(
+        pixels, shown, max(MIN_SPOT_PIXELS, int(MIN_SPOT_FRACTION * len(pixels)))
+    )
     if (spot < 0).all():
         return np.zeros(0, np.intp)
     place = np.stack(np.divmod(pixels.pixel, width), axis=1)

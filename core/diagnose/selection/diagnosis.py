@@ -17,19 +17,20 @@ from .trial import Trial
 Array = NDArray[np.floating]
 
 MIN_GAIN_FRACTION = 0.05
-"""Of what the accepted effects gained; a smaller gain is more likely a flaw of their models."""
+"""Fraction of the gain of the accepted effects; a smaller gain is more likely a flaw of their
+models."""
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What was found.
+    """The causes that were found, and the evidence for them.
 
-    accepted: the effect with the largest gain in the full model first; the freedom beside the basis
-    last. rounds: the trials of each round, best first; the last round accepted nothing. before,
-    after: the fits without and with the named effects. residual: structure that these do not
-    explain. error_before, error_after: of held-out regions and photos. expected: (n, 3) standard
-    deviation before anything was fitted. contradicted: causes that gain, and the evidence against
-    them in words: a material that contradicts it, or a second fit that does not confirm it.
+    accepted: the effect with the largest gain in the full model first; ``outside_basis`` last.
+    rounds: the trials of each round, best first; the last round accepted nothing. before, after:
+    the fits without and with the named effects. residual: structure that these do not explain.
+    error_before, error_after: of held-out regions and photos. expected: (n, 3) standard deviation
+    before anything was fitted. contradicted: causes that gain, each with a sentence that gives the
+    evidence against it: a material that contradicts it, or a second fit that does not confirm it.
     """
 
     accepted: tuple[Trial, ...]
@@ -71,10 +72,14 @@ class Diagnosis:
         return (*causes, "unknown") if self.unexplained else causes
 
     def sentence(self, trial: Trial) -> str:
-        """What an effect means, and the evidence against it."""
+        """The description of an effect, and the evidence against it."""
         evidence = self.contradicted.get(trial.effect.cause)
-        said = trial.sentence()
-        return said if evidence is None else f"{said}. But that is doubtful: {evidence}"
+        meaning = trial.sentence()
+        return (
+            meaning
+            if evidence is None
+            else f"{meaning} However, there is evidence against it. {evidence}"
+        )
 
     @property
     def unexplained(self) -> bool:

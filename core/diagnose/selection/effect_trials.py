@@ -1,4 +1,4 @@
-"""Fit an effect together with a model, and measure what it gains on held-out regions."""
+"""Fit an effect together with a model, and measure its gain on held-out regions."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ MIN_REGIONS = 10  # of a material, below which it cannot contradict anything
 
 
 def held_out_costs(now: ModelFit) -> HeldOutCosts:
-    """The costs of a model as it is, computed when they are asked for, and once."""
+    """The held-out costs of a model, computed when first needed, and only once."""
     one_at_a_time = Lock()
 
     @cache
@@ -95,8 +95,10 @@ def try_effect(now: ModelFit, costs: HeldOutCosts, candidate: Candidate) -> Tria
 def try_rebuilt(
     now: ModelFit, costs: HeldOutCosts, best: Trial, context: DiagnosisContext
 ) -> Trial:
-    """With the BRDFs that are found when the effect is in the model: those without it have absorbed
-    a part of it. In finer detail where that gains more. Unchanged where no BRDF matters."""
+    """The trial with the BRDFs of the fit that includes the effect, since the BRDFs of the fit
+    without it have absorbed a part of it. In finer detail where that gains more. Unchanged where no
+    BRDF
+    matters."""
     if not isinstance(best.effect, BuiltFromBRDFs):
         return best
     context = replace(context, brdfs=best.fitted.model.brdfs)
@@ -111,8 +113,8 @@ def try_rebuilt(
 def try_with_rays(
     now: ModelFit, costs: HeldOutCosts, best: Trial, context: DiagnosisContext
 ) -> Trial:
-    """With visibility traced anew for where the effect moves the lamp or the photos; unchanged
-    where it moves neither."""
+    """The trial with visibility traced again for the displaced lamp or photos; unchanged if the
+    effect displaces neither."""
     for _ in range(MAX_RAY_ROUNDS):
         if not isinstance(best.effect, TracesRays):
             break
@@ -120,7 +122,7 @@ def try_with_rays(
         x = best.effect.ray_parameters(context, best.x, predict)
         effect = best.effect.with_rays(context, x)
         again = try_effect(now, costs, Candidate(effect, best.gain, best.p_value))
-        if again.gain < best.gain:  # the mesh is too coarse to say where shadows end
+        if again.gain < best.gain:  # the mesh is too coarse to locate the edges of shadows
             break
         converged = again.gain < (1 + MIN_RAY_GAIN) * best.gain
         best = replace(again, ties=best.ties)
@@ -156,8 +158,8 @@ def _residual_where_bright(now: ModelFit) -> Array:
 
 
 def _patch_prior(fitted: ModelFit) -> Vector:
-    """(e,) standard deviations of the parameters of patches: the mean squares of what was found,
-    and of its uncertainty (one step of expectation and maximisation)."""
+    """(e,) standard deviations of the parameters of patches: root mean square of the estimates with
+    their variances added (one step of expectation and maximisation)."""
     model, effect = fitted.model, fitted.model.patch_effect
     assert model.patch_place is not None and effect is not None
     variance = parameter_variances(fitted)[model.patch_place]

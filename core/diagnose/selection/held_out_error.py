@@ -1,4 +1,4 @@
-"""How well left-out parts of the photos are predicted, in words that a user knows."""
+"""How well held-out regions of the photos are predicted, in measures for the user."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ Array = NDArray[np.floating]
 
 @dataclass(frozen=True)
 class HeldOutErrors:
-    """parts, photos: RMS error of left-out squares and of left-out photos, relative to what the
-    photos show up to white; photos: None of one photo. over_floor: the typical error of left-out
-    squares over what noise of the photos and the scan's known errors would make. not_noise: part of
-    the typical squared error that the photos' own noise does not make."""
+    """parts, photos: RMS error of held-out regions and of held-out photos, relative to the radiance
+    of the photos, clipped at white (relative_change.py); photos: None if there is only one.
+    over_floor: the typical (median) error of held-out regions divided by the error expected from
+    photo noise and the known errors of the scan. not_noise: fraction of the typical squared error
+    that is not photo noise."""
 
     parts: float
     photos: float | None
@@ -28,31 +29,36 @@ class HeldOutErrors:
     not_noise: float
 
 
-def held_out_errors(fitted: ModelFit, unseen: HeldOutPrediction, expected: Array) -> HeldOutErrors:
-    """unseen: of left-out squares; expected: (n, 3) deviation before anything was fitted."""
+def held_out_errors(
+    fitted: ModelFit, held_out: HeldOutPrediction, expected: Array
+) -> HeldOutErrors:
+    """held_out: prediction of held-out regions; expected: (n, 3) standard deviation before anything
+    was fitted."""
     noise = np.sqrt(fitted.model.pixels.noise)
     return HeldOutErrors(
-        _rms(fitted, unseen),
+        _rms(fitted, held_out),
         held_out_photo_error(fitted),
-        _typical(fitted, unseen, expected),
-        max(0.0, 1 - 1 / max(_typical(fitted, unseen, noise), 1e-9) ** 2),
+        _typical(fitted, held_out, expected),
+        max(0.0, 1 - 1 / max(_typical(fitted, held_out, noise), 1e-9) ** 2),
     )
 
 
 def held_out_photo_error(fitted: ModelFit) -> float | None:
-    """RMS error of left-out photos, relative to what the photos show up to white; None of one."""
+    """RMS error of held-out photos, relative to their radiance clipped at white; None if there is
+    only one photo."""
     whole = predict_held_out_photos(fitted)
     return None if whole is None else _rms(fitted, whole)
 
 
-def _typical(fitted: ModelFit, unseen: HeldOutPrediction, unit: Array) -> float:
-    """Error in a unit (n, 3) of each pixel; 1 where the errors are normal and that large."""
+def _typical(fitted: ModelFit, held_out: HeldOutPrediction, unit: Array) -> float:
+    """Median error in units (n, 3) of each pixel, divided by the median of a standard normal: 1 if
+    the errors are normally distributed with these standard deviations."""
     good = np.isfinite(fitted.deviation)
-    missed = np.abs(unseen.residual[good] * fitted.deviation[good] / unit[good])
-    return float(np.median(missed)) / NORMAL if len(missed) else 0.0
+    error = np.abs(held_out.residual[good] * fitted.deviation[good] / unit[good])
+    return float(np.median(error)) / NORMAL if len(error) else 0.0
 
 
-def _rms(fitted: ModelFit, unseen: HeldOutPrediction) -> float:
+def _rms(fitted: ModelFit, held_out: HeldOutPrediction) -> float:
     observed = fitted.model.pixels.observed
-    missed = unseen.residual * np.where(np.isfinite(fitted.deviation), fitted.deviation, 0)
-    return relative_rms_change(observed, observed - missed, fitted.deviation)
+    error = held_out.residual * np.where(np.isfinite(fitted.deviation), fitted.deviation, 0)
+    return relative_rms_change(observed, observed - error, fitted.deviation)

@@ -1,4 +1,4 @@
-"""How much two predictions differ, as a viewer of the photos would say."""
+"""The relative difference of two predictions, as it is visible in the photos."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.floating]
 
-WHITE = 90.0  # percentile of the pixels looked at, of which highlights are many
+WHITE = 90.0  # percentile of the selected pixels, many of which are in highlights
 
 
 def relative_rms_change(
     shown: Array, other: Array, deviation: Array, highlights: bool = False
 ) -> float:
-    """RMS between predictions (n, 3), relative to the first, both up to what a photo would be
-    exposed to white: a highlight, a thousand times as bright as all else, would be all that counts.
-    highlights: where they are what counts. deviation: (n, 3), inf for pixels that do not."""
+    """RMS difference of two predictions (n, 3), relative to the RMS of the first. Both are
+    clipped at the radiance that a photo would show as white; otherwise a highlight, a thousand
+    times as bright as the rest, would dominate. highlights: clip at the brightest pixel instead.
+    deviation: (n, 3), inf for pixels that do not count."""
     counted = np.isfinite(deviation).all(axis=1)
     if not counted.any():
         return 0.0

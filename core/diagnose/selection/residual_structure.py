@@ -1,4 +1,4 @@
-"""Structure that is left: what pixels miss is alike among neighbours, and no cause explains it."""
+"""Remaining structure: correlated residuals of neighbouring pixels that no cause explains."""
 
 from __future__ import annotations
 
@@ -15,19 +15,21 @@ from .relative_change import relative_rms_change
 
 Array = NDArray[np.floating]
 
-REACH = 1.5  # small squares about a pixel that are looked at
-NEIGHBOURS = 48
-SURE = 3.0  # standard errors over squares
-LEAST = 0.012  # RMS of the photos that the structure amounts to,
-PLAIN = 0.007  # nats a pixel and channel, unless it gains this much
-ACROSS = (18, 40)  # small squares along a photo's longer side: coarse structure, and fine
-SHRINK = 4.0  # neighbours' worth of doubt
+REACH = 1.5  # cells; neighbours within this distance of a pixel are used
+NEIGHBOURS = 48  # at most
+MIN_STANDARD_ERRORS = 3.0  # of the gain over cells
+MIN_CHANGE = 0.012  # RMS of the structure relative to the photos, below which it is not reported,
+LARGE_GAIN = 0.007  # nats per pixel and channel, unless it gains this much
+ACROSS = (18, 40)  # cells along the longer side of a photo: for coarse structure, and for fine
+SHRINKAGE = 4.0  # weight of a prior mean of 0, in neighbours at distance 0
 
 
 @dataclass(frozen=True)
 class ResidualStructure:
-    """gain: nats that a pixel's neighbours predict it better; error: over squares. change: RMS of
-    the structure, relative to the photos. structure: (n, 3) radiance that photos show more."""
+    """gain: nats by which a pixel's neighbours improve its prediction; error: its standard error
+    over cells. change: RMS of the structure, relative to the photos. structure: (n, 3) radiance
+    that the photos show in excess of the prediction. photo: (n,) number of each
+    pixel's photo."""
 
     gain: float
     error: float
@@ -37,9 +39,9 @@ class ResidualStructure:
 
     @property
     def is_significant(self) -> bool:
-        """Whether it is there."""
-        plain = self.gain > PLAIN * self.structure.size
-        return self.gain > SURE * self.error and (self.change > LEAST or plain)
+        """Whether it is more than chance, and large enough to be reported."""
+        large = self.gain > LARGE_GAIN * self.structure.size
+        return self.gain > MIN_STANDARD_ERRORS * self.error and (self.change > MIN_CHANGE or large)
 
     def sentence(self) -> str:
         """For an artist."""
@@ -47,18 +49,20 @@ class ResidualStructure:
         part = strength / max(float(strength.sum()), 1e-30)
         worst = int(np.argmax(part))
         return (
-            f"something else is there, {100 * self.change:.1f} % of the photos' light, that no "
-            f"cause explains; photo {worst + 1} holds {100 * part[worst]:.0f} % of it"
+            f"{100 * self.change:.1f} % of the light in the photos is not explained by any known "
+            f"cause. {100 * part[worst]:.0f} % of that is in photo {worst + 1}."
         )
 
 
 def residual_structure(fitted: ModelFit) -> ResidualStructure:
-    """What neighbours in a photo, of other small squares than a pixel's own, say about it: at the
-    scale where they say most."""
-    return max((_leftover(fitted, across) for across in ACROSS), key=lambda found: found.gain)
+    """How well a pixel's residual is predicted by neighbours in the same photo that lie in other
+    cells; at the cell size with the largest gain."""
+    return max(
+        (_structure_at_scale(fitted, across) for across in ACROSS), key=lambda found: found.gain
+    )
 
 
-def _leftover(fitted: ModelFit, across: int) -> ResidualStructure:
+def _structure_at_scale(fitted: ModelFit, across: int) -> ResidualStructure:
     pixels = fitted.model.pixels
     column, row = cell_coordinates(pixels.photo, pixels.x, pixels.y, across)
     cell = cell_numbers(pixels.photo, pixels.x, pixels.y, across)
@@ -70,11 +74,11 @@ def _leftover(fitted: ModelFit, across: int) -> ResidualStructure:
     there = np.isfinite(near)
     which = counted[np.where(there, which, 0)]
     weight = np.where(there & (cell[which] != cell[:, None]), np.exp(-near), 0.0)
-    # a pixel that is far off says little: the robust score, whose sum is what a shift gains
-    missed = np.clip(fitted.residual, -3, 3)
+    # outliers are clipped: this approximates the robust score
+    residual = np.clip(fitted.residual, -3, 3)
     total = weight.sum(axis=1)
-    mean = np.stack([np.sum(weight * missed[which, c], axis=1) for c in range(3)], axis=1)
-    mean /= (total + SHRINK)[:, None]
+    mean = np.stack([np.sum(weight * residual[which, c], axis=1) for c in range(3)], axis=1)
+    mean /= (total + SHRINKAGE)[:, None]
     gains = (robust_cost(fitted.residual) - robust_cost(fitted.residual - mean)).sum(axis=1)
     gained = sum_by_region(cell, gains)
     structure = mean * np.where(np.isfinite(fitted.deviation), fitted.deviation, 0.0)

@@ -1,4 +1,4 @@
-"""Every number of a pixel that may betray a cause, and what the residual does along it."""
+"""Coordinates of a pixel that can reveal a cause, and the trend of the residual along them."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from ..forward.tangent_directions import tangential_axes, tangential_half_vector
 
 Array = NDArray[np.floating]
 
-BINS, FEWEST = 12, 40
-UPRIGHT = np.radians(2.0)  # θh: nearer the normal, a half vector points nowhere on the surface
+BINS, MIN_PIXELS = 12, 40  # of a coordinate; pixels that a bin needs
+UPRIGHT = np.radians(2.0)  # θh below which the half vector has no direction on the surface
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,10 @@ class Coordinate:
 
 @dataclass(frozen=True)
 class Trend:
-    """What the photos show more than the prediction along a coordinate, relative to the prediction:
-    at: (b,) middles of the bins; mean: (b,), weighted by how sure pixels are; error: (b,) standard
-    errors, squares of the photos counting as independent."""
+    """The residual (photo minus prediction) along a coordinate, relative to the prediction.
+
+    at: (b,) median coordinate of each bin. mean: (b,) weighted by the inverse variance of pixels.
+    error: (b,) standard errors, with regions of the photos as independent units."""
 
     at: Array
     mean: Array
@@ -40,7 +41,7 @@ class Trend:
 
 
 def coordinates(context: DiagnosisContext) -> list[Coordinate]:
-    """Of every pixel that a diagnosis looks at."""
+    """All coordinates of the pixels of a diagnosis."""
     pixels = context.pixels
     now = ShadingState.of(pixels)
     angles = now.angles
@@ -74,9 +75,9 @@ def coordinates(context: DiagnosisContext) -> list[Coordinate]:
 
 
 def half_vector_turns(pixels: Pixels) -> Array:
-    """(n, 3) degrees on the surface between the half vector and each of the scan's axes, 0 along to
-    90 across: what is brushed or woven reflects otherwise along than across. NaN where the half
-    vector or the axis stands upright."""
+    """(n, 3) angles in the tangent plane between the half vector and each of the scan's axes,
+    degrees, 0 to 90; anisotropic reflection depends on them. NaN where the half vector or the axis
+    is nearly normal to the surface."""
     normal = pixels.normal.astype(np.float64)
     flat, axes = tangential_half_vector(normal, pixels.light, pixels.view), tangential_axes(normal)
     sizes = np.linalg.norm(flat, axis=1)[:, None], np.linalg.norm(axes, axis=2)
@@ -86,25 +87,30 @@ def half_vector_turns(pixels: Pixels) -> Array:
 
 
 def trend(
-    coordinate: Coordinate, missed: Array, shown: Array, deviation: Array, block: NDArray[np.int32]
+    coordinate: Coordinate,
+    residual: Array,
+    shown: Array,
+    deviation: Array,
+    block: NDArray[np.int32],
 ) -> Trend:
-    """missed: (n, 3) photo − prediction; shown: (n, 3) prediction; deviation: (n, 3) of it."""
+    """The trend of a residual. residual: (n, 3) photo − prediction; shown: (n, 3) prediction;
+    deviation: (n, 3) standard deviation; block: (n,) region of each pixel."""
     known = np.isfinite(coordinate.values) & np.isfinite(deviation).all(axis=1)
     known &= shown.mean(axis=1) > 0
     values = coordinate.values[known]
-    if not len(values):  # as a tangent direction on what is flat
+    if not len(values):  # for example a tangent direction on a flat surface
         return Trend(np.zeros(0), np.zeros(0), np.zeros(0))
     edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
     which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
     weight = np.sum(shown[known] ** 2 / deviation[known] ** 2, axis=1)
-    pull = np.sum(shown[known] * missed[known] / deviation[known] ** 2, axis=1)
-    # no pixel counts more than a hundred others: one that is off would be the trend
+    pull = np.sum(shown[known] * residual[known] / deviation[known] ** 2, axis=1)
+    # the weight of a pixel is limited to 100 times the median, so that no outlier makes the trend
     limit = 100 * np.median(weight)
     pull, weight = pull * np.minimum(1, limit / weight), np.minimum(weight, limit)
     at, mean, error = [], [], []
     for k in range(max(len(edges) - 1, 1)):
         rows = np.flatnonzero(which == k)
-        if len(rows) < FEWEST:
+        if len(rows) < MIN_PIXELS:
             continue
         total = weight[rows].sum()
         middle = pull[rows].sum() / total

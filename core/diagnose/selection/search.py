@@ -1,4 +1,4 @@
-"""Which effects the photos call for: stepwise selection.
+"""Stepwise selection of the effects that the photos support.
 
 In each round every effect is tried and the best one accepted. An effect is judged by how much
 better the model with it predicts held-out regions (cross_validation.py), and by how likely chance
@@ -42,13 +42,13 @@ from .trial import MIN_STANDARD_ERRORS, Trial
 
 Array = NDArray[np.floating]
 
-MIN_OUTSIDE_BASIS = 0.002  # RMS of the photos that the freedom beside the basis has to explain
+MIN_OUTSIDE_BASIS = 0.002  # RMS change of the photos, relative, that outside_basis has to explain
 MAX_ACCEPTED_EFFECTS = 4
 NEARLY_BEST = 0.93  # fraction of the best gain at which the simpler effect is preferred
 MIN_TRIALS, PROMISING = 4, 0.25  # fitted at least; and all that promise this much of the best
 MAX_PATCH_P_VALUE = 0.05  # of patch effects that are fitted at all
 SMALL_GAIN_STANDARD_ERRORS = 5.0  # that a small gain needs, where no structure remains with it
-TIE_STANDARD_ERRORS = 2.0  # by which gains differ that the photos cannot tell apart
+TIE_STANDARD_ERRORS = 2.0  # difference of gains below which two effects are tied
 
 
 def search(
@@ -110,30 +110,30 @@ def search(
 def _completes_the_model(trial: Trial) -> bool:
     """Whether no structure remains with it. A small gain then is not a flaw of the models of the
     effects that were accepted before."""
-    sure = trial.gain > SMALL_GAIN_STANDARD_ERRORS * trial.error
-    return sure and residual_structure(trial.fitted).gain < 0
+    significant = trial.gain > SMALL_GAIN_STANDARD_ERRORS * trial.error
+    return significant and residual_structure(trial.fitted).gain < 0
 
 
 def _promising(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The candidates that are fitted: those that promise most."""
+    """The candidates that are fitted: those with the largest expected gain."""
     global_ones = [
         c for c in candidates if not isinstance(c.effect, PatchEffect) and np.isfinite(c.gain)
     ]
     most = max((c.gain for c in global_ones), default=0.0)
-    chosen = []
+    promising = []
     for one in candidates:
         if isinstance(one.effect, PatchEffect):
             fitted = one.p_value < MAX_PATCH_P_VALUE
         else:
             first = any(one is c for c in global_ones[:MIN_TRIALS])
             fitted = one.gain >= PROMISING * most or first
-        chosen += [one] if fitted else []
-    return chosen
+        promising += [one] if fitted else []
+    return promising
 
 
 def _simplest(trials: Sequence[Trial]) -> Trial | None:
-    """Of significant trials, best first, the simplest that gains nearly as much as the best: many
-    light sources can imitate uniform ambient light, which is one."""
+    """The simplest of the significant trials (best first) whose gain is nearly that of the best:
+    many light sources can imitate uniform ambient light, which is one."""
     if not trials:
         return None
     most = max(trial.gain for trial in trials)
@@ -161,17 +161,17 @@ def _contradicted(
     another."""
     accepted = {trial.effect.cause for trial in kept}
     return {
-        t.effect.cause: "a camera does the same to all materials, but with it parts of "
-        f"{' and '.join(materials[k] for k in t.contradicted_by)} that were left out are predicted "
-        "worse"
+        t.effect.cause: "The camera would change all materials alike, but with this cause held-out "
+        f"regions of {' and '.join(materials[k] for k in t.contradicted_by)} are predicted worse."
         for t in tried
         if t.contradicted_by and t.is_significant and t.effect.cause not in accepted
     }
 
 
 def _outside_basis(now: ModelFit, kept: Sequence[Trial]) -> list[Trial]:
-    """What the freedom beside the basis gains: much of it means that no mixture of the measured
-    materials reflects like this."""
+    """The gain of the additional basis functions (basis_slack.py). A large gain means that no
+    mixture of the measured materials reflects like this. Empty: the gain is small, or the effect is
+    in the model already."""
     model = now.model
     if any(isinstance(effect, OutsideBasis) for effect in model.effects):
         return []
@@ -192,8 +192,8 @@ def _outside_basis(now: ModelFit, kept: Sequence[Trial]) -> list[Trial]:
 def _without_redundant(
     before: ModelFit, now: ModelFit, accepted: Sequence[Trial], pool: ThreadPoolExecutor | None
 ) -> tuple[ModelFit, tuple[Trial, ...]]:
-    """The model without the effects that gain nothing in it, and the trials of the rest: what each
-    gains when it is added to all others."""
+    """The model without the effects that gain nothing in it, and the trials of the rest, with
+    their gains when each is added to all others."""
     kept = list(accepted)
 
     def in_full_model(trial: Trial) -> Trial:

@@ -1,4 +1,4 @@
-"""One effect that was fitted together with a model, and what it gains on held-out regions."""
+"""One effect that was fitted together with a model, and its gain on held-out regions."""
 
 from __future__ import annotations
 
@@ -70,14 +70,15 @@ class Trial:
         return significant and (self.change > MIN_RELATIVE_CHANGE or large) and relevant
 
     def sentence(self) -> str:
-        """What it means, and which photo would decide between it and its ties."""
-        said = self.effect.sentence(self.identified, self.standard_errors)
+        """Its description, and the photos that would decide between it and its ties."""
+        meaning = self.effect.sentence(self.identified, self.standard_errors)
         if not self.ties:
-            return said
+            return meaning
         others = " or ".join(effect.cause for effect in self.ties)
         photos = dict.fromkeys(effect.deciding_photo for effect in (self.effect, *self.ties))
         return (
-            f"{said}. The photos cannot tell it from {others}; this would: {'; or '.join(photos)}"
+            f"{meaning} The photos cannot distinguish this from {others}. This would decide: "
+            f"{'; or '.join(photos)}."
         )
 
     def changed(self) -> Array:

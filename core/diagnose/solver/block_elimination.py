@@ -24,7 +24,7 @@ Vector = NDArray[np.float64]
 class Step:
     """A Gauss–Newton step. coefficients: (m, 3, k). x: (p,) of the global parameters. local:
     (P · e,) of the patches' parameters. covariance: (p, p) of the global parameters.
-    local_variance: (P · e,) of the patches', empty unless asked for."""
+    local_variance: (P · e,) of the patches', empty unless requested."""
 
     coefficients: Array
     x: Vector

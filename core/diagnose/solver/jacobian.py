@@ -20,7 +20,7 @@ from .model_fit import ModelFit
 Array = NDArray[np.floating]
 
 LAMP_PARTS_FOR_ROWS = 3  # parts of a lamp whose basis rows stand for all: rows vary slowly
-RELATIVE_STEP = 1e-3  # of the radiance, for the derivative of what the camera records
+RELATIVE_STEP = 1e-3  # of the radiance, for the derivative of the camera response
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Jacobian:
 
 
 def jacobian_of(fit: ModelFit) -> Jacobian:
-    """At the model's own parameters."""
+    """The Jacobian at the model's own parameters."""
     model, deviation = fit.model, fit.deviation
     light = model.lamp_light
     state, q = light.state, _basis_rows(model, light)
@@ -75,7 +75,7 @@ def jacobian_of(fit: ModelFit) -> Jacobian:
     def by_slot(place: int) -> list[Array]:
         effect = model.effects[place]
         found = []
-        for slot in model.columns(place).T:
+        for slot in model.parameter_index(place).T:
             step = effect.parameters.step[slot[slot >= 0][0]] if (slot >= 0).any() else 1.0
             stepped = _stepped(model, place, np.unique(slot[slot >= 0]), step)
             derivative = (stepped - recorded) / (step * deviation)
@@ -86,7 +86,7 @@ def jacobian_of(fit: ModelFit) -> Jacobian:
     x, column = [np.zeros((n, 3, 0), np.float32)], [np.zeros((n, 0), np.int32)]
     for place in model.global_places:
         x += [derivative[..., None] for derivative in by_slot(place)]
-        column.append(first + np.maximum(model.columns(place), 0).astype(np.int32))
+        column.append(first + np.maximum(model.parameter_index(place), 0).astype(np.int32))
         first += len(model.effects[place].parameters)
     local, patch, patches = np.zeros((n, 3, 0), np.float32), np.full(n, -1), 0
     if model.patch_place is not None and model.patch_effect is not None:
@@ -97,7 +97,7 @@ def jacobian_of(fit: ModelFit) -> Jacobian:
 
 
 def _basis_rows(model: Model, light: LampLight) -> Array:
-    """Q̂ (n, k): means over a few parts of the lamp, weighted by what each contributes."""
+    """Q̂ (n, k): means over a few parts of the lamp, weighted by their contributions."""
     parts, brdfs = model.lamp_parts(light.state), model.brdfs
     if len(parts) == 1:
         return model.basis_rows(light.state)

@@ -1,4 +1,4 @@
-"""The forward model with effects: from coefficients and parameters to what the photos show."""
+"""The forward model with effects: from coefficients and parameters to predicted photos."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Model:
 
     @property
     def causes(self) -> list[str]:
-        """Of all effects, frozen ones included."""
+        """Causes of all effects, frozen ones included."""
         return [effect.cause for effect in self.effects]
 
     def place_of(self, cause: str) -> int:
@@ -122,15 +122,15 @@ class Model:
         effect = None if self.patch_place is None else self.effects[self.patch_place]
         return effect if isinstance(effect, PatchEffect) else None
 
-    def columns(self, place: int) -> NDArray[np.intp]:
+    def parameter_index(self, place: int) -> NDArray[np.intp]:
         """(n, s) indices of an effect's parameters that each pixel depends on, −1 none: one a
         slot."""
-        columns = self.effects[place].columns
+        index = self.effects[place].parameter_index
         everything = np.arange(len(self.effects[place].parameters))
         return (
             np.broadcast_to(everything, (len(self.pixels), len(everything)))
-            if columns is None
-            else columns
+            if index is None
+            else index
         )
 
     def shading(self, x: Sequence[Vector] | None = None) -> ShadingState:
@@ -176,7 +176,7 @@ class Model:
 
     @cached_property
     def lamp_light(self) -> LampLight:
-        """At the model's own parameters."""
+        """The light of the lamp at the model's own parameters."""
         state = self.shading()
         both = self.mean(self.lamp_parts(state), self.brdfs.reflected_with_derivative)
         return LampLight(state, both[:, :3], both[:, 3:])
@@ -194,14 +194,14 @@ class Model:
     def recorded(
         self, radiance: Array, state: ShadingState, x: Sequence[Vector] | None = None
     ) -> Array:
-        """(n, 3) what the camera records of it."""
+        """(n, 3) recorded radiance. radiance: (n, 3) that reaches the camera."""
         for effect, values in zip(self.effects, self.x if x is None else x, strict=True):
             if isinstance(effect, ChangesRecording):
                 radiance = effect.recorded(radiance, state, values)
         return radiance
 
     def predicted(self, x: Sequence[Vector] | None = None) -> Array:
-        """(n, 3) what the photos show. x: parameters in place of the model's own."""
+        """(n, 3) predicted radiance in the photos. x: parameters in place of the model's own."""
         if x is None:
             return self.photographed(self.lamp_light.state, self.lamp_light.reflected)
         state = self.shading(x)
@@ -210,5 +210,6 @@ class Model:
     def photographed(
         self, state: ShadingState, reflected: Array, x: Sequence[Vector] | None = None
     ) -> Array:
-        """(n, 3) what the photos show where the surface reflects this much of the lamp."""
+        """(n, 3) predicted radiance in the photos. reflected: (n, 3) reflected radiance of the
+        lamp."""
         return self.recorded(self.entering(reflected, state, x), state, x)

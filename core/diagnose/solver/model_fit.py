@@ -30,7 +30,7 @@ class ModelFit:
 
     @classmethod
     def of(cls, model: Model, deviation: Array) -> ModelFit:
-        """Of a model as it is."""
+        """The residuals of a model at its present parameters."""
         predicted = model.predicted()
         residual = (model.pixels.observed - predicted) / deviation
         return cls(model, deviation, predicted, residual, float(robust_cost(residual).sum()))

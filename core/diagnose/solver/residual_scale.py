@@ -1,8 +1,8 @@
-"""How far a pixel may be from a perfect prediction for reasons that need no cause.
+"""The expected standard deviation of the residual of a pixel without any cause.
 
-Photo noise; the scan's normals, as far as the fit found them to be off; half a pixel at edges of
-shadows and of what the photo shows; and a part of the prediction that no model gets better. Fixed
-before any cause is tried, so that the costs of different causes compare.
+It includes photo noise, the error of the scan's normals as estimated by the fit, the misalignment
+of photos at shadow edges and image edges, and a fraction of the prediction as model error. It is
+fixed before any cause is tried, so that the costs of different causes are comparable.
 """
 
 from __future__ import annotations
@@ -19,17 +19,18 @@ from .model import Model
 
 Array = NDArray[np.floating]
 
-FLOOR = 0.015  # of the prediction
-DARK = 0.004  # of a photo's bright pixels
-NUDGE = 2e-3  # radians
-MISPLACED = 0.15  # pixels, what a good scan's poses are off by
-LEVELS, FEW = 8, 50  # of brightness; pixels that tell
+RELATIVE_FLOOR = 0.015  # fraction of the prediction
+DARK_FLOOR = 0.004  # fraction of the 90th percentile of the prediction in a photo
+TILT_STEP = 2e-3  # radians, for difference quotients
+POSE_ERROR = 0.15  # pixels, of the camera poses of a good scan
+LEVELS, MIN_PIXELS = 8, 50  # bins of brightness; pixels that a bin needs
 NORMAL = 0.6745  # median of a normal distribution's magnitude
-BESIDE = 2.0  # pixels from a shadow's edge where the mesh does not know on which side they are
+EDGE_DISTANCE = 2.0  # pixels from a shadow edge within which a pixel may be on the other side
 
 
 def expected_deviation(pixels: Pixels, brdfs: MaterialBRDFs, normal_deviation: float) -> Array:
-    """(n, 3) radiance, inf for clipped pixels; normal_deviation: radians along each tangent."""
+    """(n, 3) standard deviation of radiance, inf for clipped pixels; normal_deviation: radians
+    along each tangent."""
     model = Model(pixels, brdfs)
     state = model.shading()
     predicted = model.reflected([state])
@@ -37,12 +38,12 @@ def expected_deviation(pixels: Pixels, brdfs: MaterialBRDFs, normal_deviation: f
     for photo in np.unique(pixels.photo):
         bright[photo] = np.percentile(predicted[pixels.photo == photo].mean(axis=1), 90)
     variance = pixels.noise.astype(np.float64)
-    variance += (FLOOR * predicted) ** 2 + (DARK * bright[pixels.photo, None]) ** 2
+    variance += (RELATIVE_FLOOR * predicted) ** 2 + (DARK_FLOOR * bright[pixels.photo, None]) ** 2
     variance += np.square(normal_deviation) * _by_normals(model, predicted)
-    variance += MISPLACED**2 * np.sum(pixels.slope.astype(np.float64) ** 2, axis=1)
-    beside = np.clip(1 - pixels.edge / BESIDE, 0, 1)[:, None]
+    variance += POSE_ERROR**2 * np.sum(pixels.slope.astype(np.float64) ** 2, axis=1)
+    nearness = np.clip(1 - pixels.edge / EDGE_DISTANCE, 0, 1)[:, None]
     full = brdfs.evaluate(state.angles, pixels.material) * state.irradiance * state.cos_i[:, None]
-    variance += (0.5 * beside * full) ** 2
+    variance += (0.5 * nearness * full) ** 2
     out = np.sqrt(variance)
     out[~pixels.usable] = np.inf
     return np.asarray(out)
@@ -62,18 +63,19 @@ def rescaled_deviation(
     for material in np.unique(pixels.material):
         rows = np.flatnonzero((pixels.material == material) & np.isfinite(deviation).all(axis=1))
         for part in np.array_split(rows[np.argsort(level[rows], kind="stable")], LEVELS):
-            if len(part) >= FEW:
+            if len(part) >= MIN_PIXELS:
                 scale = np.median(np.abs(residual[part]), axis=0) / NORMAL
                 out[part] *= np.maximum(scale, 1e-3)
     return np.maximum(out, np.sqrt(pixels.noise))
 
 
 def _by_normals(model: Model, predicted: Array) -> Array:
-    """(n, 3) sum over two tangents of the squared slope of radiance."""
+    """(n, 3) sum over two tangents of the squared derivative of radiance by the tilt of the
+    normal."""
     normal = model.pixels.normal.astype(np.float64)
     out = np.zeros_like(predicted, dtype=np.float64)
     state = model.shading()
     for tangent in tangents(normal):
-        moved = replace(state, normal=(normal + NUDGE * tangent).astype(np.float32))
-        out += ((model.reflected([moved]) - predicted) / NUDGE) ** 2
+        tilted = replace(state, normal=(normal + TILT_STEP * tangent).astype(np.float32))
+        out += ((model.reflected([tilted]) - predicted) / TILT_STEP) ** 2
     return out

@@ -1,4 +1,4 @@
-"""Patina's own estimator: every sample, all components, normals and BRDF together."""
+"""Patina's own estimator: every sample and all components, normals and BRDF estimated together."""
 
 from .estimate import MeasuredFit, MeasuredSettings, fit_measured
 

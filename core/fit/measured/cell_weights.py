@@ -1,8 +1,9 @@
-"""How many cells of a region of angle space count as one observation.
+"""Weights of cells: how many cells of one region of angle space count as one observation.
 
-Cells err together: the components' own error, and what is wrong with the scan, is alike in
-neighbouring cells. Taken for independent, the thousands beside the highlight would outvote the few
-in it, and make the fit far too sure of itself. So no region has more votes than another.
+Errors of neighbouring cells are correlated: the basis' own error and errors of the scan are alike
+in all of them. Treated as independent, the thousands of cells away from the highlight would
+outweigh the few in it, and the posterior would be far too narrow. So every region of angle space
+carries at most the weight of CELLS_PER_REGION independent cells.
 """
 
 from __future__ import annotations
@@ -12,14 +13,16 @@ from numpy.typing import NDArray
 
 from .cells import AngleCells
 
-THETA_H = (1.0, 2.0, 4.0, 7.0, 11.0, 16.0, 22.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0)  # degrees
-THETA_D = 8.0  # degrees; with the edges above, the regions
-VOTES = 20.0  # of a region, cells' worth
+# degrees, edges of the regions in θh
+REGION_THETA_H = (1.0, 2.0, 4.0, 7.0, 11.0, 16.0, 22.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0)
+REGION_THETA_D = 8.0  # degrees, width of a region in θd
+CELLS_PER_REGION = 20.0  # a region weighs no more than so many independent cells
 
 
-def crowding(cells: AngleCells) -> NDArray[np.float64]:
-    """(m,) how many cells of its region count as one, for each."""
-    row = np.searchsorted(np.radians(THETA_H), cells.angles.theta_h)
-    column = (np.degrees(cells.angles.theta_d) / THETA_D).astype(np.int64)
+def cells_per_observation(cells: AngleCells) -> NDArray[np.float64]:
+    """(m,) for each cell, how many cells of its region together weigh as much as one independent
+    cell (at least 1)."""
+    row = np.searchsorted(np.radians(REGION_THETA_H), cells.angles.theta_h)
+    column = (np.degrees(cells.angles.theta_d) / REGION_THETA_D).astype(np.int64)
     region = row * 32 + column
-    return np.maximum(np.bincount(region)[region] / VOTES, 1.0)
+    return np.maximum(np.bincount(region)[region] / CELLS_PER_REGION, 1.0)

@@ -1,8 +1,9 @@
-"""All samples gathered in cells of angle space: what the BRDF is solved from.
+"""All samples averaged in cells of angle space, from which the BRDF is solved.
 
-Off-specular pixels outnumber those of the highlight a thousand to one; cells make them count alike,
-and the solver's cost does not grow with the photos' size. Within a cell RADIANCE is averaged: its
-mean is that of the blurred BRDF, whatever the normals' errors; the mean of logarithms is not.
+Off-specular pixels outnumber those of the highlight a thousand to one. Averaging them in cells
+gives both a similar weight, and the solver's cost does not grow with the resolution of the photos.
+Within a cell the RADIANCE is averaged: its mean is that of the BRDF blurred by the normals' errors.
+The mean of the logarithm does not have this property.
 """
 
 from __future__ import annotations
@@ -15,20 +16,22 @@ from numpy.typing import NDArray
 from ...angles import Angles, cosines
 from ...samples import SampleTable
 
-THETA_D = 2.0  # degrees
-PHI_D = ((1.0, 60.0), (4.0, 20.0), (91.0, 6.0))  # width for θh below, degrees
-NARROWEST, GROWTH, WIDEST = 0.25, 0.12, 2.0  # of θh, degrees: the first, a degree further, the last
-MOST = 60_000  # cells; beyond, they are made wider
+THETA_D_WIDTH = 2.0  # degrees
+# degrees: (upper limit of θh, width of a cell in φd below it)
+PHI_D_WIDTHS = ((1.0, 60.0), (4.0, 20.0), (91.0, 6.0))
+# width of a cell in θh, degrees: the first, its increase per degree of θh, the largest
+MIN_THETA_H_WIDTH, WIDTH_GROWTH, MAX_THETA_H_WIDTH = 0.25, 0.12, 2.0
+MAX_CELLS = 60_000  # where a table has more, the cells are made wider
 
 
 @dataclass(frozen=True)
 class AngleCells:
     """m cells with samples, each of one photo.
 
-    photo: (m,) int16. count: (m,) samples. angles: their mean, φd on
-    [0, 2π). reflected: (m, 3) mean of L/E (= ρ·cos θi blurred by
-    the normals' errors), at the cosine of the mean angles. normal_error:
-    (m,) radians, RMS error of the normals along each tangent, where it is known from a refinement.
+    photo: (m,) int16. count: (m,) number of samples. angles: their mean angles, radians, φd on [0,
+    2π). reflected: (m, 3) mean of L/E (= ρ·cos θi, blurred by the normals' errors), scaled to the
+    cosine at the mean angles. normal_error: (m,) radians, RMS error of the normals along each
+    tangent.
     """
 
     photo: NDArray[np.int16]
@@ -52,15 +55,19 @@ class AngleCells:
 
 
 def gather(
-    table: SampleTable, normal_error: NDArray[np.floating] | float, wider: float = 1.0
+    table: SampleTable, normal_error: NDArray[np.floating] | float, width_factor: float = 1.0
 ) -> AngleCells:
-    """Cells of a table; normal_error: (n,) radians of each sample, or one for all."""
+    """The cells of a table.
+
+    normal_error: (n,) radians along each tangent, of each sample, or one number for all.
+    width_factor: factor on the width of the cells; it grows until there are at most MAX_CELLS.
+    """
     phi = unfolded_phi_d(table)
-    key = _keys(table, phi, wider)
+    key = _keys(table, phi, width_factor)
     _, where, count = np.unique(key, return_inverse=True, return_counts=True)
     m = len(count)
-    if m > MOST:
-        return gather(table, normal_error, wider * 1.3)
+    if m > MAX_CELLS:
+        return gather(table, normal_error, width_factor * 1.3)
     where = where.ravel()
 
     def mean(values: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -68,7 +75,7 @@ def gather(
 
     phi_d = np.mod(np.arctan2(mean(np.sin(phi)), mean(np.cos(phi))), 2 * np.pi)
     angles = Angles(mean(table.theta_h), mean(table.theta_d), phi_d)
-    # mean angles stand for the cell: the cosine's own change within it is taken out
+    # a cell is represented by its mean angles: remove the variation of cos θi within it
     level = cosines(*angles)[0] / mean(table.cos_i)
     light = table.radiance / table.irradiance
     reflected = np.stack([mean(light[:, c]) * level for c in range(light.shape[1])], axis=1)
@@ -82,26 +89,31 @@ def gather(
 
 
 def unfolded_phi_d(table: SampleTable) -> NDArray[np.float64]:
-    """(n,) φd on [0, 2π): samples' are folded by reciprocity, which exchanges light and view, but
-    a cell's cosine must be the light's."""
-    one, other = cosines(*table.angles)
-    exchanged = np.abs(table.cos_i - other) < np.abs(table.cos_i - one)
+    """(n,) φd on [0, 2π), radians. The samples' φd is folded by reciprocity, which exchanges light
+    and view, but a cell's cosine must be that of the light."""
+    cos_light, cos_view = cosines(*table.angles)
+    exchanged = np.abs(table.cos_i - cos_view) < np.abs(table.cos_i - cos_light)
     return np.asarray(table.phi_d.astype(np.float64) + np.pi * exchanged)
 
 
-def theta_h_edges(wider: float = 1.0) -> NDArray[np.float64]:
-    """Radians: narrow where lobes are, two degrees wide elsewhere."""
+def theta_h_edges(width_factor: float = 1.0) -> NDArray[np.float64]:
+    """Edges of the cells in θh, radians: narrow where lobes are, 2° × ``width_factor``
+    elsewhere."""
     edges = [0.0]
     while edges[-1] < 90.0:
-        edges.append(edges[-1] + wider * min(WIDEST, NARROWEST + GROWTH * edges[-1]))
+        edges.append(
+            edges[-1]
+            + width_factor * min(MAX_THETA_H_WIDTH, MIN_THETA_H_WIDTH + WIDTH_GROWTH * edges[-1])
+        )
     return np.radians(edges)
 
 
-def _keys(table: SampleTable, phi_d: NDArray[np.float64], wider: float) -> NDArray[np.int64]:
-    ih = np.searchsorted(theta_h_edges(wider), table.theta_h, side="right").astype(np.int64)
-    i_d = (np.degrees(table.theta_d) / (wider * THETA_D)).astype(np.int64)
-    width = np.full(len(table), PHI_D[-1][1])
-    for below, degrees in reversed(PHI_D[:-1]):
+def _keys(table: SampleTable, phi_d: NDArray[np.float64], width_factor: float) -> NDArray[np.int64]:
+    """(n,) number of the cell (photo, θh, θd, φd) of each sample."""
+    ih = np.searchsorted(theta_h_edges(width_factor), table.theta_h, side="right").astype(np.int64)
+    i_d = (np.degrees(table.theta_d) / (width_factor * THETA_D_WIDTH)).astype(np.int64)
+    width = np.full(len(table), PHI_D_WIDTHS[-1][1])
+    for below, degrees in reversed(PHI_D_WIDTHS[:-1]):
         width[table.theta_h < np.radians(below)] = degrees
-    ip = (np.degrees(phi_d) / (wider * width)).astype(np.int64)
+    ip = (np.degrees(phi_d) / (width_factor * width)).astype(np.int64)
     return ((table.photo.astype(np.int64) * 512 + ih) * 64 + i_d) * 64 + ip

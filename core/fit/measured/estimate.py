@@ -1,4 +1,5 @@
-"""Samples → BRDF: every sample, all components, the scan's normals along."""
+"""The measured estimator: samples → BRDF from every sample and all components, refining the scan's
+normals along the way."""
 
 from __future__ import annotations
 
@@ -16,28 +17,30 @@ from ...errors import FitError
 from ...samples import SampleTable
 from .cells import gather
 from .forward import CellModel
-from .grazing_prior import carried_on
+from .grazing_prior import extrapolated
 from .normals import TOLERANCE, refine_normals
 from .patches import Patches
 from .posterior import solve
-from .power_likelihood import LEAST, tempered
+from .power_likelihood import MIN_TEMPERATURE, solve_power_likelihood
 from .prior import ChannelPrior
-from .shrinkage import caution
+from .shrinkage import shrinkage_step
 
-FEWEST = 50  # samples
-SETTLED = 0.02  # RMS change of ln ρ, all directions alike: the normals are refined enough
-CHUNK = 1 << 15
-WIDER = 1.5  # bands, than the posterior: no material is a draw from the measured ones' distribution
-ALWAYS = 0.03  # of ln ρ: nothing is known better
+MIN_SAMPLES = 50
+CONVERGED = 0.02  # RMS change of ln(ρ·cosMap + ε) over the grid below which refinement ends
+CHUNK = 1 << 15  # directions
+# factor on the posterior's standard deviation: no material is a draw from the training distribution
+BAND_FACTOR = 1.5
+MIN_BAND = 0.03  # standard deviation of ln ρ that is always added
 
 
 @dataclass(frozen=True)
 class MeasuredSettings:
-    """components: how many of the basis, None for all. floor: log-relative deviation granted to
-    the components themselves. normal_deviation: degrees per tangent that the scan's normals are
-    off by, to begin with. rounds: of refining normals at most, 0 for none. coupled: the
-    channels share what measured materials' channels share. trust: log-relative deviation of the
-    anchors in unseen directions (infinite: no anchors)."""
+    """components: how many of the basis, None for all. floor: log-relative standard deviation of
+    the model error assumed everywhere. normal_deviation: degrees along each tangent, initial
+    standard deviation of the scan's normals. rounds: largest number of normal refinements, 0 for
+    none. coupled: share between the channels what the channels of measured materials share. trust:
+    log-relative standard deviation of the grazing prior (grazing_prior.py) in directions without
+    samples; infinite switches it off."""
 
     components: int | None = None
     floor: float = 0.15
@@ -49,25 +52,26 @@ class MeasuredSettings:
 
 @dataclass(frozen=True)
 class MeasuredFit:
-    """brdf: the most probable one, cautious where that is unsure (shrinkage.py). samples: how many.
-    normal_deviation: degrees per tangent, what the scan's normals are off by. gains: photo → its
-    own gain. anchoring: what unseen directions rest on, in words. without: photo → the BRDF had it
-    not been there. covariance: (3, k, k) of each channel's coefficients. together: how many
-    regions' votes count as one (cell_weights.py, power_likelihood.py)."""
+    """brdf: the posterior mode, lowered where it is uncertain (shrinkage.py). samples: how many
+    were used. normal_deviation: degrees along each tangent, estimated standard deviation of the
+    scan's normals. gains: photo → its gain. extrapolation: a phrase that says what the BRDF rests
+    on in directions without samples. without: photo → the BRDF without that photo. covariance: (3,
+    k, k) posterior covariance of each channel's coefficients. temperature: the likelihood was
+    raised to the power 1/temperature (power_likelihood.py)."""
 
     brdf: PrincipalBRDF
     samples: int
     normal_deviation: float
     gains: dict[int, float]
-    anchoring: str
+    extrapolation: str
     without: dict[int, PrincipalBRDF]
     covariance: NDArray[np.float64]
-    together: float
+    temperature: float
     warnings: tuple[str, ...] = ()
 
     def band(self, angles: Angles) -> NDArray[np.float64]:
-        """(n, 3) standard deviation of ln(ρ·cosMap + ε) at n directions: the posterior's, widened
-        to what `run.py experiments` finds it to be off by."""
+        """(n, 3) standard deviation of ln(ρ·cosMap + ε) at n directions: that of the posterior,
+        widened by BAND_FACTOR and MIN_BAND to the errors that `run.py experiments` measures."""
         basis, k = self.brdf.basis, self.covariance.shape[1]
         n = len(angles.theta_h)
         out = np.empty((n, 3))
@@ -76,7 +80,9 @@ class MeasuredFit:
             part = slice(start, start + CHUNK)
             q = basis.rows(Angles(*(a[part] for a in angles)), k)[1].astype(np.float64)
             for c in range(3):
-                out[part, c] = np.sqrt(WIDER**2 * np.sum((q @ root[c]) ** 2, axis=1) + ALWAYS**2)
+                out[part, c] = np.sqrt(
+                    BAND_FACTOR**2 * np.sum((q @ root[c]) ** 2, axis=1) + MIN_BAND**2
+                )
         return out
 
 
@@ -90,57 +96,60 @@ def fit_measured(
 def measured_steps(
     table: SampleTable, basis: Basis, settings: MeasuredSettings | None = None
 ) -> Generator[float, None, MeasuredFit]:
-    """The same in steps: yields the fraction done."""
+    """fit_measured as a generator: yields the fraction done and returns the fit."""
     s = settings or MeasuredSettings()
     table = _finite(table)
-    if len(table) < FEWEST:
+    if len(table) < MIN_SAMPLES:
         raise FitError(
-            f"{len(table)} lit samples, at least {FEWEST} are needed: more light or larger masks"
+            f"{len(table)} lit samples; expected at least {MIN_SAMPLES}; "
+            "add photos or light, or enlarge the masks"
         )
     k = min(s.components or basis.count, basis.count)
     prior = ChannelPrior.of(basis, k, s.coupled)
     deviation = float(np.radians(s.normal_deviation))
     yield 0.0
     model = CellModel.of(gather(table, deviation), basis)
-    found, together = tempered(model, prior, s.floor)
+    found, temperature = solve_power_likelihood(model, prior, s.floor)
     patches = Patches.of_points(table.point) if s.rounds else None
     for done in range(s.rounds if patches is not None else 0):
         yield 0.1 + 0.6 * done / s.rounds
         brdf = LogTable.of(basis, found.coefficients)
         assert patches is not None
-        # a BRDF unlike measured ones is itself in doubt: normals must not explain what it cannot
-        tolerance = TOLERANCE * float(np.sqrt(together / LEAST))
+        # a BRDF unlike the measured materials is uncertain: normals must not absorb its errors
+        tolerance = TOLERANCE * float(np.sqrt(temperature / MIN_TEMPERATURE))
         normals = refine_normals(table, patches, brdf, deviation, tolerance)
         deviation = normals.deviation
         yield 0.1 + 0.6 * (done + 0.5) / s.rounds
         model = CellModel.of(gather(normals.table, normals.error), basis)
         before = brdf.values
-        together = max(LEAST, together / 2)
-        found, together = tempered(model, prior, s.floor, found.coefficients, together)
+        temperature = max(MIN_TEMPERATURE, temperature / 2)
+        found, temperature = solve_power_likelihood(
+            model, prior, s.floor, found.coefficients, temperature
+        )
         change = LogTable.of(basis, found.coefficients).values - before
-        if np.sqrt(np.mean(change**2)) < SETTLED:
+        if np.sqrt(np.mean(change**2)) < CONVERGED:
             break
     yield 0.7
     if np.isfinite(s.trust):
-        prior = prior.anchored(carried_on(model, found.coefficients), s.trust)
+        prior = prior.with_grazing_prior(extrapolated(model, found.coefficients), s.trust)
     yield 0.95
-    found = solve(model, prior, s.floor, found.coefficients, together=together)
+    found = solve(model, prior, s.floor, found.coefficients, temperature=temperature)
     covariance = found.covariance()
-    careful = caution(basis, covariance)
+    shrinkage = shrinkage_step(basis, covariance)
     return MeasuredFit(
-        brdf=PrincipalBRDF(basis, found.coefficients + careful),
+        brdf=PrincipalBRDF(basis, found.coefficients + shrinkage),
         samples=len(table),
         normal_deviation=float(np.degrees(deviation)),
         gains=found.gains,
-        anchoring=_told(s.trust),
-        without={p: PrincipalBRDF(basis, c + careful) for p, c in found.without.items()},
+        extrapolation=_anchoring_text(s.trust),
+        without={p: PrincipalBRDF(basis, c + shrinkage) for p, c in found.without.items()},
         covariance=covariance,
-        together=together,
+        temperature=temperature,
     )
 
 
 def _finite(table: SampleTable) -> SampleTable:
-    """Without rows that are not numbers: one of them would make every coefficient one of them."""
+    """The table without rows that are not finite: one of them would make every coefficient NaN."""
     light = table.irradiance
     good = (light > 0).all(axis=1) & np.isfinite(table.radiance).all(axis=1)
     with np.errstate(all="ignore"):
@@ -152,10 +161,11 @@ def _finite(table: SampleTable) -> SampleTable:
     return table if good.all() else table.select(good)
 
 
-def _told(trust: float) -> str:
+def _anchoring_text(trust: float) -> str:
+    """A phrase for the report: what the BRDF rests on where no photo has samples."""
     if not np.isfinite(trust):
-        return "directions that no photo saw follow measured materials"
+        return "directions without samples follow the measured materials"
     return (
-        "directions that no photo saw follow measured materials and microfacet lobes, the lobes "
-        f"trusted to a factor of {np.exp(trust):.1f}"
+        "directions without samples follow the measured materials and microfacet lobes, the lobes "
+        f"within a factor of {np.exp(trust):.1f}"
     )

@@ -1,4 +1,5 @@
-"""What every cell should show for given coefficients, and how that changes with them."""
+"""Forward model: the expected value of every cell for given coefficients, and its derivatives by
+them."""
 
 from __future__ import annotations
 
@@ -12,30 +13,31 @@ from ...angles import Angles, cosines
 from ...basis import Basis, mapping
 from ...basis.log_table import LogTable
 from .cells import AngleCells
-from .normal_quadrature import scattered
+from .normal_quadrature import quadrature_angles
 
-LEAST_COSINE = 0.01
+MIN_COSINE = 0.01  # cos θi and cos θo are clamped to it
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """level: (m, 3) (ρ·cos θi)·cosMap/cos θi + ε of the blurred BRDF: what Nielsen's mapping takes
-    the logarithm of. spread: (m, 3) its relative variance over the normals a cell may have had.
-    slopes: 3 of (m, k) ∂ ln level / ∂c."""
+    """level: (m, 3) (ρ·cos θi)·cosMap/cos θi + ε of the blurred BRDF, the argument of the logarithm
+    in Nielsen's mapping. spread: (m, 3) its relative variance over the possible normals of a cell.
+    jacobian: 3 × (m, k), ∂ ln level / ∂c."""
 
     level: NDArray[np.float64]
     spread: NDArray[np.float64]
-    slopes: list[NDArray[np.float32]]
+    jacobian: list[NDArray[np.float32]]
 
 
 @dataclass(frozen=True)
 class CellModel:
-    """The forward model of one set of cells in one basis.
+    """The forward model of a set of m cells in one basis, with j quadrature normals a cell.
 
     observed: (m, 3) like Prediction.level. scale: (m,) cosMap/cos θi of the cells. share: (j,)
-    weights of the scattered normals. factor: (m, j) what exp(log) − ε of a scattered normal
-    adds to ρ·cos θi. index, weight: (m, j, 8) nodes and their weights. slot: (m·j·8,) where each
-    falls in the distinct (cell, node) pairs: those of cell i are node[indptr[i]:indptr[i + 1]].
+    weights of the quadrature normals. factor: (m, j) what (exp(log) − ε) at a quadrature normal is
+    multiplied by before it is added to ρ·cos θi. index, weight: (m, j, 8) grid nodes and their
+    interpolation weights. slot: (m·j·8,) index of each into the distinct (cell, node) pairs; those
+    of cell i are node[indptr[i]:indptr[i + 1]].
     """
 
     basis: Basis
@@ -52,16 +54,17 @@ class CellModel:
 
     @classmethod
     def of(cls, cells: AngleCells, basis: Basis) -> CellModel:
-        seen, cos_i, cos_o, share = scattered(cells.angles, cells.normal_error)
+        """Quadrature normals, grid nodes and weights of the cells."""
+        seen, cos_i, cos_o, share = quadrature_angles(cells.angles, cells.normal_error)
         m, j = cos_i.shape
         index, weight = basis.grid.corners(Angles(*(a.ravel() for a in seen)))
         index = np.ascontiguousarray(index.T).reshape(m, j, 8)
         weight = np.ascontiguousarray(weight.T).reshape(m, j, 8)
-        cos_map = np.clip(cos_i * np.maximum(cos_o, LEAST_COSINE), 0.01, 1.0)
+        cos_map = np.clip(cos_i * np.maximum(cos_o, MIN_COSINE), 0.01, 1.0)
         lit = np.maximum(cos_i, 0.0) / cos_map
         slot, indptr, node = _distinct(index.reshape(m, -1))
-        own_i, own_o = cosines(*cells.angles)
-        scale = np.clip(own_i * own_o, 0.01, 1.0) / np.maximum(own_i, LEAST_COSINE)
+        cell_cos_i, cell_cos_o = cosines(*cells.angles)
+        scale = np.clip(cell_cos_i * cell_cos_o, 0.01, 1.0) / np.maximum(cell_cos_i, MIN_COSINE)
         observed = np.maximum(cells.reflected, 0.0) * scale[:, None] + mapping.EPSILON
         return cls(
             basis=basis,
@@ -96,8 +99,8 @@ class CellModel:
             self.node[pairs],
         )
 
-    def predict(self, coefficients: NDArray[np.floating], slopes: bool = True) -> Prediction:
-        """coefficients: (3, k)."""
+    def predict(self, coefficients: NDArray[np.floating], jacobian: bool = True) -> Prediction:
+        """Expected levels, and with ``jacobian`` their derivatives, for coefficients (3, k)."""
         k = coefficients.shape[1]
         table = LogTable.of(self.basis, coefficients).values
         m = len(self.cells)
@@ -105,30 +108,32 @@ class CellModel:
         found: list[NDArray[np.float32]] = []
         for channel in range(3):
             logs = np.einsum("mjc,mjc->mj", table[:, channel][self.index], self.weight)
-            grown = np.exp(np.clip(logs, -12.0, 12.0))
-            parts = self.factor * np.maximum(grown - np.float32(mapping.EPSILON), 0)
+            exponential = np.exp(np.clip(logs, -12.0, 12.0))
+            parts = self.factor * np.maximum(exponential - np.float32(mapping.EPSILON), 0)
             total = parts.sum(axis=1, dtype=np.float64)
             level[:, channel] = total * self.scale + mapping.EPSILON
             second = (parts.astype(np.float64) ** 2 / self.share).sum(axis=1)
             wide = np.maximum(second - total**2, 0.0)
             spread[:, channel] = wide * (self.scale / level[:, channel]) ** 2
-            if slopes:
-                each = (self.factor * grown)[..., None] * self.weight
+            if jacobian:
+                each = (self.factor * exponential)[..., None] * self.weight
                 data = np.bincount(self.slot, each.ravel(), len(self.node))
                 matrix = sparse.csr_matrix(
                     (data.astype(np.float32), self.node, self.indptr),
                     shape=(m, self.basis.grid.size),
                 )
-                rise = matrix @ self.basis.nodes[:, 1 : 1 + k]
-                found.append(rise * (self.scale / level[:, channel]).astype(np.float32)[:, None])
+                derivative = matrix @ self.basis.nodes[:, 1 : 1 + k]
+                found.append(
+                    derivative * (self.scale / level[:, channel]).astype(np.float32)[:, None]
+                )
         return Prediction(level, spread, found)
 
 
 def _distinct(
     index: NDArray[np.integer],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """(slot (m·j,), indptr (m + 1,), node) of the distinct nodes in each row of index (m, j), in
-    order: row i's are node[indptr[i]:indptr[i + 1]], its entry's place there is its slot."""
+    """(slot (m·j,), indptr (m + 1,), node): the distinct nodes in each row of index (m, j), sorted.
+    Those of row i are node[indptr[i]:indptr[i + 1]]; slot is the position of each entry in node."""
     order = np.argsort(index, axis=1)
     ordered = np.take_along_axis(index, order, axis=1)
     fresh = np.ones(index.shape, bool)

@@ -1,10 +1,10 @@
-"""Weak observations towards grazing light, where no photo looked.
+"""Pseudo-observations of low weight at grazing angles that have no samples.
 
-Two guesses meet halfway there, in the logarithm: that ρ·cosMap stays what it is at the most grazing
-angle that photos saw, which is what measured materials do on average; and that the BRDF goes on as
-the lobes do, whose Fresnel term and shadowing know how glossy materials grow, but overdo it. The
-lobes are first brought to the level of the BRDF over the last angles seen, not at the edge alone,
-where samples are few.
+They average two extrapolations in the logarithm: that ρ·cosMap stays what it is at the most grazing
+angle with samples, as it does on average for measured materials; and that the BRDF follows the
+fitted microfacet lobes (lobes.py), whose Fresnel term and shadowing predict how glossy materials
+rise, but overestimate it. The lobes are first scaled to the BRDF over the last degrees with
+samples, not at the edge alone, where samples are few.
 """
 
 from __future__ import annotations
@@ -21,32 +21,32 @@ from .forward import CellModel
 from .lobes import Lobes, fit_lobes
 
 THETA_H = (0.2, 0.6, 1.2, 2.0, 4.0, 7.0, 12.0, 20.0, 30.0, 45.0)  # degrees
-BEYOND = 3.0  # degrees between rows of anchors, the first so far from what was seen
-PHI_D = (15.0, 45.0, 75.0, 105.0, 135.0, 165.0)
-LIMIT = 83.0  # of light and view
-INDEPENDENT = 50.0  # their errors go together: all of them count as so many
-NEAR_HIGHLIGHT = 15.0  # degrees of θh: cells that say how far highlights were seen
-SEEN = 0.97  # of those cells
-INSIDE = 2.0  # degrees: the edge that is carried on lies so far inside
-LEVELS = (0.0, 10.0)  # degrees inside it, where the lobes' level is found
-HALFWAY = 0.5  # of the lobes' change; all of it is too much, none too little
+THETA_D_STEP = 3.0  # degrees between rows of pseudo-observations, the first so far from the edge
+PHI_D = (15.0, 45.0, 75.0, 105.0, 135.0, 165.0)  # degrees
+MAX_THETA = 83.0  # degrees of light and view from the normal
+TOTAL_WEIGHT = 50.0  # observations: the errors are correlated, so all together count as so many
+NEAR_HIGHLIGHT = 15.0  # degrees of θh: these cells tell how far highlights were sampled
+EDGE_QUANTILE = 0.97  # of θd of those cells
+EDGE_INSET = 2.0  # degrees: the extrapolation starts so far inside the edge
+LEVEL_OFFSETS = (0.0, 10.0)  # degrees inside that, where the lobes are scaled to the BRDF
+LOBE_SHARE = 0.5  # weight of the lobes: 1 overestimates grazing reflectance, 0 underestimates it
 
 
 @dataclass(frozen=True)
-class Anchors:
-    """What the anchors add to the normal equations, per unit of 1/deviation²: gram (k, k), the
-    same for all channels; pull (3, k)."""
+class GrazingPrior:
+    """Normal equations of the pseudo-observations, per unit of 1/(standard deviation)²: gram (k,
+    k), the same for all channels; rhs (3, k), the right-hand side."""
 
     gram: NDArray[np.float64]
-    pull: NDArray[np.float64]
+    rhs: NDArray[np.float64]
 
     @classmethod
     def of(
         cls, lobes: Lobes, basis: Basis, coefficients: NDArray[np.float64], edge: float
-    ) -> Anchors:
-        """coefficients: (3, k) of the BRDF that is carried on from θd = edge (radians)."""
+    ) -> GrazingPrior:
+        """coefficients: (3, k) of the BRDF to extrapolate beyond θd = edge (radians)."""
         k = coefficients.shape[1]
-        edge = max(edge - np.radians(INSIDE), 0.0)
+        edge = max(edge - np.radians(EDGE_INSET), 0.0)
         angles = directions(edge)
         if not len(angles.theta_h):
             return cls(np.zeros((k, k)), np.zeros((3, k)))
@@ -61,36 +61,38 @@ class Anchors:
         def of_lobes(where: Angles) -> NDArray[np.float64]:
             return _logs(lobes.evaluate(where), where)
 
-        seen = [at(edge - np.radians(inside)) for inside in LEVELS]
+        seen = [at(edge - np.radians(inside)) for inside in LEVEL_OFFSETS]
         level = np.mean([known(where) - of_lobes(where) for where in seen], axis=0)
-        expected = (1 - HALFWAY) * known(at(edge)) + HALFWAY * (of_lobes(angles) + level)
+        expected = (1 - LOBE_SHARE) * known(at(edge)) + LOBE_SHARE * (of_lobes(angles) + level)
         centre, rows = basis.rows(angles, k)
         q = rows.astype(np.float64)
         mapped = expected - centre[:, None]
-        weight = INDEPENDENT / len(q)
+        weight = TOTAL_WEIGHT / len(q)
         return cls(weight * q.T @ q, weight * (mapped.T @ q))
 
 
-def carried_on(model: CellModel, coefficients: NDArray[np.float64]) -> Anchors:
-    """Anchors beyond what a model's cells saw, from the BRDF found there."""
-    edge = seen_edge(model.cells)
-    return Anchors.of(fit_lobes(model.cells), model.basis, coefficients, edge)
+def extrapolated(model: CellModel, coefficients: NDArray[np.float64]) -> GrazingPrior:
+    """Pseudo-observations beyond the samples of a model's cells, extrapolated from the BRDF with
+    these coefficients (3, k)."""
+    edge = sampled_edge(model.cells)
+    return GrazingPrior.of(fit_lobes(model.cells), model.basis, coefficients, edge)
 
 
-def seen_edge(cells: AngleCells) -> float:
-    """The θd, radians, up to which photos saw highlights."""
+def sampled_edge(cells: AngleCells) -> float:
+    """The θd, radians, up to which highlights were sampled."""
     near = cells.angles.theta_h < np.radians(NEAR_HIGHLIGHT)
     theta_d = cells.angles.theta_d[near] if near.sum() > 20 else cells.angles.theta_d
-    return float(np.quantile(theta_d, SEEN))
+    return float(np.quantile(theta_d, EDGE_QUANTILE))
 
 
 def directions(edge: float) -> Angles:
-    """Half/difference angles of the anchors beyond θd = edge, light and view within LIMIT."""
-    theta_d = np.arange(np.degrees(edge) + BEYOND, LIMIT, BEYOND)
+    """Half/difference angles of the pseudo-observations beyond θd = edge (radians), light and view
+    within MAX_THETA of the normal."""
+    theta_d = np.arange(np.degrees(edge) + THETA_D_STEP, MAX_THETA, THETA_D_STEP)
     grid = np.meshgrid(*(np.radians(a) for a in (THETA_H, theta_d, PHI_D)), indexing="ij")
     flat = [a.ravel() for a in grid]
     cos_i, cos_o = cosines(*flat)
-    seen = np.minimum(cos_i, cos_o) > np.cos(np.radians(LIMIT))
+    seen = np.minimum(cos_i, cos_o) > np.cos(np.radians(MAX_THETA))
     return Angles(*(a[seen] for a in flat))
 
 

@@ -1,8 +1,10 @@
-"""Diffuse and two microfacet lobes fitted to the cells: what physics expects where no photo looked.
+"""A diffuse term and two microfacet lobes fitted to the cells, to extrapolate where there are no
+samples.
 
-Principal components know how measured materials look; where no photo saw this one they may run
-wild towards grazing light. A Fresnel lobe cannot. It is never the result: its prediction is a weak
-observation in unseen directions (grazing_prior.py).
+Principal components describe measured materials; outside the sampled directions their sum can take
+implausible values at grazing angles. A microfacet lobe cannot. The lobes are never the result:
+their prediction is a pseudo-observation of low weight in directions without samples
+(grazing_prior.py).
 """
 
 from __future__ import annotations
@@ -20,35 +22,36 @@ from .cells import AngleCells
 Array = NDArray[np.float64]
 
 LOBES = 2
-ENOUGH = 1500  # cells
-GRAZING = 0.05  # cosines below count as this: the microfacet formula has poles there
+MAX_CELLS = 1500  # cells that are fitted
+MIN_COSINE = 0.05  # cosines are clamped to it: the microfacet formula has poles at 0
 STARTS = ((0.05, 0.3), (0.01, 0.1), (0.2, 0.6))  # roughnesses to start from
-SOFT = 0.2  # log residuals beyond it count less
+SOFT_L1_SCALE = 0.2  # log residual beyond which the soft-L1 loss turns linear
+# bounds of the parameters
 LOW = np.array([-12.0] * 3 + [np.log(0.003), -5.0, -14.0, -14.0, -14.0] * LOBES)
 HIGH = np.array([1.0] * 3 + [np.log(0.9), 5.0, 2.0, 2.0, 2.0] * LOBES)
 
 
 @dataclass(frozen=True)
 class Lobes:
-    """numbers: ln diffuse (3), then per lobe ln α, logit F0, ln strength (3). misfit: RMS of the
+    """parameters: ln diffuse (3), then per lobe ln α, logit F0, ln strength (3). misfit: RMS of the
     log residuals."""
 
-    numbers: Array
+    parameters: Array
     misfit: float
 
     def evaluate(self, angles: Angles) -> Array:
         """ρ (n, 3) in 1/sr: GGX distribution (Walter et al. 2007, equation 33), height-correlated
         Smith shadowing, Schlick's Fresnel."""
-        return _evaluate(self.numbers, angles)
+        return _evaluate(self.parameters, angles)
 
 
 def fit_lobes(cells: AngleCells, seed: int = 0) -> Lobes:
-    """Least squares in the mapped space over some of the cells, from several starts."""
+    """Least squares in the mapped space over a random subset of the cells, from several starts."""
     rng = np.random.default_rng(seed)
-    some = cells.select(np.sort(rng.choice(len(cells), min(ENOUGH, len(cells)), replace=False)))
+    some = cells.select(np.sort(rng.choice(len(cells), min(MAX_CELLS, len(cells)), replace=False)))
     cos_i, _ = cosines(*some.angles)
     weight = mapping.cos_map(some.angles)[:, None]
-    rho = np.maximum(some.reflected, 0.0) / np.maximum(cos_i, GRAZING)[:, None]
+    rho = np.maximum(some.reflected, 0.0) / np.maximum(cos_i, MIN_COSINE)[:, None]
     target = np.log(rho * weight + mapping.EPSILON)
     diffuse = np.log(np.maximum(np.percentile(rho, 20, axis=0), 1e-3))
 
@@ -65,7 +68,7 @@ def fit_lobes(cells: AngleCells, seed: int = 0) -> Lobes:
             np.clip(start, LOW, HIGH),
             bounds=(LOW, HIGH),
             loss="soft_l1",
-            f_scale=SOFT,
+            f_scale=SOFT_L1_SCALE,
             max_nfev=60,
         )
         if best is None or found.cost < best.cost:
@@ -75,7 +78,8 @@ def fit_lobes(cells: AngleCells, seed: int = 0) -> Lobes:
 
 
 def _evaluate(x: Array, angles: Angles) -> Array:
-    cos_i, cos_o = (np.maximum(c, GRAZING) for c in cosines(*angles))
+    """ρ (n, 3) in 1/sr of the lobes with parameters x."""
+    cos_i, cos_o = (np.maximum(c, MIN_COSINE) for c in cosines(*angles))
     cos_h, cos_d = np.cos(angles.theta_h), np.cos(angles.theta_d)
     rho: Array = np.exp(x[:3]) * np.ones((len(cos_h), 1))
     for lobe in range(LOBES):
@@ -84,7 +88,7 @@ def _evaluate(x: Array, angles: Angles) -> Array:
         f0 = 1 / (1 + np.exp(-logit))
         distribution = a2 / (np.pi * (cos_h**2 * (a2 - 1) + 1) ** 2)
         fresnel = 1 + (1 / f0 - 1) * (1 - cos_d) ** 5  # 1 at normal incidence: strength has F0
-        hidden = sum((-1 + np.sqrt(1 + a2 * (1 - c**2) / c**2)) / 2 for c in (cos_i, cos_o))
-        value = distribution * fresnel / ((1 + hidden) * 4 * cos_i * cos_o)
+        smith_lambda = sum((-1 + np.sqrt(1 + a2 * (1 - c**2) / c**2)) / 2 for c in (cos_i, cos_o))
+        value = distribution * fresnel / ((1 + smith_lambda) * 4 * cos_i * cos_o)
         rho = rho + value[:, None] * np.exp(strength)
     return rho

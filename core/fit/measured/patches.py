@@ -1,4 +1,5 @@
-"""Small patches of the surface, across photos: samples that share one correction of the normal."""
+"""Small patches of the surface, across photos: the samples of one share one rotation of the
+normal."""
 
 from __future__ import annotations
 
@@ -9,15 +10,15 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-SAMPLES = 6.0  # a patch holds about so many, of all photos
-MOST = 150_000  # patches
-REACH = 1.8  # patch sizes to those that count as neighbours
+SAMPLES_PER_PATCH = 6.0  # of all photos together
+MAX_PATCHES = 150_000
+NEIGHBOUR_DISTANCE = 1.8  # patch sizes between centres of neighbours
 
 
 @dataclass(frozen=True)
 class Patches:
     """of: (n,) patch of each sample. count: number of patches. neighbours: (p, p) Laplacian of the
-    graph of patches that touch. size: edge of a patch, scan units."""
+    graph of neighbouring patches. size: edge of a patch, scan units."""
 
     of: NDArray[np.int64]
     count: int
@@ -26,12 +27,13 @@ class Patches:
 
     @classmethod
     def of_points(cls, points: NDArray[np.float64]) -> Patches:
-        """Cubes of one size around points (n, 3), found by halving until they hold few enough."""
+        """Cubes of one size around points (n, 3), scan units. The size is iterated until a cube
+        holds about SAMPLES_PER_PATCH points, or there are MAX_PATCHES cubes."""
         low = points.min(axis=0)
         extent = float((points.max(axis=0) - low).max()) or 1.0
-        goal = min(len(points) / SAMPLES, MOST)
+        goal = min(len(points) / SAMPLES_PER_PATCH, MAX_PATCHES)
         size = extent / 64
-        for _ in range(6):  # patches of a surface grow with the inverse square of their size
+        for _ in range(6):  # their number grows with the inverse square of their size
             found = len(np.unique(_cubes(points, low, size)))
             if abs(np.log(found / max(goal, 1.0))) < 0.05:
                 break
@@ -41,7 +43,7 @@ class Patches:
         count = int(of.max()) + 1
         inside = np.bincount(of, minlength=count)
         centre = np.stack([np.bincount(of, points[:, a], count) / inside for a in range(3)], axis=1)
-        pairs = cKDTree(centre).query_pairs(REACH * size, output_type="ndarray")
+        pairs = cKDTree(centre).query_pairs(NEIGHBOUR_DISTANCE * size, output_type="ndarray")
         touch = sparse.coo_matrix(
             (np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count)
         ).tocsr()
@@ -51,5 +53,6 @@ class Patches:
 
 
 def _cubes(points: NDArray[np.float64], low: NDArray[np.float64], size: float) -> NDArray[np.int64]:
+    """(n,) number of the cube that holds each point."""
     at = np.floor((points - low) / size).astype(np.int64)
     return (at[:, 0] << 42) | (at[:, 1] << 21) | at[:, 2]

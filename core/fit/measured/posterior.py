@@ -1,10 +1,10 @@
-"""Coefficients from all cells at once: the most probable ones, how sure they are, and what they
-would be without any one photo.
+"""Posterior of the coefficients from all cells: its mode, its precision and the coefficients
+without each photo.
 
-Gauss–Newton on the mapped space's residuals. Weights come from each cell's own uncertainty and are
-computed anew at every step: pixel noise, the model's floor, and the normals' error times the BRDF's
-slope there; a Student t keeps what does not belong (a shadow the mesh does not explain) from
-pulling.
+Gauss–Newton on the residuals in the mapped space. The weights are computed anew at every step from
+each cell's uncertainty: pixel noise, the model error and the normals' error times the slope of the
+BRDF. A Student-t error model limits the influence of outliers, such as shadows that the mesh does
+not explain.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .cell_weights import crowding
+from ...statistics.student_t import weights_of_squares
+from .cell_weights import cells_per_observation
 from .equations import Arrow, PhotoEquations, add_blocks
 from .forward import CellModel, Prediction
 from .prior import ChannelPrior
 
 ITERATIONS = 12
-DEGREES = 4.0  # of freedom of the Student t
-TOGETHER = 30  # neighbouring samples share one error of the normal
-READ = 3e-3  # of the mapped level: what photos cannot resolve near black
-STEP = 2.0  # most that a coefficient moves at once, in units of its prior
-CLOSE = 0.01  # the same, where the search ends
-GAIN = 0.03  # prior deviation of a photo's own gain
+SAMPLES_PER_NORMAL = 30  # so many neighbouring samples share one error of the normal
+READ_NOISE = 3e-3  # of the mapped level: what photos do not resolve near black
+MAX_STEP = 2.0  # largest change of a parameter in one iteration, in prior standard deviations
+CONVERGED = 0.01  # the same: the iteration ends where no parameter changes more
+GAIN_DEVIATION = 0.03  # prior standard deviation of the logarithm of a photo's gain
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """coefficients: (3, k). precision: at the optimum, of the coefficients, channels one after the
-    other, and of the photos' log gains. gains: {photo: gain}. without: {photo:
-    (3, k)} coefficients had the photo not been there."""
+    """coefficients: (3, k), the mode. precision: at the mode, of the coefficients, channel after
+    channel, and of the photos' log gains. gains: photo → gain. without: photo → (3, k) coefficients
+    without that photo."""
 
     coefficients: NDArray[np.float64]
     precision: Arrow
@@ -54,40 +54,46 @@ def solve(
     start: NDArray[np.float64] | None = None,
     leave_out: bool = True,
     iterations: int = ITERATIONS,
-    together: float = 1.0,
+    temperature: float = 1.0,
 ) -> Posterior:
-    """floor: log-relative deviation that the model is granted everywhere. together: so many votes
-    of a region (cell_weights.py) count as one (power_likelihood.py)."""
+    """The posterior of a model's coefficients, by Gauss–Newton from ``start`` (3, k), or from 0.
+
+    floor: log-relative standard deviation of the model error assumed everywhere. leave_out: compute
+    the coefficients without each photo too. temperature: the likelihood is raised to the power
+    1/temperature (power_likelihood.py), after the cells' weights by region (cell_weights.py).
+    """
     k = len(prior.own)
-    crowd = crowding(model.cells)[:, None]
+    crowd = cells_per_observation(model.cells)[:, None]
     photos, place = np.unique(model.cells.photo, return_inverse=True)
     p = len(photos)
-    prior_precision, prior_pull = prior.precision(), prior.pull()
+    prior_precision, prior_pull = prior.precision(), prior.rhs()
     state = np.zeros(3 * k + p)
     if start is not None:
         state[: 3 * k] = start.ravel()
-    size = np.concatenate([np.tile(np.sqrt(prior.own + prior.shared), 3), np.full(p, GAIN)])
+    size = np.concatenate(
+        [np.tile(np.sqrt(prior.own + prior.shared), 3), np.full(p, GAIN_DEVIATION)]
+    )
     order = np.argsort(place, kind="stable")
     cells = np.split(order, np.cumsum(np.bincount(place, minlength=p))[:-1])
     for _ in range(iterations):
         prediction = model.predict(state[: 3 * k].reshape(3, k))
         residual, weight = _residuals(model, prediction, state[3 * k :][place], floor)
-        weight = weight / (together * crowd)
+        weight = weight / (temperature * crowd)
         each = (_equations(prediction, residual, weight, own) for own in cells)
-        total, pull = _summed(each, prior_precision, p)
-        pull[: 3 * k] += prior_pull - prior_precision @ state[: 3 * k]
-        pull[3 * k :] -= state[3 * k :] / GAIN**2
-        step = total.solve(pull)
-        far = np.abs(step / size).max()
-        state = state + step * min(1.0, STEP / max(far, 1e-12))
-        if far < CLOSE:
+        total, rhs = _summed(each, prior_precision, p)
+        rhs[: 3 * k] += prior_pull - prior_precision @ state[: 3 * k]
+        rhs[3 * k :] -= state[3 * k :] / GAIN_DEVIATION**2
+        step = total.solve(rhs)
+        largest_change = np.abs(step / size).max()
+        state = state + step * min(1.0, MAX_STEP / max(largest_change, 1e-12))
+        if largest_change < CONVERGED:
             break
     without = {}
     if leave_out and p > 1:
-        everything = total.marginal()
+        full_precision = total.marginal()
         for i, (photo, own) in enumerate(zip(photos.tolist(), cells, strict=True)):
             one = _equations(prediction, residual, weight, own)
-            shift = _left_out(everything, one, total.coupling[:, i], total.gains[i])
+            shift = _step_without_photo(full_precision, one, total.coupling[:, i], total.gains[i])
             without[photo] = state[: 3 * k].reshape(3, k) + shift
     return Posterior(
         coefficients=state[: 3 * k].reshape(3, k),
@@ -109,11 +115,11 @@ def _residuals(
     count = model.cells.count[:, None]
     variance = (
         floor**2
-        + prediction.spread * np.minimum(1.0, TOGETHER / count)
-        + (READ / level) ** 2 / count
+        + prediction.spread * np.minimum(1.0, SAMPLES_PER_NORMAL / count)
+        + (READ_NOISE / level) ** 2 / count
         + 0.05**2 / count
     )
-    weight = (DEGREES + 1) / (DEGREES + residual**2 / variance) / variance
+    weight = weights_of_squares(residual**2 / variance) / variance
     return residual, weight
 
 
@@ -123,8 +129,8 @@ def _equations(
     weight: NDArray[np.float64],
     own: NDArray[np.intp],
 ) -> PhotoEquations:
-    """Of the cells ``own`` of one photo."""
-    return PhotoEquations.of([s[own] for s in prediction.slopes], residual[own], weight[own])
+    """Normal equations of the cells ``own`` of one photo."""
+    return PhotoEquations.of([s[own] for s in prediction.jacobian], residual[own], weight[own])
 
 
 def _summed(
@@ -132,23 +138,31 @@ def _summed(
 ) -> tuple[Arrow, NDArray[np.float64]]:
     """(precision of all cells and the prior, right-hand side (3k + p,) of the cells alone)."""
     n = len(prior_precision)
-    total = Arrow(prior_precision.copy(), np.zeros((n, photos)), np.full(photos, GAIN**-2))
-    pull = np.zeros(n + photos)
+    total = Arrow(
+        prior_precision.copy(), np.zeros((n, photos)), np.full(photos, GAIN_DEVIATION**-2)
+    )
+    rhs = np.zeros(n + photos)
     for i, one in enumerate(each):
         add_blocks(total.coefficients, one.blocks)
         total.coupling[:, i] = one.coupling.ravel()
         total.gains[i] += one.gain
-        pull[:n] += one.pull.ravel()
-        pull[n + i] = one.gain_pull
-    return total, pull
+        rhs[:n] += one.rhs.ravel()
+        rhs[n + i] = one.gain_rhs
+    return total, rhs
 
 
-def _left_out(
-    everything: NDArray[np.float64], one: PhotoEquations, coupling: NDArray[np.float64], gain: float
+def _step_without_photo(
+    full_precision: NDArray[np.float64],
+    one: PhotoEquations,
+    coupling: NDArray[np.float64],
+    gain: float,
 ) -> NDArray[np.float64]:
-    """(3, k) step of the coefficients from the optimum of all photos to that without one: without
-    its cells its gain says nothing of them. everything: (3k, 3k) precision with its gain integrated
-    out; coupling (3k,), gain: that gain's row of the whole precision."""
-    rest = everything + np.outer(coupling, coupling) / gain
+    """(3, k) step of the coefficients from the optimum of all photos to that without one photo: its
+    cells are subtracted, and its gain no longer depends on the coefficients.
+
+    everything: (3k, 3k) precision with the gain integrated out. coupling (3k,), gain: the row of
+    that gain in the whole precision.
+    """
+    rest = full_precision + np.outer(coupling, coupling) / gain
     add_blocks(rest, one.blocks, -1.0)
-    return np.linalg.solve(rest, -one.pull.ravel().astype(np.float64)).reshape(one.pull.shape)
+    return np.linalg.solve(rest, -one.rhs.ravel().astype(np.float64)).reshape(one.rhs.shape)

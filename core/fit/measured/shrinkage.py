@@ -1,9 +1,9 @@
-"""The most probable BRDF made cautious where it is unsure.
+"""Shrink the most probable BRDF where it is uncertain.
 
-Extrapolated highlights err by factors, and to be three times too bright is worse than to be three
-times too dark: it costs more of ‖fit − truth‖/‖truth‖, and a picture forgives it less. The value
-that makes the expected relative error least lies below the most probable one by a multiple of the
-variance of the logarithm; where photos looked that is nothing.
+Extrapolated highlights are wrong by factors, and an overestimate by a factor of three is worse than
+an underestimate by the same factor: it adds more to ‖fit − truth‖/‖truth‖ and is more visible in a
+picture. The value that minimises the expected relative error lies below the most probable one by a
+multiple of the variance of the logarithm. Where photos have samples this variance is almost zero.
 """
 
 from __future__ import annotations
@@ -14,16 +14,18 @@ from numpy.typing import NDArray
 from ...angles import Angles, cosines
 from ...basis import Basis
 
-CAUTION = 0.5  # times the variance; 1.5 is the least E(ρ̂/ρ − 1)² of a log-normal ρ, 0 its median
-MOST = 1.5  # of the variance
-SURE = 0.02  # variance: directions that are surer keep their value alike
-NODES = 6000
-STIFF = 1e-6
+SHRINKAGE = 0.5  # times the variance; 1.5 minimises E(ρ̂/ρ − 1)² of a log-normal ρ, 0 is its median
+MAX_VARIANCE = 1.5  # the variance is clipped to it
+MIN_VARIANCE = 0.02  # added in the weights, so that well-known directions count alike
+NODES = 6000  # grid nodes of the least squares
+RIDGE = 1e-6
 
 
-def caution(basis: Basis, covariance: NDArray[np.float64], seed: int = 0) -> NDArray[np.float64]:
-    """(3, k) to add to coefficients of this covariance (3, k, k): it lowers ln(ρ·cosMap + ε) by
-    CAUTION times its variance."""
+def shrinkage_step(
+    basis: Basis, covariance: NDArray[np.float64], seed: int = 0
+) -> NDArray[np.float64]:
+    """(3, k) change of coefficients with covariance (3, k, k) that lowers ln(ρ·cosMap + ε) by
+    SHRINKAGE times its variance, by weighted least squares over random nodes of the grid."""
     k = covariance.shape[1]
     cos_i, cos_o = cosines(*(Angles(*(a.ravel() for a in basis.grid.nodes()))))
     visible = np.flatnonzero(np.minimum(cos_i, cos_o) > 0.01)
@@ -32,7 +34,7 @@ def caution(basis: Basis, covariance: NDArray[np.float64], seed: int = 0) -> NDA
     out = np.empty((len(covariance), k))
     for c, own in enumerate(covariance):
         variance = np.sum((q @ own) * q, axis=1)
-        weighted = (q / (variance + SURE)[:, None]).T
-        down = weighted @ (-CAUTION * np.minimum(variance, MOST))
-        out[c] = np.linalg.solve(weighted @ q + STIFF * np.eye(k), down)
+        weighted = (q / (variance + MIN_VARIANCE)[:, None]).T
+        down = weighted @ (-SHRINKAGE * np.minimum(variance, MAX_VARIANCE))
+        out[c] = np.linalg.solve(weighted @ q + RIDGE * np.eye(k), down)
     return out

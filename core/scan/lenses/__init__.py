@@ -1,1 +1,1 @@
-"""Lenses that COLMAP has no exact model for, and the choice of the simplest exact model."""
+"""Lens models that COLMAP lacks, and the choice of the exact model for a tool's distortion."""

@@ -1,4 +1,4 @@
-"""Which lens model stands for the distortion a tool describes: the simplest that is exact."""
+"""Choose the lens model for a tool's distortion: the simplest exact one."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ def brown_lens(
     radial: Sequence[float] = (),
     tangential: Sequence[float] = (0.0, 0.0),
 ) -> Lens:
-    """Brown's lens: x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶ + k4 r⁸) + 2 p1 x y + p2 (r² + 2 x²), and
-    y' with x and y, p1 and p2 exchanged (OpenCV's order of p1 and p2; its k4 is another thing).
+    """Brown's lens: x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶ + k4 r⁸) + 2 p1 x y + p2 (r² + 2 x²); y' with
+    x and y, and p1 and p2, exchanged. p1 and p2 are in OpenCV's order; k4 is not OpenCV's k4.
 
     fx, fy, cx, cy: pixels. radial: up to k1 … k4. tangential: p1, p2.
     """
     k1, k2, k3, k4 = (*radial, *(0.0,) * (4 - len(radial)))
     p1, p2 = tangential
     if k4:
-        # Metashape's lens has a k4; its p1 and p2 are exchanged, its focal length is fy
+        # Metashape's model has this k4; p1 and p2 are exchanged in it, and f is fy
         return "METASHAPE_FRAME", (fy, cx, cy, k1, k2, k3, k4, p2, p1, 0.0, 0.0, fx - fy, 0.0)
     if k3:
         return "FULL_OPENCV", (fx, fy, cx, cy, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0)
@@ -37,13 +37,13 @@ def brown_lens(
 
 
 def fisheye_lens(fx: float, fy: float, cx: float, cy: float, radial: Sequence[float] = ()) -> Lens:
-    """The equidistant lens with a polynomial: r' = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸), θ the
-    angle to the axis. radial: up to k1 … k4."""
+    """Equidistant lens with a polynomial: r' = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸), θ the angle
+    to the optical axis. radial: up to k1 … k4."""
     if not any(radial):
         return "FISHEYE", (fx, fy, cx, cy)
     return "OPENCV_FISHEYE", (fx, fy, cx, cy, *radial, *(0.0,) * (4 - len(radial)))
 
 
 def panorama_lens(width: int, height: int) -> Lens:
-    """The whole sphere: longitude across, latitude down, the middle looks along z."""
+    """The whole sphere: longitude along x, latitude along y; the centre looks along z."""
     return "EQUIRECTANGULAR", (float(width), float(height))

@@ -1,7 +1,7 @@
-"""The lens of VisualSFM: its polynomial undoes the distortion instead of making it.
+"""VisualSFM's lens: its polynomial maps distorted pixels to undistorted ones, not the reverse.
 
-C. Wu, "Multicore bundle adjustment" (PBA): with m = (pixel − centre) / f the straight ray is
-m (1 + r |m|²). No model of COLMAP is that one (SIMPLE_DIVISION divides).
+C. Wu, "Multicore bundle adjustment" (PBA): with m = (pixel − centre) / f the undistorted ray is m
+(1 + r |m|²). COLMAP has no such model (its SIMPLE_DIVISION divides).
 """
 
 from __future__ import annotations
@@ -50,10 +50,10 @@ class MeasuredRadialLens:
         return self.r == 0.0
 
     def img_from_cam(self, cam_points: Array) -> Array:
-        """Pixels (n, 2) of points (n, 3); NaN beyond the rays that any pixel has.
+        """Pixels (n, 2) of points (n, 3); NaN beyond the rays of all pixels.
 
-        The one real root of r m³ + m = ρ that goes to ρ with r → 0, in closed form (hyperbolic for
-        r > 0, trigonometric for r < 0).
+        The real root of r m³ + m = ρ that tends to ρ for r → 0, in closed form (hyperbolic for r >
+        0, trigonometric for r < 0).
         """
         straight = cam_points[:, :2] / cam_points[:, 2:]
         if self.r == 0.0:
@@ -69,7 +69,7 @@ class MeasuredRadialLens:
         return straight * (self.f * ratio[:, None]) + (self.cx, self.cy)
 
     def cam_from_img(self, image_points: Array) -> Array:
-        """(n, 2): x/z and y/z of pixels (n, 2); NaN where the polynomial has turned back."""
+        """(n, 2): x/z and y/z of pixels (n, 2); NaN beyond the fold of the polynomial."""
         measured = (image_points - (self.cx, self.cy)) / self.f
         bent = self.r * (measured**2).sum(axis=1, keepdims=True)
         return np.where(1.0 + 3.0 * bent > 0, measured * (1.0 + bent), np.nan)

@@ -1,4 +1,4 @@
-"""Metashape's distortion of a lens, and its inverse.
+"""Metashape's lens distortion, and its inverse.
 
 Agisoft Metashape Professional, User Manual, appendix "Camera models". With r² = x² + y²:
 
@@ -18,15 +18,15 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-BLOCK = 1 << 18  # points solved at once
-TABLE = 4096  # radii tabulated for a first guess
-STEPS = 30  # of Newton's method; three to five do it unless a point lies on the fold
-EXACT = 1e-13  # remaining error, in units of the focal length
+BLOCK = 1 << 18  # points solved together
+TABLE_SIZE = 4096  # radii in the table for the initial guess
+MAX_NEWTON_STEPS = 30  # three to five suffice unless a point lies on the fold
+NEWTON_TOLERANCE = 1e-13  # remaining error, in units of the focal length
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """Metashape's parameters; pixels: f, cx, cy (absolute), b1, b2; the others have no unit."""
+    """Metashape's parameters. f, cx, cy (absolute), b1, b2: pixels; the others have no unit."""
 
     f: float
     cx: float
@@ -49,12 +49,14 @@ class Calibration:
 
     @property
     def tangential(self) -> bool:
-        """Whether the lens is decentred (without p1 and p2, p3 and p4 do nothing)."""
+        """Whether the lens has tangential distortion (without p1 and p2, p3 and p4 have no
+        effect)."""
         return self.p1 != 0 or self.p2 != 0
 
 
-def bent_forward(lens: Calibration, x: Array, y: Array) -> tuple[Array, Array, Array]:
-    """(x', y', Jacobian (2, 2, n)) of x, y (n,): the formulas at the head of this file."""
+def distort(lens: Calibration, x: Array, y: Array) -> tuple[Array, Array, Array]:
+    """(x', y', Jacobian (2, 2, n)) of undistorted x, y (n,): the equations in the module's
+    docstring."""
     s = x * x + y * y
     radial = 1 + s * (lens.k1 + s * (lens.k2 + s * (lens.k3 + s * lens.k4)))
     slope = lens.k1 + s * (2 * lens.k2 + s * (3 * lens.k3 + s * 4 * lens.k4))
@@ -85,19 +87,18 @@ def bent_forward(lens: Calibration, x: Array, y: Array) -> tuple[Array, Array, A
 
 
 def determinant(jacobian: Array) -> Array:
-    """(n,) of a Jacobian (2, 2, n): positive where the lens does not fold."""
+    """(n,) determinant of a Jacobian (2, 2, n): positive where the lens does not fold."""
     return np.asarray(jacobian[0, 0] * jacobian[1, 1] - jacobian[0, 1] * jacobian[1, 0])
 
 
-def straightened(
-    lens: Calibration, bent_x: Array, bent_y: Array, limit: float
-) -> tuple[Array, Array]:
-    """x, y (n,) within the radius ``limit`` of x', y'; NaN where there is none."""
+def undistort(lens: Calibration, bent_x: Array, bent_y: Array, limit: float) -> tuple[Array, Array]:
+    """Undistorted x, y (n,), within the radius ``limit``, of distorted x', y'; NaN where there is
+    no solution."""
     guess = _radial_guess(lens.radial, limit, np.hypot(bent_x, bent_y))
     x, y = np.empty_like(bent_x), np.empty_like(bent_y)
     for start in range(0, len(bent_x), BLOCK):
         part = slice(start, start + BLOCK)
-        x[part], y[part] = _unbent(lens, bent_x[part], bent_y[part], guess)
+        x[part], y[part] = _invert(lens, bent_x[part], bent_y[part], guess)
     with np.errstate(invalid="ignore"):
         beyond = ~(np.hypot(x, y) <= limit * (1 + 1e-12))
     x[beyond] = y[beyond] = np.nan
@@ -107,7 +108,7 @@ def straightened(
 def _radial_guess(
     coefficients: tuple[float, float, float, float], limit: float, bent: Array
 ) -> Callable[[Array], Array]:
-    """r of r' where only the radial terms act, by a table up to the fold."""
+    """Function r' → r for the radial terms only, from a table up to the fold."""
     finite = bent[np.isfinite(bent)]
     farthest = 1.05 * finite.max(initial=0.0) + 0.1
     k = np.array([0.0, 1.0, 0.0, coefficients[0], 0.0, coefficients[1], 0.0, coefficients[2], 0.0])
@@ -115,27 +116,27 @@ def _radial_guess(
     end = min(limit, 1.0)
     while end < limit and np.polynomial.polynomial.polyval(end, k) < farthest and end < 1e6:
         end = min(2 * end, limit)
-    radii = np.linspace(0.0, end, TABLE)
+    radii = np.linspace(0.0, end, TABLE_SIZE)
     table = np.maximum.accumulate(np.polynomial.polynomial.polyval(radii, k))
     return lambda values: np.interp(values, table, radii)
 
 
-def _unbent(
+def _invert(
     lens: Calibration, bent_x: Array, bent_y: Array, guess: Callable[[Array], Array]
 ) -> tuple[Array, Array]:
-    """The x, y that the lens bends to these: Newton's method, its steps halved while they lead
-    away; NaN where it does not arrive."""
+    """Undistorted x, y of distorted coordinates, by Newton's method with step halving; NaN where it
+    does not converge."""
     bent = np.hypot(bent_x, bent_y)
     with np.errstate(invalid="ignore", divide="ignore"):
         factor = np.where(bent > 0, guess(bent) / bent, 1.0)
     x, y = bent_x * factor, bent_y * factor
     active = np.flatnonzero(np.isfinite(bent))
     error = np.full_like(bent, np.inf)
-    for _ in range(STEPS):
-        now_x, now_y, jacobian = bent_forward(lens, x[active], y[active])
+    for _ in range(MAX_NEWTON_STEPS):
+        now_x, now_y, jacobian = distort(lens, x[active], y[active])
         off_x, off_y = now_x - bent_x[active], now_y - bent_y[active]
         error[active] = np.hypot(off_x, off_y)
-        going = error[active] > EXACT * (1 + bent[active])
+        going = error[active] > NEWTON_TOLERANCE * (1 + bent[active])
         active, off_x, off_y, jacobian = (
             active[going],
             off_x[going],
@@ -148,21 +149,21 @@ def _unbent(
             inverse = 1.0 / determinant(jacobian)
             step_x = inverse * (jacobian[1, 1] * off_x - jacobian[0, 1] * off_y)
             step_y = inverse * (jacobian[0, 0] * off_y - jacobian[1, 0] * off_x)
-        share = (np.isfinite(step_x) & np.isfinite(step_y)).astype(float)
+        step_scale = (np.isfinite(step_x) & np.isfinite(step_y)).astype(float)
         step_x, step_y = np.nan_to_num(step_x), np.nan_to_num(step_y)
         for _ in range(6):
             with np.errstate(all="ignore"):
-                to_x, to_y, _j = bent_forward(
-                    lens, x[active] - share * step_x, y[active] - share * step_y
+                to_x, to_y, _j = distort(
+                    lens, x[active] - step_scale * step_x, y[active] - step_scale * step_y
                 )
                 worse = ~(np.hypot(to_x - bent_x[active], to_y - bent_y[active]) <= error[active])
             if not worse.any():
                 break
-            share = np.where(worse, share / 2, share)
-        x[active] -= share * step_x
-        y[active] -= share * step_y
-    _, _, jacobian = bent_forward(lens, x, y)
+            step_scale = np.where(worse, step_scale / 2, step_scale)
+        x[active] -= step_scale * step_x
+        y[active] -= step_scale * step_y
+    _, _, jacobian = distort(lens, x, y)
     with np.errstate(invalid="ignore"):
-        lost = ~((error <= 1e-9 * (1 + bent)) & (determinant(jacobian) > 0))
-    x[lost] = y[lost] = np.nan
+        diverged = ~((error <= 1e-9 * (1 + bent)) & (determinant(jacobian) > 0))
+    x[diverged] = y[diverged] = np.nan
     return x, y

@@ -1,13 +1,13 @@
 """Metashape's lenses, where no camera model of COLMAP is exact.
 
 Agisoft Metashape Professional, User Manual, appendix "Camera models". Frame: x = X/Z, y = Y/Z;
-(equidistant) fisheye: x = θ·X/R, y = θ·Y/R; equisolid fisheye (since 2.3): 2 sin(θ/2) in place of
-θ. Then the distortion of metashape_distortion.py for all of them, and
+(equidistant) fisheye: x = θ·X/R, y = θ·Y/R; equisolid fisheye (since 2.3): 2 sin(θ/2) instead of θ.
+Then the distortion of metashape_distortion.py for all of them, and
 
     u = cx + x' f + x' b1 + y' b2,   v = cy + y' f
 
-The manual's cx, cy are offsets from the photo's centre; here they are absolute, the centre of the
-top left pixel being at (0.5, 0.5) in both.
+cx, cy are offsets from the photo's centre in the manual, and absolute here; the centre of the top
+left pixel is at (0.5, 0.5) in both.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .fold import fold_radius
-from .metashape_distortion import Calibration, bent_forward, determinant, straightened
+from .metashape_distortion import Calibration, determinant, distort, undistort
 
 Array = NDArray[np.float64]
 
@@ -29,20 +29,20 @@ MODELS = ("METASHAPE_FRAME", "METASHAPE_FISHEYE", "METASHAPE_EQUISOLID")
 def metashape_lens(model: str, parameters: Sequence[float]) -> MetashapeLens:
     """The lens of one of MODELS with the 13 parameters of :class:`Calibration`, in its order.
 
-    Raises ValueError for another model or another number of parameters.
+    Raises ValueError for another model or number of parameters.
     """
     if model not in MODELS:
-        raise ValueError(f"{model} is none of Metashape's models {', '.join(MODELS)}")
+        raise ValueError(f"found the model {model}; expected one of {', '.join(MODELS)}")
     if len(parameters) != 13:
-        raise ValueError(f"{model} has 13 parameters, not {len(parameters)}")
+        raise ValueError(f"{model} has 13 parameters; found {len(parameters)}")
     return MetashapeLens(model, Calibration(*(float(p) for p in parameters)))
 
 
 def resized(
     model: str, parameters: Sequence[float], across: float, down: float
 ) -> tuple[float, ...]:
-    """The parameters for a photo ``across`` times as wide and ``down`` times as high. Exact: f is
-    counted in rows, b1 takes up what makes the pixels oblong."""
+    """The parameters for a photo ``across`` times as wide and ``down`` times as high. Exact: f
+    scales with the height, and b1 takes up the difference of the two scales."""
     lens = metashape_lens(model, parameters).calibration
     f = lens.f * down
     values = {
@@ -56,10 +56,11 @@ def resized(
 
 
 def colmap_model(model: str, lens: Calibration) -> tuple[str, tuple[float, ...]]:
-    """(model, parameters) of the same lens: COLMAP's simplest that is exact, else its own.
+    """(model, parameters) of the same lens: the simplest exact COLMAP model, else ``model`` itself.
 
     COLMAP's fisheyes distort θ as Metashape's do (models.h, OpenCVFisheyeCameraModel and
-    ThinPrismFisheyeCameraModel); none has k4 together with a perspective, p3, p4 or b2.
+    ThinPrismFisheyeCameraModel). No COLMAP model has k4 with a perspective projection, p3, p4 or
+    b2.
     """
     own = model, astuple(lens)
     if lens.b2 != 0 or (lens.tangential and (lens.p3 != 0 or lens.p4 != 0)):
@@ -84,8 +85,8 @@ def colmap_model(model: str, lens: Calibration) -> tuple[str, tuple[float, ...]]
 
 @dataclass(frozen=True)
 class MetashapeLens:
-    """One of MODELS, a :class:`patina.core.scan.lens.Lens`. NaN is what does not exist: the pixel
-    of a point beyond the fold of the polynomial (fold.py), the ray of a pixel beyond it."""
+    """One of MODELS, a :class:`patina.core.scan.lens.Lens`. NaN for pixels of points beyond the
+    fold of the polynomial (fold.py), and for rays of pixels beyond it."""
 
     model: str
     calibration: Calibration
@@ -111,8 +112,8 @@ class MetashapeLens:
         return self.calibration.cy
 
     def is_undistorted(self) -> bool:
-        """True for a frame lens without distortion. False where rows and columns are not
-        perpendicular (b2): linear too, but no pinhole with two focal lengths is it."""
+        """True for a frame lens without distortion. False with skew (b2): that is linear, but a
+        pinhole with two focal lengths does not represent it."""
         lens = self.calibration
         bent = lens.tangential or any(lens.radial) or lens.b2 != 0
         return self.model == "METASHAPE_FRAME" and not bent
@@ -121,7 +122,7 @@ class MetashapeLens:
         """Pixels (n, 2) of points (n, 3) in the camera's frame."""
         x, y = self._flattened(np.asarray(cam_points, np.float64))
         with np.errstate(invalid="ignore", over="ignore"):
-            bent_x, bent_y, jacobian = bent_forward(self.calibration, x, y)
+            bent_x, bent_y, jacobian = distort(self.calibration, x, y)
             kept = (np.hypot(x, y) <= self._limit) & (determinant(jacobian) > 0)
         lens = self.calibration
         u = lens.cx + bent_x * (lens.f + lens.b1) + bent_y * lens.b2
@@ -129,7 +130,7 @@ class MetashapeLens:
         return np.where(kept[:, None], np.stack([u, v], axis=1), np.nan)
 
     def cam_ray_from_img(self, image_points: Array) -> Array:
-        """Directions (n, 3), of no particular length, of pixels (n, 2)."""
+        """Directions (n, 3), not normalised, of pixels (n, 2)."""
         x, y = self._straightened(image_points)
         if self.model == "METASHAPE_FRAME":
             return np.stack([x, y, np.where(np.isnan(x), np.nan, 1.0)], axis=1)
@@ -148,12 +149,12 @@ class MetashapeLens:
 
     @property
     def _limit(self) -> float:
-        """The greatest r the lens maps."""
+        """The largest undistorted radius that the lens maps."""
         widest = {"METASHAPE_FISHEYE": np.pi, "METASHAPE_EQUISOLID": 2.0}
         return min(fold_radius(self.calibration.radial), widest.get(self.model, np.inf))
 
     def _flattened(self, points: Array) -> tuple[Array, Array]:
-        """x, y before distortion; NaN where there is none."""
+        """x, y before distortion; NaN where the point has no projection."""
         across, z = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
         with np.errstate(invalid="ignore", divide="ignore"):
             if self.model == "METASHAPE_FRAME":
@@ -167,9 +168,9 @@ class MetashapeLens:
         return points[:, 0] * factor, points[:, 1] * factor
 
     def _straightened(self, image_points: Array) -> tuple[Array, Array]:
-        """x, y before distortion of pixels (n, 2); NaN where no point is seen there."""
+        """x, y before distortion of pixels (n, 2); NaN where no ray reaches the pixel."""
         pixels = np.asarray(image_points, np.float64)
         lens = self.calibration
         bent_y = (pixels[:, 1] - lens.cy) / lens.f
         bent_x = (pixels[:, 0] - lens.cx - bent_y * lens.b2) / (lens.f + lens.b1)
-        return straightened(lens, bent_x, bent_y, self._limit)
+        return undistort(lens, bent_x, bent_y, self._limit)

@@ -1,4 +1,4 @@
-"""The lens without perspective: a telecentric one, or a photo taken from very far away."""
+"""Orthographic lens: a telecentric lens, or a photo from a large distance."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ Array = NDArray[np.float64]
 class OrthographicLens:
     """x = scale_x · X + cx, y = scale_y · Y + cy for a point (X, Y, Z) in the camera's frame.
 
-    scale_x, scale_y: pixels per scan unit; cx, cy: pixels. All its rays run along z; where each of
-    them starts is asked with :meth:`starts`.
+    scale_x, scale_y: pixels per scan unit; cx, cy: pixels. All rays run along z; :meth:`starts`
+    returns their start points.
     """
 
     scale_x: float
@@ -53,7 +53,7 @@ class OrthographicLens:
         return np.stack([self.scale_x * x + self.cx, self.scale_y * y + self.cy], axis=1)
 
     def cam_ray_from_img(self, image_points: Array) -> Array:
-        """Directions (n, 3): z, for all of them."""
+        """Directions (n, 3): z for all pixels."""
         return np.tile((0.0, 0.0, 1.0), (len(image_points), 1))
 
     def cam_from_img(self, image_points: Array) -> Array:
@@ -61,5 +61,5 @@ class OrthographicLens:
         return (image_points - (self.cx, self.cy)) / (self.scale_x, self.scale_y)
 
     def starts(self, image_points: Array) -> Array:
-        """(n, 3) points of the plane z = 0 that the pixels (n, 2) see through."""
+        """(n, 3) points on the plane z = 0 of the pixels (n, 2)."""
         return np.c_[self.cam_from_img(image_points), np.zeros(len(image_points))]

@@ -1,4 +1,5 @@
-"""Mesh files → polygons: one reader a format, none of which believes a count it has not checked."""
+"""Readers of mesh files: one module for each format. Every declared count is checked against the
+size of the file before it is used."""
 
 from .polygons import Polygons
 

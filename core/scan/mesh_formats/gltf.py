@@ -1,8 +1,8 @@
-"""glTF 2.0 (.gltf, .glb): the triangles of the default scene, in the scene's own frame.
+"""Reader for glTF 2.0 (.gltf, .glb): the triangles of the default scene, in the scene's frame.
 
-Khronos Group, glTF 2.0 specification (2021). The frame is the file's: y is up, as written; nothing
-is turned. Colours of vertices (COLOR_0) are linear there and sRGB in a Mesh; v of a texture
-coordinate goes down there and up in a Mesh.
+Khronos Group, glTF 2.0 specification (2021). The frame is that of the file, with y up; it is not
+converted. Vertex colours (COLOR_0) are linear in glTF and sRGB in a Mesh. The v texture coordinate
+points down in glTF and up in a Mesh.
 """
 
 from __future__ import annotations
@@ -18,15 +18,16 @@ from .gltf_buffers import COMPRESSED, Gltf
 from .gltf_nodes import placed_meshes
 from .polygons import Polygons
 from .precision import float32_note
-from .texture_path import MOST_TEXTURES, beside
+from .texture_path import MOST_TEXTURES, resolve_inside
 
-MOST_PARTS = 20_000
+MAX_PARTS = 20_000  # primitives of all nodes
 POINTS, LINES, TRIANGLES, STRIP, FAN = 0, (1, 2, 3), 4, 5, 6
 
 
 @dataclass(frozen=True)
 class _Part:
-    """One primitive of one node: vertices (v, 3), corners (t, 3), uv and linear colours (v, …)."""
+    """One primitive of one node: vertices (v, 3), triangles (t, 3), uv (v, 2), linear colours (v,
+    3)."""
 
     vertices: NDArray[np.float64]
     triangles: NDArray[np.int64]
@@ -36,7 +37,7 @@ class _Part:
 
 
 def read_gltf(data: bytes, path: Path) -> Polygons:
-    """The triangles of a glTF or GLB, all meshes in one. Raises InputError."""
+    """The triangles of all meshes of a glTF or GLB. Raises InputError."""
     document = Gltf(data, path)
     notes: dict[str, None] = {}
     parts = []
@@ -44,12 +45,12 @@ def read_gltf(data: bytes, path: Path) -> Polygons:
         primitives = document.member(document.entry("meshes", mesh), "primitives", list, [])
         for primitive in primitives:
             if not isinstance(primitive, dict):
-                raise document.error(f"glTF: meshes[{mesh}] has a primitive that is no object")
+                raise document.error(f"glTF: meshes[{mesh}] has a primitive that is not an object")
             part = _part(document, primitive, matrix, notes)
             if part is not None:
                 parts.append(part)
-            if len(parts) > MOST_PARTS:
-                raise document.error(f"glTF: its scene has more than {MOST_PARTS} parts")
+            if len(parts) > MAX_PARTS:
+                raise document.error(f"glTF: its scene has more than {MAX_PARTS} primitives")
     materials, textures = _materials(document, notes)
     return _joined(parts, materials, textures, tuple(notes))
 
@@ -73,15 +74,15 @@ def _part(
     if "indices" in primitive:
         corners = document.accessor(primitive["indices"], 1)[:, 0]
         if corners.dtype.kind != "u":
-            raise document.error("glTF: indices are no whole numbers")
+            raise document.error("glTF: its indices are not whole numbers")
         corners = corners.astype(np.int64)
         if len(corners) and corners.max() >= count:
-            raise document.error("glTF: an index refers to a vertex that is not there")
+            raise document.error("glTF: an index refers to a missing vertex")
     else:
         corners = np.arange(count)
     document.spend(8 * len(corners) + 24 * count)
     triangles = _triangles(corners, mode)
-    if np.linalg.det(matrix[:3, :3]) < 0:  # a mirrored node turns its faces inside out
+    if np.linalg.det(matrix[:3, :3]) < 0:  # a mirrored node reverses the orientation of its faces
         triangles = triangles[:, ::-1]
     vertices = stored.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     material = document.member(primitive, "material", int, -1)
@@ -89,12 +90,12 @@ def _part(
     uv = _of_vertices(document, attributes, f"TEXCOORD_{_uv_set(document, entry)}", 2, count)
     colours = _of_vertices(document, attributes, "COLOR_0", 3, count)
     if "JOINTS_0" in attributes or primitive.get("targets"):
-        notes["it is animated (skin or morph targets): it is read as it is at rest"] = None
+        notes["The mesh is animated (skin or morph targets). It was read in its rest pose."] = None
     return _Part(vertices, triangles, uv, colours, material)
 
 
 def _triangles(corners: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
-    """(t, 3) of a list, a strip (every second one turned) or a fan."""
+    """(t, 3) of a triangle list, a strip (every second triangle is reversed) or a fan."""
     if mode == TRIANGLES:
         return corners[: len(corners) // 3 * 3].reshape(-1, 3)
     if len(corners) < 3:
@@ -119,7 +120,7 @@ def _of_vertices(
 
 
 def _uv_set(document: Gltf, material: dict) -> int:
-    """Which texture coordinates the base colour of a material uses."""
+    """Index of the texture coordinates that the material's base colour uses."""
     texture = _base_texture(document, material)
     return document.member(texture, "texCoord", int, 0)
 
@@ -133,7 +134,7 @@ def _base_texture(document: Gltf, material: dict) -> dict:
 def _materials(
     document: Gltf, notes: dict[str, None]
 ) -> tuple[tuple[str, ...], tuple[Path | None, ...]]:
-    """Names and base colour textures, in the file's order."""
+    """(names, base colour textures), in the file's order."""
     names, textures = [], []
     for index in range(len(document.member(document.json, "materials", list, []))):
         entry = document.entry("materials", index)
@@ -145,17 +146,17 @@ def _materials(
 
 def _texture(document: Gltf, texture: dict, notes: dict[str, None]) -> Path | None:
     if "KHR_texture_transform" in document.member(texture, "extensions", dict, {}):
-        notes["it moves its textures (KHR_texture_transform): that is not followed"] = None
+        notes["The mesh transforms its textures (KHR_texture_transform), which was ignored."] = None
     source = document.entry("textures", texture.get("index")).get("source")
     if source is None:
         return None
     uri = document.member(document.entry("images", source), "uri", str, None)
     if uri is None or uri.startswith("data:"):
-        notes["its textures are inside the file and are not read"] = None
+        notes["Textures inside the mesh file were not read."] = None
         return None
-    found = beside(document.path, unquote(uri))
+    found = resolve_inside(document.path, unquote(uri))
     if found is None:
-        notes["a texture it names is not in its folder: put it there"] = None
+        notes["A texture of the mesh is not in the mesh's folder. Copy it there."] = None
     return found
 
 
@@ -166,11 +167,11 @@ def _joined(
     notes: tuple[str, ...],
 ) -> Polygons:
     if not parts:
-        nothing = np.empty(0, np.int64)
-        return Polygons(np.empty((0, 3)), nothing, nothing)
+        no_corners = np.empty(0, np.int64)
+        return Polygons(np.empty((0, 3)), no_corners, no_corners)
     sizes = [len(part.vertices) for part in parts]
-    before = np.cumsum(sizes) - sizes
-    triangles = np.concatenate([p.triangles + n for p, n in zip(parts, before, strict=True)])
+    offsets = np.cumsum(sizes) - sizes
+    triangles = np.concatenate([p.triangles + n for p, n in zip(parts, offsets, strict=True)])
     colours = uv = None
     if all(part.colours is not None for part in parts):
         colours = _srgb(np.concatenate([p.colours for p in parts if p.colours is not None]))
@@ -183,8 +184,8 @@ def _joined(
         uv[:, 1] = 1 - uv[:, 1]
     attributes = {}
     if materials:
-        numbers = [np.full(len(p.triangles), p.material, np.int32) for p in parts]
-        attributes["material"] = np.concatenate(numbers)
+        material = [np.full(len(p.triangles), p.material, np.int32) for p in parts]
+        attributes["material"] = np.concatenate(material)
     return Polygons(
         np.concatenate([part.vertices for part in parts]),
         triangles.ravel(),

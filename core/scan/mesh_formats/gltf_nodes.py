@@ -1,4 +1,4 @@
-"""The node tree of a glTF scene: which mesh stands where.
+"""The node tree of a glTF scene: meshes and their transforms.
 
 Khronos Group, glTF 2.0 specification (2021), section 3.5 (scenes, nodes, transformations).
 """
@@ -14,53 +14,55 @@ from numpy.typing import NDArray
 
 from .gltf_buffers import Gltf
 
-MOST_NODES, MOST_PLACED = 200_000, 20_000
+MAX_NODES, MAX_MESH_NODES = 200_000, 20_000
 
 
 def placed_meshes(document: Gltf) -> Iterator[tuple[Any, NDArray[np.float64]]]:
-    """(index of a mesh, its 4 × 4 matrix to the scene's frame) of every node with a mesh.
+    """(index of the mesh, 4 × 4 matrix to the scene's frame) of every node with a mesh.
 
-    The scene is the default one, else the first; a file without scenes shows every node that is no
-    other's child. A node below two others, or below itself, is refused, as the format does.
+    The scene is the default one, else the first. In a file without scenes, the roots are all nodes
+    that are not a child. A node with two parents, or below itself, raises InputError, as the format
+    requires.
     """
     nodes = document.member(document.json, "nodes", list, [])
-    if len(nodes) > MOST_NODES:
-        raise document.error(f"glTF: it has {len(nodes)} nodes, expected at most {MOST_NODES}")
-    above: dict[int, int | None] = {}
-    known: dict[int | None, NDArray[np.float64]] = {None: np.eye(4)}
-    waiting: list[tuple[Any, int | None]] = [(root, None) for root in _roots(document)]
+    if len(nodes) > MAX_NODES:
+        raise document.error(f"glTF: it has {len(nodes)} nodes; expected at most {MAX_NODES}")
+    parent_of: dict[int, int | None] = {}
+    world_matrix: dict[int | None, NDArray[np.float64]] = {None: np.eye(4)}
+    stack: list[tuple[Any, int | None]] = [(root, None) for root in _roots(document)]
     placed = 0
-    while waiting:
-        index, parent = waiting.pop()
+    while stack:
+        index, parent = stack.pop()
         node = document.entry("nodes", index)
-        if index in above:
-            raise document.error(f"glTF: nodes[{index}] stands in the tree twice")
-        above[index] = parent
+        if index in parent_of:
+            raise document.error(f"glTF: nodes[{index}] occurs twice in the tree")
+        parent_of[index] = parent
         children = document.member(node, "children", list, [])
-        waiting += [(child, index) for child in reversed(children)]
+        stack += [(child, index) for child in reversed(children)]
         if "mesh" in node:
             placed += 1
-            if placed > MOST_PLACED:
-                raise document.error(f"glTF: its scene shows more than {MOST_PLACED} meshes")
-            yield node["mesh"], _placed(document, index, above, known)
+            if placed > MAX_MESH_NODES:
+                raise document.error(f"glTF: its scene holds more than {MAX_MESH_NODES} meshes")
+            yield node["mesh"], _world_matrix(document, index, parent_of, world_matrix)
 
 
-def _placed(
+def _world_matrix(
     document: Gltf,
     index: int,
-    above: dict[int, int | None],
-    known: dict[int | None, NDArray[np.float64]],
+    parent_of: dict[int, int | None],
+    world_matrix: dict[int | None, NDArray[np.float64]],
 ) -> NDArray[np.float64]:
-    """The matrix of a node to the scene's frame; those on the way to it become known too."""
+    """The matrix of a node to the scene's frame. Adds the matrices of its ancestors to
+    ``world_matrix``."""
     chain: list[int] = []
     at: int | None = index
-    while at is not None and at not in known:
+    while at is not None and at not in world_matrix:
         chain.append(at)
-        at = above[at]
-    matrix = known[at]
+        at = parent_of[at]
+    matrix = world_matrix[at]
     for step in reversed(chain):
         matrix = matrix @ _matrix(document, document.entry("nodes", step))
-        known[step] = matrix
+        world_matrix[step] = matrix
     return matrix
 
 
@@ -80,14 +82,14 @@ def _roots(document: Gltf) -> list:
 
 
 def _matrix(document: Gltf, node: dict) -> NDArray[np.float64]:
-    """A node's own transform: a matrix (column by column), or translation, rotation, scale."""
+    """A node's own transform: a matrix (column by column), or translation, rotation and scale."""
     if "matrix" in node:
-        matrix = _numbers(document, node, "matrix", [0.0] * 16).reshape(4, 4).T
+        matrix = _number_array(document, node, "matrix", [0.0] * 16).reshape(4, 4).T
         return matrix
-    x, y, z, w = _numbers(document, node, "rotation", [0.0, 0.0, 0.0, 1.0])
+    x, y, z, w = _number_array(document, node, "rotation", [0.0, 0.0, 0.0, 1.0])
     length = math.sqrt(x * x + y * y + z * z + w * w)
     if not 1e-6 < length < 1e6:
-        raise document.error("glTF: a rotation is no quaternion")
+        raise document.error("glTF: a rotation is not a valid quaternion")
     x, y, z, w = x / length, y / length, z / length, w / length
     matrix = np.eye(4)
     matrix[:3, :3] = [
@@ -95,16 +97,18 @@ def _matrix(document: Gltf, node: dict) -> NDArray[np.float64]:
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
-    matrix[:3, :3] *= _numbers(document, node, "scale", [1.0, 1.0, 1.0])
-    matrix[:3, 3] = _numbers(document, node, "translation", [0.0, 0.0, 0.0])
+    matrix[:3, :3] *= _number_array(document, node, "scale", [1.0, 1.0, 1.0])
+    matrix[:3, 3] = _number_array(document, node, "translation", [0.0, 0.0, 0.0])
     return matrix
 
 
-def _numbers(document: Gltf, node: dict, key: str, default: list[float]) -> NDArray[np.float64]:
+def _number_array(
+    document: Gltf, node: dict, key: str, default: list[float]
+) -> NDArray[np.float64]:
     values = document.member(node, key, list, default)
-    fine = len(values) == len(default) and all(
+    valid = len(values) == len(default) and all(
         isinstance(v, (int, float)) and not isinstance(v, bool) and abs(v) < 1e30 for v in values
     )
-    if not fine:
-        raise document.error(f"glTF: {key!r} is not {len(default)} numbers")
+    if not valid:
+        raise document.error(f"glTF: {key!r} does not hold {len(default)} numbers")
     return np.array(values, np.float64)

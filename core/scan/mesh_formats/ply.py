@@ -1,4 +1,4 @@
-"""PLY, ascii and binary, as one table of bytes: an ascii body becomes binary doubles first.
+"""Reader for PLY, ascii and binary. An ascii body is first converted to binary doubles.
 
 The format: Turk, "The PLY polygon file format" (Stanford, 1994). Texture coordinates per corner
 (`property list uchar float texcoord`), `texnumber` and `comment TextureFile` as MeshLab, OpenMVS
@@ -18,7 +18,7 @@ from .ply_header import Element, Header, read_header
 from .polygons import Polygons
 from .precision import float32_note
 from .text_lines import SPACE, parse_numbers, text_bytes
-from .texture_path import beside
+from .texture_path import resolve_inside
 
 COORDINATES = ("x", "y", "z")
 COLOURS = (
@@ -51,13 +51,15 @@ def read_ply(data: bytes, path: Path) -> Polygons:
     sizes, corners = face.lists[name]
     corner_uv = _corner_uv(vertex, face, sizes, corners, notes)
     attributes = _attributes(face, header, notes)
-    enough = sizes >= 3
-    if not enough.all():
-        notes.append(f"{int((~enough).sum())} faces of fewer than 3 corners are left out")
-        kept = np.repeat(enough, sizes)
-        corners, sizes = corners[kept], sizes[enough]
+    complete = sizes >= 3
+    if not complete.all():
+        notes.append(
+            f"Faces with fewer than 3 corners that were left out: {int((~complete).sum())}."
+        )
+        kept = np.repeat(complete, sizes)
+        corners, sizes = corners[kept], sizes[complete]
         corner_uv = None if corner_uv is None else corner_uv[kept]
-        attributes = {key: values[enough] for key, values in attributes.items()}
+        attributes = {key: values[complete] for key, values in attributes.items()}
     textures = _textures(header, path, notes)
     if len(textures) > 1 and "texnumber" in attributes:
         attributes.setdefault("material", attributes["texnumber"])
@@ -75,10 +77,10 @@ def read_ply(data: bytes, path: Path) -> Polygons:
 
 
 def _as_binary(text: bytes, header: Header, path: Path) -> tuple[memoryview, tuple[Element, ...]]:
-    """An ascii body as little-endian doubles, and the elements in these terms."""
+    """(ascii body as little-endian doubles, elements with these types)."""
     text = text_bytes(text, path)
     parts = []
-    for begin in _cuts(text):
+    for begin in _pieces(text):
         chunk = np.frombuffer(text, np.uint8)[begin]
         visible = chunk > SPACE
         count = int(visible[:1].sum()) + int((visible[1:] & ~visible[:-1]).sum())
@@ -87,7 +89,7 @@ def _as_binary(text: bytes, header: Header, path: Path) -> tuple[memoryview, tup
             offset = begin.start
             line = header.lines + text.count(b"\n", 0, offset) + 1
             raise InputError(
-                "expected numbers, found something else (here or in the lines below)",
+                "expected numbers; found other text (on this line or below)",
                 file=path,
                 line=line,
             )
@@ -96,8 +98,8 @@ def _as_binary(text: bytes, header: Header, path: Path) -> tuple[memoryview, tup
     return memoryview(flat.data).cast("B"), tuple(e.in_doubles() for e in header.elements)
 
 
-def _cuts(text: bytes, chunk: int = 4 << 20) -> list[slice]:
-    """Pieces of a text that end at blanks."""
+def _pieces(text: bytes, chunk: int = 4 << 20) -> list[slice]:
+    """Slices of a text that end at line breaks."""
     pieces, begin = [], 0
     while begin < len(text):
         end = text.find(b"\n", begin + chunk)
@@ -108,7 +110,7 @@ def _cuts(text: bytes, chunk: int = 4 << 20) -> list[slice]:
 
 
 def _tables(body: memoryview, elements: tuple[Element, ...], path: Path) -> dict[str, Table]:
-    """The vertices and faces; elements that stand before them are passed over."""
+    """The vertex and face tables. Elements before them are skipped."""
     wanted, tables, place = {"vertex", "face"}, {}, 0
     for element in elements:
         tables[element.name], place = read_table(body, place, element, path)
@@ -120,12 +122,12 @@ def _tables(body: memoryview, elements: tuple[Element, ...], path: Path) -> dict
 def _vertices(vertex: Table, path: Path) -> NDArray[np.float64]:
     missing = [axis for axis in COORDINATES if axis not in vertex.scalars]
     if missing:
-        raise InputError(f"its vertices have no property {missing[0]!r}", file=path)
+        raise InputError(f"its vertices lack the property {missing[0]!r}", file=path)
     return np.stack([vertex.scalars[axis].astype(np.float64) for axis in COORDINATES], axis=1)
 
 
 def _colours(vertex: Table, declared: dict[str, str]) -> NDArray[np.uint8] | None:
-    """(v, 3) colours: whole numbers of 8 or 16 bits, or floats in 0…1."""
+    """(v, 3) uint8 colours, from integers of 8 or 16 bits or floats in 0…1."""
     for names in COLOURS:
         if all(name in vertex.scalars for name in names):
             rgb = np.stack([vertex.scalars[name].astype(np.float64) for name in names], axis=1)
@@ -144,24 +146,26 @@ def _corner_uv(
     corners: NDArray[np.int64],
     notes: list[str],
 ) -> NDArray[np.float32] | None:
-    """(c, 2) texture coordinates: of the corners, or of their vertices."""
+    """(c, 2) texture coordinates of the corners, or of their vertices."""
     if "texcoord" in face.lists:
         counts, values = face.lists["texcoord"]
         if (counts == 2 * sizes).all():
             return values.reshape(-1, 2).astype(np.float32)
-        notes.append("its texcoord lists do not hold two numbers a corner: not read")
+        notes.append(
+            "The texcoord lists of the mesh do not hold two values per corner; they were not read."
+        )
     for names in VERTEX_UV:
         if all(name in vertex.scalars for name in names):
             inside = (corners >= 0) & (corners < vertex.count)
             if not inside.all():
-                return None  # refused later, with its own words
+                return None  # rejected later by Polygons.check
             uv = np.stack([vertex.scalars[n].astype(np.float32) for n in names], axis=1)
             return np.asarray(uv[corners])
     return None
 
 
 def _attributes(face: Table, header: Header, notes: list[str]) -> dict[str, NDArray[np.int32]]:
-    """Properties of the faces that are declared as whole numbers."""
+    """Integer properties of the faces."""
     element = next(e for e in header.elements if e.name == "face")
     found = {}
     for prop in element.properties:
@@ -172,14 +176,16 @@ def _attributes(face: Table, header: Header, notes: list[str]) -> dict[str, NDAr
         if len(values) and (
             (whole != values).any() or whole.min() < -(2**31) or whole.max() >= 2**31
         ):
-            notes.append(f"its face property {prop.name!r} holds no 32-bit numbers: not read")
+            notes.append(
+                f"The face property {prop.name!r} does not fit into 32 bits; it was not read."
+            )
             continue
         found[prop.name] = whole.astype(np.int32)
     return found
 
 
 def _textures(header: Header, path: Path, notes: list[str]) -> tuple[Path | None, ...]:
-    textures = tuple(beside(path, name) for name in header.textures)
+    textures = tuple(resolve_inside(path, name) for name in header.textures)
     if any(texture is None for texture in textures):
-        notes.append("a texture it names is not in its folder: put it there")
+        notes.append("A texture of the mesh is not in the mesh's folder. Copy it there.")
     return textures if any(textures) else ()

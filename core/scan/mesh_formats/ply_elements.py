@@ -1,4 +1,4 @@
-"""The rows of one element of a binary PLY, as columns."""
+"""Read the rows of one element of a binary PLY as columns."""
 
 from __future__ import annotations
 
@@ -14,36 +14,37 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from .ply_header import Element, Property
 
-LETTERS = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q",
-           "f4": "f", "f8": "d"}  # fmt: skip
+STRUCT_CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q",
+                "u8": "Q", "f4": "f", "f8": "d"}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Table:
-    """scalars: property → (n,); lists: property → (lengths (n,), values of all rows in one)."""
+    """scalars: property → (n,); lists: property → (lengths (n,), values of all rows
+    concatenated)."""
 
     count: int
     scalars: dict[str, NDArray]
     lists: dict[str, tuple[NDArray[np.int64], NDArray]]
 
 
-def read_table(body: memoryview, place: int, element: Element, path: Path) -> tuple[Table, int]:
-    """The element whose first row stands at byte ``place``, and where the next one begins. Raises
-    InputError where fewer bytes are left than the rows need."""
+def read_table(body: memoryview, start: int, element: Element, path: Path) -> tuple[Table, int]:
+    """(the element whose first row starts at byte ``start``, start of the next element). Raises
+    InputError where the file is too short for the rows."""
     if not element.properties:
-        return Table(element.count, {}, {}), place
-    least = sum(np.dtype(p.count_type or p.type).itemsize for p in element.properties)
-    if element.count * least > len(body) - place:
+        return Table(element.count, {}, {}), start
+    min_row_bytes = sum(np.dtype(p.count_type or p.type).itemsize for p in element.properties)
+    if element.count * min_row_bytes > len(body) - start:
         raise _truncated(element, path)
     if not any(p.count_type for p in element.properties):
-        rows = np.frombuffer(body, _layout(element, {}), element.count, place)
+        rows = np.frombuffer(body, _layout(element, {}), element.count, start)
         table = Table(element.count, {p.name: rows[p.name] for p in element.properties}, {})
-        return table, place + rows.nbytes
-    return _alike(body, place, element) or _walk(body, place, element, path)
+        return table, start + rows.nbytes
+    return _read_uniform(body, start, element) or _read_ragged(body, start, element, path)
 
 
 def _layout(element: Element, lengths: dict[str, int]) -> np.dtype:
-    """A packed row, where every list has the length given."""
+    """The dtype of a packed row whose lists have the given lengths."""
     fields: list[tuple] = []
     for i, p in enumerate(element.properties):
         if p.count_type is None:
@@ -53,12 +54,13 @@ def _layout(element: Element, lengths: dict[str, int]) -> np.dtype:
     return np.dtype(fields)
 
 
-def _alike(body: memoryview, place: int, element: Element) -> tuple[Table, int] | None:
-    """The table where all rows have lists as long as the first row's, as all triangles have."""
+def _read_uniform(body: memoryview, start: int, element: Element) -> tuple[Table, int] | None:
+    """The table where all lists are as long as in the first row (as with triangles); None
+    otherwise."""
     if not element.count:
         return Table(0, {}, {p.name: (np.empty(0, np.int64), np.empty(0)) for p in
-                             element.properties if p.count_type}), place  # fmt: skip
-    lengths, at = {}, place
+                             element.properties if p.count_type}), start  # fmt: skip
+    lengths, at = {}, start
     for p in element.properties:
         kind = np.dtype(p.count_type or p.type)
         if at + kind.itemsize > len(body):
@@ -70,9 +72,9 @@ def _alike(body: memoryview, place: int, element: Element) -> tuple[Table, int] 
             lengths[p.name] = int(count)
             at += int(count) * np.dtype(p.type).itemsize
         at += kind.itemsize
-    if (at - place) * element.count > len(body) - place or at - place > 1 << 20:
+    if (at - start) * element.count > len(body) - start or at - start > 1 << 20:
         return None
-    rows = np.frombuffer(body, _layout(element, lengths), element.count, place)
+    rows = np.frombuffer(body, _layout(element, lengths), element.count, start)
     scalars, lists = {}, {}
     for i, p in enumerate(element.properties):
         if p.count_type is None:
@@ -84,31 +86,37 @@ def _alike(body: memoryview, place: int, element: Element) -> tuple[Table, int] 
                 np.full(element.count, lengths[p.name], np.int64),
                 _values(rows[p.name].reshape(-1), p.declared),
             )
-    return Table(element.count, scalars, lists), place + rows.nbytes
+    return Table(element.count, scalars, lists), start + rows.nbytes
 
 
-def _walk(body: memoryview, place: int, element: Element, path: Path) -> tuple[Table, int]:
-    """The table of rows of different lengths: one step of Python a list."""
+def _read_ragged(body: memoryview, start: int, element: Element, path: Path) -> tuple[Table, int]:
+    """The table of rows with different lengths, with one Python step for each list."""
     lists: list[_List] = []
-    before = 0  # bytes of scalars since the row's beginning or its last list
-    scalars = {}  # name → (lists before it, bytes behind the last of them)
+    before = 0  # bytes of scalars since the start of the row or the last list
+    scalars = {}  # name → (number of lists before it, bytes after the last of them)
     for p in element.properties:
         size = np.dtype(p.type).itemsize
         if p.count_type is None:
             scalars[p.name] = (len(lists), before)
             before += size
         else:
-            lists.append(_List(before, struct.Struct(p.count_type[0] + LETTERS[p.count_type[1:]]),
-                               size, p))  # fmt: skip
+            lists.append(
+                _List(
+                    before,
+                    struct.Struct(p.count_type[0] + STRUCT_CODES[p.count_type[1:]]),
+                    size,
+                    p,
+                )
+            )
             before = 0
-    counts, end = _list_lengths(body, place, element, lists, before, path)
-    # where the parts of each row begin: the part up to and with each list, and the tail
+    counts, end = _list_lengths(body, start, element, lists, before, path)
+    # start of each part of a row: one part up to and including each list, and the tail
     lengths = np.empty((element.count, len(lists) + 1), np.int64)
     for k, one in enumerate(lists):
         lengths[:, k] = one.before + one.form.size + counts[:, k] * one.size
     lengths[:, -1] = before
     ends = np.cumsum(lengths.ravel()).reshape(lengths.shape)
-    starts = ends - lengths + place
+    starts = ends - lengths + start
     raw = np.frombuffer(body, np.uint8)
     types = {p.name: p.type for p in element.properties}
     columns = {
@@ -126,7 +134,7 @@ def _walk(body: memoryview, place: int, element: Element, path: Path) -> tuple[T
 
 
 class _List(NamedTuple):
-    """Bytes before the count, the count's form, bytes of a value."""
+    """before: bytes before the count; form: struct of the count; size: bytes of a value."""
 
     before: int
     form: struct.Struct
@@ -135,16 +143,16 @@ class _List(NamedTuple):
 
 
 def _list_lengths(
-    body: memoryview, place: int, element: Element, lists: list[_List], tail: int, path: Path
+    body: memoryview, start: int, element: Element, lists: list[_List], tail_bytes: int, path: Path
 ) -> tuple[NDArray[np.int64], int]:
-    """(n, lists) the length of every list, and where the rows end."""
+    """((n, lists) length of every list, end of the rows)."""
     lengths, total = array("q"), len(body)
-    append, at = lengths.append, place
+    append, at = lengths.append, start
     steps = [(one.before, one.form.unpack_from, one.form.size, one.size) for one in lists]
     try:
         if len(steps) == 1 and lists[0].form.format in ("<B", ">B"):
             before, _, _, size = steps[0]
-            more = before + 1 + tail
+            more = before + 1 + tail_bytes
             for _ in range(element.count):
                 count = body[at + before]
                 append(count)
@@ -158,7 +166,7 @@ def _list_lengths(
                         raise _truncated(element, path)
                     append(count)
                     at += width + count * size
-                at += tail
+                at += tail_bytes
     except (struct.error, IndexError, ValueError, OverflowError) as error:
         raise _truncated(element, path) from error
     if at > total:
@@ -167,7 +175,7 @@ def _list_lengths(
 
 
 def _gather(raw: NDArray[np.uint8], places: NDArray[np.int64], kind: str) -> NDArray:
-    """(n,) the numbers of one type that begin at those bytes."""
+    """(n,) the values of one type that start at those bytes."""
     size = np.dtype(kind).itemsize
     packed = np.empty((len(places), size), np.uint8)
     for k in range(size):
@@ -176,7 +184,7 @@ def _gather(raw: NDArray[np.uint8], places: NDArray[np.int64], kind: str) -> NDA
 
 
 def _values(values: NDArray, declared: str) -> NDArray:
-    """Whole numbers as int64 (-1 where a double cannot be one), others as they are."""
+    """Integers as int64 (−1 where a double is not an integer), floats unchanged."""
     if declared[0] == "f":
         return values
     if values.dtype.kind == "f":
@@ -187,7 +195,8 @@ def _values(values: NDArray, declared: str) -> NDArray:
 
 def _truncated(element: Element, path: Path) -> InputError:
     return InputError(
-        f"is truncated: its header says {element.count} elements of kind {element.name[:40]!r}, "
-        "and there is not enough for them",
+        f"is truncated: its header declares {element.count} elements of type "
+        f"{element.name[:40]!r}, "
+        "which do not fit into the file",
         file=path,
     )

@@ -1,7 +1,8 @@
-"""STL, binary and ascii: a soup of triangles, joined where their corners agree in every bit.
+"""Reader for STL, binary and ascii: separate triangles, joined where their corners are equal in
+every bit.
 
 The StereoLithography Interface Specification (3D Systems, 1989). A file is binary where its size is
-the one its count asks for: many binary files begin with the word "solid" too.
+the one its count implies, because many binary files begin with the word "solid" too.
 """
 
 from __future__ import annotations
@@ -17,29 +18,29 @@ from .polygons import Polygons
 from .precision import float32_note
 from .text_lines import TextLines, text_bytes
 
-HEADER, RECORD = 84, 50
+HEADER_BYTES, TRIANGLE_BYTES = 84, 50
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def read_stl(data: bytes, path: Path) -> Polygons:
     """The triangles of an STL. Raises InputError."""
     is_text = data[:512].lstrip()[:5].lower() == b"solid"
-    if len(data) >= HEADER:
+    if len(data) >= HEADER_BYTES:
         (count,) = struct.unpack_from("<I", data, 80)
-        needed = HEADER + RECORD * count
-        # less than a triangle may be left over: some programs end their files with a word
-        if needed == len(data) or (not is_text and needed < len(data) < needed + RECORD):
-            triangles = np.frombuffer(data, TRIANGLE, count, HEADER)
+        needed = HEADER_BYTES + TRIANGLE_BYTES * count
+        # a rest shorter than a triangle is accepted: some programs append a word
+        if needed == len(data) or (not is_text and needed < len(data) < needed + TRIANGLE_BYTES):
+            triangles = np.frombuffer(data, TRIANGLE, count, HEADER_BYTES)
             stored = triangles["corners"].reshape(-1, 3)
             return _soup(stored.astype(np.float64), float32_note(stored))
         if not is_text:
             raise InputError(
-                f"its header says {count} triangles, which take {needed} bytes; the file has "
-                f"{len(data)}: it is truncated or no STL",
+                f"its header declares {count} triangles, which take {needed} bytes; the file has "
+                f"{len(data)}: it is truncated or not an STL file",
                 file=path,
             )
     if not is_text:
-        raise InputError("is truncated or no STL", file=path)
+        raise InputError("is truncated or not an STL file", file=path)
     return _ascii(data, path)
 
 
@@ -49,7 +50,7 @@ def _ascii(data: bytes, path: Path) -> Polygons:
     corners = lines.starting_with(b"vertex")
     if not len(lines.starting_with(b"endsolid")) or len(facets) != len(ends):
         raise InputError("is truncated: it ends within a solid", file=path)
-    # every facet: three vertices between its first line and its last
+    # each facet has three vertices between its first and last line
     owner = np.searchsorted(facets, corners) - 1
     if len(corners) != 3 * len(facets) or (owner != np.repeat(np.arange(len(facets)), 3)).any():
         raise InputError("a facet does not have three vertices", file=path)

@@ -1,4 +1,4 @@
-"""Numbers from the lines of a large text, without a Python object for each line."""
+"""Read numbers from the lines of a large text without a Python object for each line."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 
-CHUNK = 4 << 20  # bytes looked at together
-DEEPEST = 64  # blanks before the first word of a line
+CHUNK_BYTES = 4 << 20  # processed together
+MAX_INDENT = 64  # spaces or tabs before the first word of a line
 SPACE, TAB, NEWLINE = 32, 9, 10
 
 
 def text_bytes(data: bytes, path: Path) -> bytes:
-    """The text with line breaks of one kind. Raises InputError for UTF-16 and for binary data."""
+    """The text with uniform line breaks. Raises InputError for UTF-16 and for binary data."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise InputError("is UTF-16 text; save it as UTF-8", file=path)
     if b"\0" in data:
-        raise InputError("is not text (it holds zero bytes); the file is damaged", file=path)
+        raise InputError("is not text (it contains zero bytes); the file is damaged", file=path)
     data = data.removeprefix(b"\xef\xbb\xbf")
     if b"\r" in data and b"\n" not in data:
         data = data.replace(b"\r", b"\n")
@@ -31,35 +31,36 @@ def text_bytes(data: bytes, path: Path) -> bytes:
 
 
 class TextLines:
-    """Lines of a text and the first visible byte of each."""
+    """The lines of a text and the first visible byte of each."""
 
     def __init__(self, data: bytes, path: Path) -> None:
         self.data, self.path = data, path
         self.bytes = np.frombuffer(data, np.uint8)
         breaks = [
-            np.flatnonzero(self.bytes[begin : begin + CHUNK] == NEWLINE) + begin
-            for begin in range(0, len(data), CHUNK)
+            np.flatnonzero(self.bytes[begin : begin + CHUNK_BYTES] == NEWLINE) + begin
+            for begin in range(0, len(data), CHUNK_BYTES)
         ]
         ends = np.concatenate([*breaks, [len(data)]]).astype(np.int64)
         self.starts = np.concatenate([[0], ends[:-1] + 1])
-        self.edges = np.append(self.starts, len(data) + 1)  # of line i: edges[i] … edges[i + 1]
+        self.edges = np.append(self.starts, len(data) + 1)  # line i is edges[i] … edges[i + 1]
 
     @cached_property
     def first(self) -> NDArray[np.int64]:
-        """(n,) place of the first visible byte of each line; of an empty line, of a later one."""
+        """(n,) offset of the first visible byte of each line; for an empty line, that of a later
+        line."""
         first = self.starts.copy()
-        waiting = np.arange(len(first))
-        for _ in range(DEEPEST):
-            waiting = waiting[first[waiting] < len(self.data)]
-            letter = self.bytes[first[waiting]]
-            waiting = waiting[(letter == SPACE) | (letter == TAB)]
-            if not len(waiting):
+        pending = np.arange(len(first))
+        for _ in range(MAX_INDENT):
+            pending = pending[first[pending] < len(self.data)]
+            letter = self.bytes[first[pending]]
+            pending = pending[(letter == SPACE) | (letter == TAB)]
+            if not len(pending):
                 break
-            first[waiting] += 1
+            first[pending] += 1
         return first
 
     def starting_with(self, word: bytes) -> NDArray[np.intp]:
-        """Numbers of the lines whose first word it is."""
+        """Indices of the lines whose first word is ``word``."""
         n = len(self.data)
         found = np.arange(len(self.first))
         for k, letter in enumerate(word):
@@ -71,17 +72,17 @@ class TextLines:
         return np.asarray(found[ended | blank])
 
     def line(self, number: int) -> bytes:
-        """A line without its break."""
+        """A line without its line break."""
         return self.data[self.edges[number] : self.edges[number + 1] - 1].strip()
 
     def chunks(
         self, lines: NDArray[np.intp], word: bytes
     ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.uint8], NDArray[np.int64]]]:
-        """(lines, text, edges of those lines in it): a few of ``lines`` at a time; the text has
-        blanks for ``word`` at their beginning and for the lines between."""
+        """(lines, text, edges of the lines in that text), for successive parts of ``lines``. In the
+        text, ``word`` at the start of lines and all lines between are replaced with spaces."""
         begin = 0
         while begin < len(lines):
-            stop = np.searchsorted(self.starts, self.starts[lines[begin]] + CHUNK)
+            stop = np.searchsorted(self.starts, self.starts[lines[begin]] + CHUNK_BYTES)
             end = max(int(np.searchsorted(lines, stop)), begin + 1)
             these = lines[begin:end]
             low, high = int(these[0]), int(these[-1]) + 1
@@ -98,10 +99,11 @@ class TextLines:
             begin = end
 
     def floats(
-        self, lines: NDArray[np.intp], word: bytes, least: int
+        self, lines: NDArray[np.intp], word: bytes, min_count: int
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """All numbers behind ``word`` in these lines, one after the other, and how many stand in
-        each (n,). Raises InputError with the line that holds none or fewer than ``least``."""
+        """All numbers after ``word`` in these lines, concatenated, and the number of them in each
+        line (n,). Raises InputError for a line with other text or fewer than ``min_count`` numbers.
+        """
         values, counts = [], []
         for these, text, edges in self.chunks(lines, word):
             visible = text > SPACE
@@ -109,8 +111,10 @@ class TextLines:
             starts[1:] &= ~visible[:-1]
             places = np.flatnonzero(starts)
             count = np.searchsorted(places, edges[1]) - np.searchsorted(places, edges[0])
-            if (count < least).any():
-                self.refuse(int(these[np.argmax(count < least)]), f"at least {least} numbers")
+            if (count < min_count).any():
+                self.refuse(
+                    int(these[np.argmax(count < min_count)]), f"at least {min_count} numbers"
+                )
             parsed = parse_numbers(text, len(places), np.float64)
             if parsed is None:
                 self._refuse_first(these, word)
@@ -123,22 +127,22 @@ class TextLines:
     def table(
         self, lines: NDArray[np.intp], word: bytes, columns: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-        """(n, columns) the first numbers of every line, and all of them (n, k) where every line
-        has the same number of them."""
+        """(n, columns) the first numbers of every line, and all numbers (n, k) where every line has
+        the same count."""
         values, counts = self.floats(lines, word, columns)
         if not len(counts):
             return np.empty((0, columns)), None
         if (counts == counts[0]).all():
-            every = values.reshape(len(counts), -1)
-            return every[:, :columns], every
+            all_values = values.reshape(len(counts), -1)
+            return all_values[:, :columns], all_values
         starts = np.cumsum(counts) - counts
         return values[starts[:, None] + np.arange(columns)], None
 
     def refuse(self, line: int, expected: str) -> NoReturn:
-        """Raise the InputError of a line."""
+        """Raise an InputError about a line."""
         found = self.line(line)[:60].decode("utf-8", "replace")
         found = "".join(c if c.isprintable() else "?" for c in found)
-        raise InputError(f"expected {expected}, found {found!r}", file=self.path, line=line + 1)
+        raise InputError(f"found {found!r}; expected {expected}", file=self.path, line=line + 1)
 
     def _refuse_first(self, lines: NDArray[np.intp], word: bytes) -> NoReturn:
         for line in lines:
@@ -147,18 +151,18 @@ class TextLines:
                     float(token)
             except ValueError:
                 self.refuse(int(line), "numbers")
-        self.refuse(int(lines[0]), "numbers (here or in the lines below)")
+        self.refuse(int(lines[0]), "numbers (on this line or below)")
 
 
 def parse_numbers(
     text: NDArray[np.uint8], count: int, dtype: type[np.float64] | type[np.int64]
 ) -> NDArray | None:
-    """The ``count`` numbers of a text with blanks between them; None where it holds anything
+    """The ``count`` numbers of a text, separated by white space; None where it contains anything
     else."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)
-            # the last number is ours: it is reached only where all before it were numbers
+            # the appended number is parsed only if all text before it was numbers
             values = np.fromstring(text.tobytes() + b" 7", dtype, count + 1, sep=" ")
     except ValueError:
         return None

@@ -1,7 +1,7 @@
-"""Polygons → triangles: ears are cut off many polygons at once.
+"""Triangulate many polygons at once by ear clipping.
 
-Ear clipping: Meisters, "Polygons have ears", American Mathematical Monthly 82(6), 1975; that only
-the two neighbours of an ear change when it is cut: O'Rourke, "Computational Geometry in C", 1998.
+Ear clipping: Meisters, "Polygons have ears", American Mathematical Monthly 82(6), 1975. When an ear
+is cut, only its two neighbours change: O'Rourke, "Computational Geometry in C", 1998.
 """
 
 from __future__ import annotations
@@ -9,14 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-CUT = -4.0  # the score of a corner that is no more there; others lie between -3 and 1
-NO_EAR = -2.0
+CUT_SCORE = -4.0  # score of a removed corner; other scores are between -3 and 1
+NO_EAR_OFFSET = -2.0  # added to the score of a corner that is not an ear
 
 
 def plane_coordinates(rings: NDArray[np.float64]) -> NDArray[np.float64]:
     """(m, n, 2) corners of polygons (m, n, 3) in their mean planes, counter-clockwise.
 
-    The plane is that of Newell's normal (Sutherland, Sproull & Schumacker 1974).
+    The plane's normal is Newell's (Sutherland, Sproull & Schumacker 1974).
     """
     local = rings - rings[:, :1]
     normal = np.cross(local, np.roll(local, -1, axis=1)).sum(axis=1)
@@ -30,20 +30,19 @@ def plane_coordinates(rings: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def is_convex(flat: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(m,) which of counter-clockwise polygons (m, n, 2) turn left at every corner (or hardly
-    turn)."""
+    """(m,) whether counter-clockwise polygons (m, n, 2) turn left at every corner, within 1e-9."""
     before = flat - np.roll(flat, 1, axis=1)
     turn = _cross(before, np.roll(before, -1, axis=1))
-    slack = 1e-9 * np.max(np.sum(before**2, axis=2), axis=1)
-    return np.asarray((turn >= -slack[:, None]).all(axis=1))
+    tolerance = 1e-9 * np.max(np.sum(before**2, axis=2), axis=1)
+    return np.asarray((turn >= -tolerance[:, None]).all(axis=1))
 
 
 def ear_clip(flat: NDArray[np.float64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(m, n − 2, 3) triangles of counter-clockwise simple polygons, each of the first ``sizes``
-    (m,) of its corners (m, n, 2); of a polygon of s corners the first s − 2 rows count.
+    """(m, n − 2, 3) triangles of counter-clockwise simple polygons; each uses the first ``sizes``
+    (m,) of its corners (m, n, 2). For a polygon of s corners the first s − 2 rows are valid.
 
-    Of a polygon's ears the one nearest to an equilateral triangle goes first. A polygon that cuts
-    itself has times without an ear: the most convex corner is cut then.
+    The ear nearest to an equilateral triangle is cut first. Where a self-intersecting polygon has
+    no ear, the most convex corner is cut.
     """
     triangles = np.zeros((len(flat), flat.shape[1] - 2, 3), np.int64)
     _Rings(flat, sizes).clip(triangles)
@@ -51,7 +50,7 @@ def ear_clip(flat: NDArray[np.float64], sizes: NDArray[np.int64]) -> NDArray[np.
 
 
 class _Rings:
-    """Polygons as linked lists of the corners that are left, with a score for each corner."""
+    """Polygons as linked lists of the remaining corners, with a score for each corner."""
 
     def __init__(self, flat: NDArray[np.float64], sizes: NDArray[np.int64]) -> None:
         m, n = flat.shape[:2]
@@ -60,13 +59,13 @@ class _Rings:
         self.there = place < sizes[:, None]
         self.before = np.where(place > 0, place - 1, sizes[:, None] - 1)
         self.after = np.where(place < sizes[:, None] - 1, place + 1, 0)
-        self.score = np.full((m, n), CUT)
+        self.score = np.full((m, n), CUT_SCORE)
         rows = np.arange(m)
         for k in range(n):
             self._rate(rows[self.there[:, k]], np.full(int(self.there[:, k].sum()), k))
 
     def clip(self, triangles: NDArray[np.int64]) -> None:
-        """Fill in the triangles, the last one included."""
+        """Fill in all triangles."""
         rows = np.arange(len(self.flat))
         for cut in range(self.flat.shape[1] - 2):
             rows = rows[self.left[rows] > 2]
@@ -74,15 +73,15 @@ class _Rings:
             before, after = self.before[rows, ear], self.after[rows, ear]
             triangles[rows, cut] = np.stack([before, ear, after], axis=1)
             self.there[rows, ear] = False
-            self.score[rows, ear] = CUT
+            self.score[rows, ear] = CUT_SCORE
             self.left[rows] -= 1
             self.after[rows, before], self.before[rows, after] = after, before
             for neighbour in (before, after):
                 self._rate(rows, neighbour)
 
     def _rate(self, rows: NDArray[np.intp], corner: NDArray[np.intp]) -> None:
-        """Score one corner of each of those polygons: the shape of its triangle, less where that
-        is no ear."""
+        """Score one corner of each of those polygons: the shape of its triangle, lowered where it
+        is not an ear."""
         b = self.flat[rows, corner]
         a, c = (self.flat[rows, link[rows, corner]] for link in (self.before, self.after))
         area = _cross(b - a, c - b)
@@ -91,7 +90,7 @@ class _Rings:
         ear = area > 0
         these = np.flatnonzero(ear)
         ear[these] = ~self._holds_a_corner(rows[these], a[these], b[these], c[these])
-        self.score[rows, corner] = np.where(ear, 0.0, NO_EAR) + shape
+        self.score[rows, corner] = np.where(ear, 0.0, NO_EAR_OFFSET) + shape
 
     def _holds_a_corner(
         self,
@@ -100,7 +99,7 @@ class _Rings:
         b: NDArray[np.float64],
         c: NDArray[np.float64],
     ) -> NDArray[np.bool_]:
-        """Whether those triangles hold another corner of their polygons."""
+        """Whether those triangles contain another corner of their polygons."""
         x, y = self.flat[rows, :, 0], self.flat[rows, :, 1]
         inside = self.there[rows]
         for p, q in ((a, b), (b, c), (c, a)):

@@ -1,1 +1,1 @@
-"""What the readers share: files opened without believing them, labels, sizes, sparse points."""
+"""Helpers shared by the readers: bounded file access, labels, photo sizes, sparse points."""

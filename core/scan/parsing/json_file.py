@@ -1,4 +1,4 @@
-"""JSON of a reconstruction tool, opened without believing it."""
+"""Open a reconstruction tool's JSON, within limits on its size."""
 
 from __future__ import annotations
 
@@ -8,19 +8,20 @@ from typing import Any
 
 from ...errors import InputError
 
-LARGEST = 1 << 30  # bytes: Meshroom's .sfm with features' colours has some hundred MB
+MAX_FILE_BYTES = 1 << 30  # Meshroom's .sfm with feature colours has some hundred MB
 
 
-def read_json(path: Path, largest: int = LARGEST, what: str = "a file of cameras") -> Any:
-    """What the file says; largest: bytes. Raises InputError naming file and line."""
+def read_json(path: Path, max_bytes: int = MAX_FILE_BYTES, what: str = "a file of cameras") -> Any:
+    """The parsed content of a file of at most ``max_bytes``. Raises InputError with file and
+    line."""
     try:
-        if path.stat().st_size > largest:
+        if path.stat().st_size > max_bytes:
             raise InputError(f"is too large for {what}", file=path)
         with open(path, "rb") as opened:
-            text = opened.read(largest + 1).decode("utf-8-sig")
+            text = opened.read(max_bytes + 1).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError("is not a text in UTF-8", file=path) from error
-    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
+        raise InputError("is not UTF-8 text", file=path) from error
+    except (OSError, ValueError) as error:  # ValueError: the path contains a zero byte
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"cannot be read ({reason})", file=path) from error
     try:
@@ -29,7 +30,10 @@ def read_json(path: Path, largest: int = LARGEST, what: str = "a file of cameras
         raise InputError(
             f"is not valid JSON ({error.msg})", file=path, line=error.lineno
         ) from error
-    except (RecursionError, ValueError) as error:  # nested, or a number, beyond all bounds
+    except (
+        RecursionError,
+        ValueError,
+    ) as error:  # nested too deep, or an integer with too many digits
         raise InputError(
-            "is not a JSON that any tool writes (nested too deep)", file=path
+            "is nested too deep; expected the JSON of a reconstruction tool", file=path
         ) from error

@@ -1,5 +1,5 @@
-"""JSON of a reconstruction tool, asked for what it should hold: each answer is of the type, the
-length and the finiteness expected, or an InputError that names file and key."""
+"""Typed access to a reconstruction tool's JSON. Each accessor checks type, length and finiteness,
+and raises InputError with file and key."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from ...errors import InputError
 
 Array = NDArray[np.float64]
 
-LARGEST_WHOLE = 1 << 53  # beyond it a JSON number is no exact integer
-BEYOND = 1e100  # no tool writes such a number; its square would be beyond floats
+MAX_EXACT_INTEGER = 1 << 53  # larger JSON numbers are not exact integers in double precision
+MAX_MAGNITUDE = 1e100  # values above it are rejected: their squares may overflow a double
 
 
 @dataclass(frozen=True)
 class Record:
-    """An object of the file: ``where`` says which ("frames[3]"; "" for the file itself)."""
+    """An object of the file. ``where``: its key path ("frames[3]"; "" for the root)."""
 
     values: dict[str, Any]
     file: Path
@@ -36,7 +36,7 @@ class Record:
         return InputError(message, file=self.file, key=self._key(key) or None)
 
     def number(self, key: str, default: float | None = None) -> float:
-        """A finite number; one in quotes too (Boost's writer quotes all of them)."""
+        """A finite number, also in quotes (Boost's writer quotes all numbers)."""
         value = self.values.get(key)
         if value is None and default is not None:
             return default
@@ -46,16 +46,17 @@ class Record:
         return number
 
     def whole(self, key: str, default: int | None = None) -> int:
-        """A whole number, not negative."""
+        """A whole number that is not negative."""
         number = self.number(key, default)
-        if number != int(number) or not 0 <= number <= LARGEST_WHOLE:
-            raise self.error(f"is {number:g}; expected a whole number, not negative", key)
+        if number != int(number) or not 0 <= number <= MAX_EXACT_INTEGER:
+            raise self.error(f"is {number:g}; expected a whole number of 0 or more", key)
         return int(number)
 
     def identity(self, key: str) -> str:
-        """What another object refers to this one by, in whatever type it was written; "" without.
+        """The id of an object or of a reference, whatever type it was written in; "" where it is
+        missing.
 
-        As text, because ids go beyond what a float can tell apart.
+        Returned as text, because ids exceed what a float represents exactly.
         """
         value = self.values.get(key)
         if value is None:
@@ -65,21 +66,21 @@ class Record:
         return str(value)[:200]
 
     def flag(self, key: str) -> bool:
-        """A truth value, in quotes or as a number too; False where it is missing."""
+        """A truth value, also in quotes or as a number; False where it is missing."""
         value = self.values.get(key, False)
         if isinstance(value, (list, dict)):
             raise self.error(f"is {shown(value)}; expected true or false", key)
         return value not in (False, None, 0, "", "0", "false", "False")
 
     def text(self, key: str, default: str | None = None) -> str:
-        """A text."""
+        """A string."""
         value = self.values.get(key, default)
         if not isinstance(value, str):
-            raise self.error(f"is {shown(value)}; expected a text", key)
+            raise self.error(f"is {shown(value)}; expected text", key)
         return value
 
     def numbers(self, key: str, *counts: int, default: Array | None = None) -> Array:
-        """Finite numbers in a list, nested or not, as many as one of ``counts``; flat."""
+        """(n,) finite numbers of a list, nested or not. n: one of ``counts``."""
         if key not in self.values and default is not None:
             return default
         value = self.values.get(key)
@@ -91,7 +92,7 @@ class Record:
         return np.array(found, np.float64)
 
     def record(self, key: str) -> Record:
-        """An object within this one."""
+        """A nested object."""
         return self._as_record(self.values.get(key), key)
 
     def records(self, key: str) -> list[Record]:
@@ -104,13 +105,13 @@ class Record:
         return [self._as_record(item, f"{key}[{i}]") for i, item in enumerate(value)]
 
     def items(self, key: str) -> Iterator[tuple[str, Record]]:
-        """Objects by name."""
+        """(name, object) of each member of a nested object."""
         for name, value in self.record(key).values.items():
             yield name, self._as_record(value, f"{key}.{name[:60]}")
 
     def table(self, key: str, column: str, width: int) -> Array:
-        """(n, width) what each object of a list, or of an object of objects, says under
-        ``column``: for the many. NaN rows where one says nothing."""
+        """(n, width) the values under ``column`` of each object in a list, or in an object of
+        objects; vectorised for long lists. Rows without the column are NaN."""
         value = self.values.get(key)
         if value in (None, ""):
             return np.zeros((0, width))
@@ -122,9 +123,9 @@ class Record:
             found = [row.get(column, missing) for row in rows]
             table = np.array(found, np.float64).reshape(len(rows), -1)
         except (AttributeError, TypeError, ValueError, OverflowError) as error:
-            raise self.error(f"has a {column!r} that is not {width} numbers", key) from error
+            raise self.error(f"has a {column!r} that does not hold {width} numbers", key) from error
         if table.shape[1] != width and len(rows):
-            raise self.error(f"has a {column!r} that is not {width} numbers", key)
+            raise self.error(f"has a {column!r} that does not hold {width} numbers", key)
         return table.reshape(len(rows), width)
 
     def _key(self, key: str | None) -> str:
@@ -137,14 +138,14 @@ class Record:
 
 
 def root_record(data: Any, file: Path) -> Record:
-    """The file's outermost object. Raises InputError where it is none."""
+    """The root object of the file. Raises InputError where the root is not an object."""
     if not isinstance(data, dict):
         raise InputError(f"holds {shown(data)}; expected an object {{…}}", file=file)
     return Record(data, file)
 
 
 def as_number(value: Any) -> float | None:
-    """A finite float (of sane size), or None for what is none."""
+    """A finite float below MAX_MAGNITUDE in magnitude, or None for any other value."""
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         return None
     if isinstance(value, str) and len(value) > 60:
@@ -153,30 +154,31 @@ def as_number(value: Any) -> float | None:
         number = float(value)
     except (ValueError, OverflowError):
         return None
-    return number if abs(number) < BEYOND else None
+    return number if abs(number) < MAX_MAGNITUDE else None
 
 
 def shown(value: Any) -> str:
-    """A value as a message can show it."""
+    """A short text of a value, for messages."""
     if value is None:
         return "missing"
     if isinstance(value, list):
         return f"a list of {len(value)}"
     if isinstance(value, dict):
         return "an object"
-    if isinstance(value, int) and abs(value) > LARGEST_WHOLE:
-        return "a huge number"
+    if isinstance(value, int) and abs(value) > MAX_EXACT_INTEGER:
+        return "an integer above 2^53"
     text = repr(value)
     return text if len(text) <= 40 else text[:37] + "…"
 
 
-def _flat(value: Any, most: int) -> list[Any]:
-    """The values of a list, and of lists in it (never deeper), a few more than ``most`` at most."""
+def _flat(value: Any, max_values: int) -> list[Any]:
+    """The values of a list and of the lists in it (one level), at most a few more than
+    ``max_values``."""
     if not isinstance(value, list):
         return []
     flat: list[Any] = []
-    for item in value[: most + 1]:
-        flat += item[: most + 1] if isinstance(item, list) else [item]
-        if len(flat) > most:
+    for item in value[: max_values + 1]:
+        flat += item[: max_values + 1] if isinstance(item, list) else [item]
+        if len(flat) > max_values:
             break
     return flat

@@ -1,4 +1,4 @@
-"""XML of a reconstruction tool, opened without believing it."""
+"""Open a reconstruction tool's XML, within limits on its size and depth and without entities."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from defusedxml.ElementTree import DefusedXMLParser
 
 from ...errors import InputError
 
-LARGEST = 1 << 27  # bytes; a hundred thousand cameras of Metashape are 50 MB
-MOST_ELEMENTS = 1_000_000  # the same are 600,000
-DEEPEST = 100  # elements inside each other; no tool writes more than 12
+MAX_XML_BYTES = 1 << 27  # bytes; 100,000 Metashape cameras take 50 MB
+MAX_ELEMENTS = 1_000_000  # 100,000 Metashape cameras take 600,000
+MAX_DEPTH = 100  # nested elements; no tool writes more than 12
 
 
 class XmlElement(Element):
-    """An element that knows the line it starts on, for the message that names it."""
+    """An element with the line it starts on, for messages."""
 
     __slots__ = ("line",)
     line: int | None
 
 
-class _Beyond(Exception):
-    """More than any tool writes."""
+class _LimitExceeded(Exception):
+    """The document exceeds MAX_ELEMENTS or MAX_DEPTH."""
 
 
 class _Tree(TreeBuilder):
-    """Builds the tree while it stays within bounds."""
+    """A tree builder that enforces the limits."""
 
     def __init__(self) -> None:
         super().__init__(element_factory=XmlElement)
@@ -37,10 +37,10 @@ class _Tree(TreeBuilder):
     def start(self, tag: str, attrs: dict[str, str]) -> Element:
         self.depth += 1
         self.count += 1
-        if self.depth > DEEPEST:
-            raise _Beyond(f"its elements are nested more than {DEEPEST} deep")
-        if self.count > MOST_ELEMENTS:
-            raise _Beyond(f"it holds more than {MOST_ELEMENTS:,} elements")
+        if self.depth > MAX_DEPTH:
+            raise _LimitExceeded(f"its elements are nested more than {MAX_DEPTH} deep")
+        if self.count > MAX_ELEMENTS:
+            raise _LimitExceeded(f"it holds more than {MAX_ELEMENTS:,} elements")
         element = super().start(tag, attrs)
         assert isinstance(element, XmlElement) and self.parser is not None
         element.line = self.parser.parser.CurrentLineNumber
@@ -52,16 +52,18 @@ class _Tree(TreeBuilder):
 
 
 def read_xml(source: Path | bytes, file: Path | str | None = None) -> XmlElement:
-    """The root of the document in a file, or in bytes that came from one (``file`` names it).
+    """Root of the document in a file, or in bytes that were read from one (``file`` is its name for
+    messages).
 
-    Each element has a ``line``; so has the InputError raised for what is no XML, is too large or
-    too deep, or carries a document type (with it come entities: bombs, and files from elsewhere).
+    Each element has a ``line``, as has the InputError. It is raised for invalid XML, for documents
+    that are too large or too deep, and for a document type, because that can declare entities
+    (expansion bombs, external files).
     """
     name = file if file is not None or isinstance(source, bytes) else source
     data = source if isinstance(source, bytes) else _bytes_of(source)
-    if len(data) > LARGEST:
+    if len(data) > MAX_XML_BYTES:
         raise InputError(
-            f"is too large for a file of cameras (more than {LARGEST >> 20} MB)", file=name
+            f"is too large for a file of cameras (more than {MAX_XML_BYTES >> 20} MB)", file=name
         )
     tree = _Tree()
     parser = DefusedXMLParser(target=tree, forbid_dtd=True)
@@ -73,20 +75,20 @@ def read_xml(source: Path | bytes, file: Path | str | None = None) -> XmlElement
         raise InputError(
             f"is not valid XML ({str(error).partition(':')[0]})", file=name, line=error.position[0]
         ) from error
-    except _Beyond as error:
+    except _LimitExceeded as error:
         raise InputError(
-            f"is not an XML that any tool writes: {error}", file=name, line=_line(parser)
+            f"exceeds the limits for a file of cameras: {error}", file=name, line=_line(parser)
         ) from error
     except DefusedXmlException as error:
         raise InputError(
-            "declares a document type (<!DOCTYPE …>), which no tool of reconstruction writes; "
-            "take it out if you trust the file",
+            "declares a document type (<!DOCTYPE …>), which no reconstruction tool writes; "
+            "remove it if you trust the file",
             file=name,
             line=_line(parser),
         ) from error
-    except (LookupError, ValueError) as error:  # an encoding the parser does not know
+    except (LookupError, ValueError) as error:  # an encoding unknown to the parser
         raise InputError(
-            f"is in an encoding that is not read ({error}); expected UTF-8", file=name
+            f"has an unsupported encoding ({error}); expected UTF-8", file=name
         ) from error
     assert isinstance(root, XmlElement)
     return root
@@ -100,7 +102,7 @@ def line_of(element: Element | None) -> int | None:
 def _bytes_of(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
-            return file.read(LARGEST + 1)  # never more: the file may be a device, or grow
+            return file.read(MAX_XML_BYTES + 1)  # bounded: the file may be a device, or grow
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", file=path) from error
 

@@ -1,1 +1,1 @@
-"""One reader a format of a reconstruction tool; formats.py says which reads what."""
+"""Readers of camera files: one module for each reconstruction tool's format."""

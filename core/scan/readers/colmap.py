@@ -1,4 +1,5 @@
-"""COLMAP models, binary or text, old layout or with rigs and frames (pycolmap reads)."""
+"""Reader for COLMAP models, binary or text, old layout or with rigs and frames (through
+pycolmap)."""
 
 from __future__ import annotations
 
@@ -31,12 +32,12 @@ def read_colmap(folder: Path) -> Reconstruction:
     cameras, unplaced = _cameras(model, folder)
     return reconstruction_of(
         cameras, folder, points=positions[finite], colours=colours[finite],
-        notes=(f"{unplaced} images have no pose and are left out",) if unplaced else (),
+        notes=(f"Images without a pose that were left out: {unplaced}.",) if unplaced else (),
     )  # fmt: skip
 
 
 def _cameras(model: pycolmap.Reconstruction, folder: Path) -> tuple[list[Camera], int]:
-    """(the cameras with a pose, how many have none)."""
+    """(cameras with a pose, number of images without a pose)."""
     cameras: list[Camera] = []
     unplaced = 0
     for image in model.images.values():
@@ -46,7 +47,7 @@ def _cameras(model: pycolmap.Reconstruction, folder: Path) -> tuple[list[Camera]
         try:
             label = image.name
         except UnicodeDecodeError as error:
-            raise InputError("an image's name is not UTF-8", file=folder) from error
+            raise InputError("the name of an image is not UTF-8", file=folder) from error
         lens = model.cameras[image.camera_id]
         pose = image.cam_from_world()
         camera = Camera(
@@ -63,9 +64,9 @@ def _cameras(model: pycolmap.Reconstruction, folder: Path) -> tuple[list[Camera]
 
 
 def _open(folder: Path) -> pycolmap.Reconstruction:
-    if (folder / "cameras.bin").is_file():  # what pycolmap prefers where there are both
+    if (folder / "cameras.bin").is_file():  # pycolmap prefers the binary model where both exist
         check_binary_model(folder)
     try:
         return pycolmap.Reconstruction(str(folder))
-    except Exception as error:  # pycolmap raises whatever its parser met
-        raise InputError(f"not a readable COLMAP model ({error})", file=folder) from error
+    except Exception as error:  # pycolmap raises many types of exception
+        raise InputError(f"is not a readable COLMAP model ({error})", file=folder) from error

@@ -1,8 +1,9 @@
-"""Walk a binary COLMAP model without believing it: counts must fit into the bytes that are left.
+"""Check a binary COLMAP model before pycolmap reads it: each count must fit into the remaining
+bytes.
 
-pycolmap trusts the counts in these files: a truncated one can make it loop for ever, ask for
-gigabytes, or read half a record as a whole one. This walk takes milliseconds and allocates nothing.
-Layouts as COLMAP 3.12 writes them; older models lack rigs.bin and frames.bin.
+pycolmap trusts the counts in these files: a truncated file can make it loop for ever, allocate
+gigabytes, or accept half a record as a whole one. This check takes milliseconds and allocates
+nothing. Layouts as COLMAP 3.12 writes them; older models lack rigs.bin and frames.bin.
 """
 
 from __future__ import annotations
@@ -17,12 +18,12 @@ import pycolmap
 
 from ...errors import InputError
 
-LARGEST = 1 << 17  # pixels a side
-LEAST_RECORD = {"camera": 24, "image": 73, "frame": 68, "rig": 8, "point": 51}  # bytes
+MAX_SIDE = 1 << 17  # pixels
+MIN_RECORD_BYTES = {"camera": 24, "image": 73, "frame": 68, "rig": 8, "point": 51}
 
 
 def check_binary_model(folder: Path) -> None:
-    """Raise InputError naming the file that is truncated, or whose numbers cannot be right."""
+    """Raise InputError naming the file that is truncated or whose values cannot be right."""
     cameras: set[int] = set()
     walks: tuple[tuple[str, Callable[[_Walk], None]], ...] = (
         ("cameras.bin", lambda walk: cameras.update(_cameras(walk))),
@@ -47,7 +48,7 @@ def check_binary_model(folder: Path) -> None:
 
 
 class _Walk:
-    """A place in the bytes of one file."""
+    """A read position in the bytes of one file."""
 
     def __init__(self, data: bytes, path: Path) -> None:
         self.data, self.path, self.place = data, path, 0
@@ -66,26 +67,28 @@ class _Walk:
     def skip(self, size: int) -> None:
         left = len(self.data) - self.place
         if size > left:
-            raise self.error(f"is truncated: {size} bytes announced, {left} are left")
+            raise self.error(f"is truncated: {size} bytes are declared, {left} remain")
         self.place += size
 
     def count(self, kind: str) -> int:
         (number,) = self.take("Q")
-        if number * LEAST_RECORD[kind] > len(self.data) - self.place:
+        if number * MIN_RECORD_BYTES[kind] > len(self.data) - self.place:
             raise self.error(
-                f"announces {number} records, too many for its {len(self.data)} bytes: "
+                f"declares {number} records, too many for its {len(self.data)} bytes: "
                 "it is truncated or damaged"
             )
         return int(number)
 
     def end(self) -> None:
         if self.place != len(self.data):
-            raise self.error(f"has {len(self.data) - self.place} bytes too many: it is damaged")
+            raise self.error(
+                f"has {len(self.data) - self.place} bytes after the last record: it is damaged"
+            )
 
 
 @lru_cache(maxsize=1)
 def _parameter_counts() -> dict[int, int]:
-    """COLMAP's model number → how many parameters its lens has, as pycolmap knows them."""
+    """COLMAP's model number → number of lens parameters, as pycolmap defines them."""
     counts = {}
     for model in pycolmap.CameraModelId.__members__.values():
         if model != pycolmap.CameraModelId.INVALID:
@@ -99,11 +102,15 @@ def _cameras(walk: _Walk) -> Iterable[int]:
     for _ in range(walk.count("camera")):
         number, model, width, height = walk.take("IiQQ")
         if model not in known:
-            raise walk.error(f"camera {number} has model {model}, which COLMAP does not know")
-        if not (0 < width <= LARGEST and 0 < height <= LARGEST):
-            raise walk.error(f"camera {number} is {width} × {height} pixels")
+            raise walk.error(
+                f"camera {number} has the lens model {model}, which is not a COLMAP model"
+            )
+        if not (0 < width <= MAX_SIDE and 0 < height <= MAX_SIDE):
+            raise walk.error(
+                f"camera {number} has {width} × {height} pixels; expected a valid size"
+            )
         if not all(map(math.isfinite, walk.take(f"{known[model]}d"))):
-            raise walk.error(f"camera {number} has parameters that are not finite numbers")
+            raise walk.error(f"camera {number} has lens parameters that are not finite")
         yield number
 
 
@@ -111,11 +118,13 @@ def _images(walk: _Walk, cameras: set[int]) -> None:
     for _ in range(walk.count("image")):
         number, *pose, camera = walk.take("I7dI")
         if camera not in cameras:
-            raise walk.error(f"image {number} names camera {camera}, which is not in cameras.bin")
+            raise walk.error(
+                f"image {number} refers to camera {camera}, which is not in cameras.bin"
+            )
         _check_pose(walk, f"image {number}", pose)
         end = walk.data.find(b"\0", walk.place)
         if end < 0:
-            raise walk.error("is truncated: an image name has no end")
+            raise walk.error("is truncated: the name of an image has no terminating zero")
         try:
             walk.data[walk.place : end].decode()
         except UnicodeDecodeError:
@@ -151,7 +160,10 @@ def _points(walk: _Walk) -> None:
 def _check_pose(walk: _Walk, what: str, pose: Iterable[float]) -> None:
     values = list(pose)
     if not all(map(math.isfinite, values)):
-        raise walk.error(f"the pose of {what} is not made of finite numbers")
+        raise walk.error(f"the pose of {what} is not finite")
     length = math.sqrt(sum(q * q for q in values[:4]))
     if abs(length - 1) > 1e-3:
-        raise walk.error(f"the rotation of {what} is none (its quaternion has length {length:g})")
+        raise walk.error(
+            f"the rotation of {what} is not valid (its quaternion has length {length:g}, "
+            "expected 1)"
+        )

@@ -1,12 +1,12 @@
-"""Meshroom's (AliceVision's) .sfm and .json.
+"""Reader for Meshroom's (AliceVision's) .sfm and .json.
 
-AliceVision, src/aliceVision/sfmDataIO/jsonIO.cpp and src/aliceVision/camera: poses are world →
-camera (x right, y down, z forward), the rotation column by column, with a centre; the principal
-point counts from the photo's middle since version 1.2.1; the focal length is in millimetres of the
-sensor since 1.2.2, that of x, with pixelRatio fx/fy until 1.2.4 and fy/fx since 1.2.5, and that of
-y since 1.2.11 (seen in the files of one scene that AliceVision keeps of each version,
-compatibilityData). The photo's middle is at half its size in pixels, as AliceVision's own export to
-COLMAP has it.
+AliceVision, src/aliceVision/sfmDataIO/jsonIO.cpp and src/aliceVision/camera. Poses are world →
+camera (x right, y down, z forward); the rotation is stored column by column, with a centre. The
+principal point is relative to the photo's centre since version 1.2.1. The focal length is in
+millimetres of the sensor since 1.2.2: that of x, with pixelRatio fx/fy until 1.2.4 and fy/fx since
+1.2.5; that of y since 1.2.11 (found in the files of one scene that AliceVision keeps of each
+version, compatibilityData). The photo's centre is at half its size in pixels, as in AliceVision's
+own export to COLMAP.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ..reconstruction import Reconstruction, reconstruction_of
 
 Array = NDArray[np.float64]
 
-# the type of older files says the distortion too → (projection, distortion, its parameters)
+# In older files the type also names the distortion: type → (projection, distortion)
 TYPES = {
     "pinhole": ("pinhole", "none"),
     "radial1": ("pinhole", "radialk1"),
@@ -39,11 +39,11 @@ TYPES = {
     "equidistant_r3": ("equidistant", "radialk3pt"),
     "equirectangular": ("equirectangular", "none"),
 }
-PARAMETERS = {
+PARAMETER_COUNTS = {
     "none": 0, "radialk1": 1, "radialk3": 3, "radialk3pt": 3, "brown": 5, "fisheye4": 4,
     "fisheye1": 1,
 }  # fmt: skip
-SENSOR = 36.0, 24.0  # millimetres, where the file does not say
+DEFAULT_SENSOR = 36.0, 24.0  # width and height in mm, where the file gives none
 
 
 def read_meshroom(path: Path, images: Path | None, chunk: str | None) -> Reconstruction:
@@ -69,11 +69,14 @@ def read_meshroom(path: Path, images: Path | None, chunk: str | None) -> Reconst
         cameras.append(Camera(label, *lenses[key], pose, view.text("path")))
     notes = []
     if len(cameras) < len(views):
-        notes.append(f"{len(views) - len(cameras)} photos without a pose or a lens were left out")
+        notes.append(
+            f"Photos without a pose or a lens that were left out: {len(views) - len(cameras)}."
+        )
     if not poses:
         raise InputError(
-            f"holds {len(views)} photos and no pose: it was written before StructureFromMotion ran "
-            "(its own output is sfm.abc; ConvertSfMFormat makes a .sfm of that)",
+            f"holds {len(views)} photos and no pose: it was written before "
+            "StructureFromMotion ran; "
+            "that node writes sfm.abc, which ConvertSfMFormat converts to .sfm",
             file=path,
         )
     points, colours, more = sparse_points(
@@ -83,7 +86,7 @@ def read_meshroom(path: Path, images: Path | None, chunk: str | None) -> Reconst
 
 
 def _version(data: Record) -> tuple[int, ...]:
-    """Of the file's format; 1.0.0 wrote none of the later keys."""
+    """Version of the file's format, 1.0.0 where it is missing."""
     return tuple(int(v) for v in data.numbers("version", 3, default=np.array([1.0, 0.0, 0.0])))
 
 
@@ -97,11 +100,11 @@ def _intrinsic(record: Record, version: tuple[int, ...]) -> tuple[int, int, str,
     distortion = record.text("distortionType", distortion).lower()
     distortion = {"fisheye": "fisheye4"}.get(distortion, distortion)
     if projection not in ("pinhole", "equidistant", "equirectangular") or (
-        distortion not in PARAMETERS
+        distortion not in PARAMETER_COUNTS
     ):
         raise record.error(
-            f"the lens {kind!r}{f' with {distortion!r}' if distortion else ''} is not read "
-            f"(expected {', '.join(TYPES)}): undistort the photos in Meshroom and use those",
+            f"the lens {kind!r}{f' with {distortion!r}' if distortion else ''} is not supported; "
+            f"expected {', '.join(TYPES)}; or undistort the photos in Meshroom and use those",
             "type",
         )
     fx, fy = _focal(record, version, width, height)
@@ -112,7 +115,9 @@ def _intrinsic(record: Record, version: tuple[int, ...]) -> tuple[int, int, str,
         return width, height, *_panorama(record, (fx, fy, cx, cy), width, height)
     parameters = _distortion(record, distortion)
     if _undistortion(record):
-        raise record.error("is a 3DEqualizer calibration, which is not read", "undistortionParams")
+        raise record.error(
+            "is a 3DEqualizer calibration, which is not supported", "undistortionParams"
+        )
     if projection == "pinhole":
         return width, height, *_pinhole(distortion, parameters, fx, fy, cx, cy)
     return width, height, *_equidistant(record, distortion, parameters, fx, cx, cy)
@@ -128,7 +133,7 @@ def _focal(
     if "pxFocalLength" in record:
         both = record.numbers("pxFocalLength", 2)
         return float(both[0]), float(both[1])
-    sensor = record.number("sensorWidth", SENSOR[0])
+    sensor = record.number("sensorWidth", DEFAULT_SENSOR[0])
     if sensor <= 0:
         raise record.error(f"is {sensor:g} mm; expected a positive number", "sensorWidth")
     focal = record.number("focalLength") / sensor * width
@@ -141,7 +146,7 @@ def _focal(
         return focal, focal * ratio
     if version < (1, 2, 11):
         raise record.error(
-            f"is {ratio:g}: what that means in version {'.'.join(map(str, version))} of the format "
+            f"is {ratio:g}: its meaning in version {'.'.join(map(str, version))} of the format "
             "is not known; save the scene with a newer Meshroom",
             "pixelRatio",
         )
@@ -149,8 +154,8 @@ def _focal(
 
 
 def _distortion(record: Record, distortion: str) -> list[float]:
-    """Its parameters, "" standing for none of them."""
-    count = PARAMETERS[distortion]
+    """The distortion coefficients; zeros where the file holds none or ""."""
+    count = PARAMETER_COUNTS[distortion]
     for key in ("distortionParams", "distortionCoefficients"):
         if record.values.get(key) not in (None, "", []):
             values = record.numbers(key, count, *(range(9) if count == 0 else ()))
@@ -175,7 +180,7 @@ def _pinhole(
         return "FOV", (fx, fy, cx, cy, parameters[0])
     if distortion == "brown":
         return brown_lens(fx, fy, cx, cy, parameters[:3], parameters[3:])
-    if distortion == "radialk3pt":  # the polynomial over its value at r = 1
+    if distortion == "radialk3pt":  # the polynomial is divided by its value at r = 1
         total = 1.0 + sum(parameters)
         if total <= 0:
             total = np.nan
@@ -186,16 +191,16 @@ def _pinhole(
 def _equidistant(
     record: Record, distortion: str, parameters: list[float], fx: float, cx: float, cy: float
 ) -> Lens:
-    """AliceVision's Equidistant: θ over half the field of view, times the radius of the fisheye's
-    circle; the distortion works on the quotient."""
+    """AliceVision's Equidistant model: θ divided by half the field of view, times the radius of the
+    fisheye's circle. The distortion acts on that quotient."""
     width, height = record.whole("width"), record.whole("height")
-    sensor_width = record.number("sensorWidth", SENSOR[0])
-    sensor_height = record.number("sensorHeight", SENSOR[1])
+    sensor_width = record.number("sensorWidth", DEFAULT_SENSOR[0])
+    sensor_height = record.number("sensorHeight", DEFAULT_SENSOR[1])
     radius = record.number("fisheyeCircleRadius", min(width, height) / 2)
     if distortion not in ("none", "radialk3", "radialk3pt"):
-        raise record.error(f"the lens equidistant with {distortion!r} is not read", "type")
+        raise record.error(f"the lens equidistant with {distortion!r} is not supported", "type")
     if min(sensor_width, sensor_height, radius, fx) <= 0:
-        raise record.error("has a size, a focal length or a circle that is not positive")
+        raise record.error("has a size, a focal length or a fisheye circle that is not positive")
     focal = fx * sensor_width / max(width, height)  # mm
     half = 0.5 * min(sensor_width, sensor_height) / focal  # radians
     scale = radius / half
@@ -207,15 +212,20 @@ def _equidistant(
 
 
 def _panorama(record: Record, lens: tuple[float, ...], width: int, height: int) -> Lens:
-    """AliceVision's Equirectangular: fx and fy pixels per radian."""
+    """AliceVision's Equirectangular model: fx and fy are pixels per radian."""
     whole = width / (2 * np.pi), width / (2 * np.pi), width / 2, height / 2
     if width != 2 * height or not np.allclose(lens, whole, rtol=1e-3, atol=0.5):
-        raise record.error("is a panorama that is not the whole sphere; not read", "type")
+        raise record.error(
+            "is a panorama of a part of the sphere, which is not supported; expected the "
+            "whole sphere",
+            "type",
+        )
     return panorama_lens(width, height)
 
 
 def _pose(view: Record, poses: dict[str, Record], rigs: dict[str, Record]) -> Pose | None:
-    """World → camera; for a camera of a rig the rig's pose, then its place in it."""
+    """World → camera. For a camera of a rig: the rig's pose combined with the camera's pose in the
+    rig."""
     record = poses.get(view.identity("poseId"))
     if record is None:
         return None

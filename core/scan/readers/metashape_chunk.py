@@ -1,4 +1,4 @@
-"""A chunk of Metashape as a reconstruction."""
+"""Convert a Metashape chunk to a Reconstruction."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ CHUNK_TRANSFORM = "chunk transform"
 
 @dataclass(frozen=True)
 class Chunk:
-    """label, id: its names. element: the <chunk>. file: what messages call it. photos: paths by
-    the id of the camera, where they are written elsewhere. notes: of how it was found."""
+    """label, id: label and id of the chunk. element: its <chunk>. file: name for messages. photos:
+    photo paths by camera id, where they are written in another file. notes: sentences about how the
+    chunk was found."""
 
     label: str
     id: str
@@ -41,8 +42,8 @@ class Chunk:
 
 
 def read_chunk(chunk: Chunk) -> Reconstruction:
-    """Its aligned cameras, in the frame they are written in (the chunk's, or its component's),
-    the way to the world's, and where on Earth that is. Raises InputError."""
+    """Aligned cameras of the chunk, in the frame they are written in (the chunk's or its
+    component's), the transform to the world's frame, and the georeference. Raises InputError."""
     rig = Rig(chunk.element, chunk.file)
     notes = list(chunk.notes)
     posed = _posed(chunk, rig, notes)
@@ -51,10 +52,10 @@ def read_chunk(chunk: Chunk) -> Reconstruction:
         for component in chunk.element.iterfind("components/component")
     }
     base = _base_component(chunk, rig, posed, notes)
-    named = dict(zip(posed, _labels(list(posed.values()), notes), strict=True))
+    label_of = dict(zip(posed, _labels(list(posed.values()), notes), strict=True))
     cameras, left_out = [], 0
     for identity, entry in posed.items():
-        camera = _camera(entry, named[identity], chunk, rig)
+        camera = _camera(entry, label_of[identity], chunk, rig)
         component = rig.component(entry)
         if component != base:
             source, target = transforms.get(component), transforms.get(base)
@@ -65,27 +66,29 @@ def read_chunk(chunk: Chunk) -> Reconstruction:
         cameras.append(camera)
     if left_out:
         notes.append(
-            f"{_count(left_out, 'camera')} of other components left out: nothing ties "
-            f"{'it' if left_out == 1 else 'them'} to component {base}"
+            f"{_count(left_out, 'camera')} of other components left out: no transform relates "
+            f"{'it' if left_out == 1 else 'them'} to component {base}."
         )
-    whole = read_transform(chunk.element, chunk.file)
-    own = transforms.get(base)
+    chunk_transform = read_transform(chunk.element, chunk.file)
+    base_transform = transforms.get(base)
     frames: dict[str, Similarity] = {}
-    if whole is not None:
-        frames[CHUNK_TRANSFORM] = whole
-    if own is not None and not _same(own, whole):
-        frames[f"component {base}"] = own
+    if chunk_transform is not None:
+        frames[CHUNK_TRANSFORM] = chunk_transform
+    if base_transform is not None and not _same(base_transform, chunk_transform):
+        frames[f"component {base}"] = base_transform
     centre = np.mean([camera.pose.centre for camera in cameras], axis=0)
-    georeference, said = read_georeference(chunk.element, own or whole, centre)
-    notes += [*(note for sensor in rig.used for note in sensor.notes), *said]
+    georeference, georeference_notes = read_georeference(
+        chunk.element, base_transform or chunk_transform, centre
+    )
+    notes += [*(note for sensor in rig.used for note in sensor.notes), *georeference_notes]
     return reconstruction_of(
         cameras, chunk.file, frames=frames, georeference=georeference, notes=tuple(notes)
     )
 
 
 def _posed(chunk: Chunk, rig: Rig, notes: list[str]) -> dict[str, Entry]:
-    """The cameras to read, by id; what is left out goes into notes. Raises InputError where none
-    is left."""
+    """Cameras to read, by id. Adds to ``notes`` what is left out. Raises InputError where no camera
+    remains."""
     enabled = [e for e in rig.entries.values() if e.enabled and not e.keyframe]
     posed = {entry.id: entry for entry in enabled if rig.pose(entry) is not None}
     if not posed:
@@ -97,8 +100,8 @@ def _posed(chunk: Chunk, rig: Rig, notes: list[str]) -> dict[str, Entry]:
         else:
             found = f"has {_count(len(enabled), 'camera')}, none of them aligned"
         raise InputError(
-            f"{where}{found}: no camera with a pose; expected one whose photos Align Photos has "
-            "placed, exported with File > Export > Export Cameras",
+            f"{where}{found}; expected a chunk with aligned photos; run Align "
+            "Photos, then File > Export > Export Cameras",
             file=chunk.file,
             line=line_of(chunk.element),
         )
@@ -106,28 +109,28 @@ def _posed(chunk: Chunk, rig: Rig, notes: list[str]) -> dict[str, Entry]:
     keyframes = sum(entry.keyframe for entry in rig.entries.values())
     unaligned = len(enabled) - len(posed)
     if disabled:
-        notes.append(f"{_count(disabled, 'disabled camera')} left out")
+        notes.append(f"{_count(disabled, 'disabled camera')} left out.")
     if keyframes:
-        notes.append(f"{_count(keyframes, 'viewpoint')} without a photo left out")
+        notes.append(f"{_count(keyframes, 'viewpoint')} without a photo left out.")
     if unaligned:
-        notes.append(f"{unaligned} of {_count(len(enabled), 'camera')} left out: not aligned")
+        notes.append(f"{unaligned} of {_count(len(enabled), 'camera')} left out: not aligned.")
     if rig.rolling:
-        notes.append("rolling shutter is not modelled: each photo has the one pose that is written")
-    hung = sum(entry.master is not None and _own(entry) is None for entry in posed.values())
-    if hung:
-        notes.append(f"{_count(hung, 'camera')} placed by the rig's master camera")
+        notes.append("Rolling shutter is not modelled: each photo has one pose.")
+    slaves = sum(entry.master is not None and _own(entry) is None for entry in posed.values())
+    if slaves:
+        notes.append(f"{_count(slaves, 'camera')} placed by the rig's master camera.")
     return posed
 
 
 def _own(entry: Entry) -> Element | None:
-    """Its own transform, where there is one."""
+    """The transform of the camera itself; None where it has none."""
     element = entry.element.find("transform")
     return None if element is None or not (element.text or "").strip() else element
 
 
 def _base_component(chunk: Chunk, rig: Rig, posed: dict[str, Entry], notes: list[str]) -> str:
-    """The component whose frame is the reconstruction's: the active one where it has cameras (the
-    chunk's model is made of it), else the largest."""
+    """The component whose frame the reconstruction uses: the active one where it has cameras (the
+    chunk's model is in its frame), else the largest."""
     members = Counter(rig.component(entry) for entry in posed.values())
     components = chunk.element.find("components")
     active = components.get("active_id") if components is not None else None
@@ -135,8 +138,8 @@ def _base_component(chunk: Chunk, rig: Rig, posed: dict[str, Entry], notes: list
     if len(members) > 1:
         which = "the active one" if base == active else "the largest"
         notes.append(
-            f"the chunk has {len(members)} components; the frame is that of component {base}, "
-            f"{which}"
+            f"The chunk has {len(members)} components; the frame is that of component {base}, "
+            f"{which}."
         )
     return str(base)
 
@@ -159,7 +162,7 @@ def _camera(entry: Entry, label: str, chunk: Chunk, rig: Rig) -> Camera:
 
 
 def _photo(camera: Element) -> str | None:
-    """The photo's path, where the camera itself says it."""
+    """Path of the photo, where the camera element holds it."""
     for name in (".//photo", ".//image"):
         element = camera.find(name)
         if element is not None and element.get("path"):
@@ -168,13 +171,13 @@ def _photo(camera: Element) -> str | None:
 
 
 def _labels(entries: list[Entry], notes: list[str]) -> list[str]:
-    """A label for each: its own, "group/label" where several have the same, with the camera's id
-    where that is not enough."""
+    """A unique label for each camera: its own; "group/label" where several have the same; with the
+    camera's id added where that is not enough."""
     labels = [entry.label for entry in entries]
     for name in (lambda e: f"{e.group}/{e.label}" if e.group else e.label, lambda e: None):
-        times = Counter(labels)
+        counts = Counter(labels)
         labels = [
-            label if times[label] == 1 else name(entry) or f"{label} [{entry.id}]"
+            label if counts[label] == 1 else name(entry) or f"{label} [{entry.id}]"
             for label, entry in zip(labels, entries, strict=True)
         ]
     changed = [
@@ -183,10 +186,10 @@ def _labels(entries: list[Entry], notes: list[str]) -> list[str]:
         if label != entry.label
     ]
     if changed:
-        was, became = changed[0]
+        old_label, new_label = changed[0]
         notes.append(
-            f"{_count(len(changed), 'camera')} of the same label as another renamed: "
-            f"{was!r} is {became!r} …"
+            f"{_count(len(changed), 'camera')} with a duplicate label renamed, "
+            f"for example {old_label!r} to {new_label!r}."
         )
     return labels
 
@@ -204,5 +207,5 @@ def _count(number: int, what: str) -> str:
 
 
 def with_notes(chunk: Chunk, *notes: str) -> Chunk:
-    """The chunk with more to say."""
+    """The chunk with further notes."""
     return replace(chunk, notes=(*chunk.notes, *notes))

@@ -1,5 +1,5 @@
-"""Metashape's frames: the chunk's own, and the world's, which for a georeferenced chunk is
-geocentric (Earth-centred, metres)."""
+"""Metashape's frames: the chunk's frame, and the world's frame, which is geocentric (Earth-centred,
+metres) for a georeferenced chunk."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ Array = NDArray[np.float64]
 # WGS84 ellipsoid (NIMA TR8350.2): metres, and the first eccentricity squared
 SEMI_MAJOR = 6378137.0
 ECCENTRICITY_2 = 6.694379990141316e-3
-HIGHEST = 1e5  # metres from the ellipsoid that a place on Earth may be
+MAX_ALTITUDE = 1e5  # metres from the ellipsoid; larger values are not a place on Earth
 SAME_DATUM = ("WGS 84", "WGS84", "World Geodetic System 1984", "EPSG::4326")
 
 
 def read_transform(parent: Element, file: Source) -> Similarity | None:
-    """The <transform> of a chunk or component, to the world's frame: rotation, translation and
-    scale, each left out where it does nothing, or a 4 × 4 matrix. Raises InputError."""
+    """The <transform> of a chunk or component to the world's frame: rotation, translation and
+    scale, each omitted where it is the identity, or a 4 × 4 matrix. Raises InputError."""
     element = parent.find("transform")
     if element is None:
         return None
@@ -47,14 +47,15 @@ def read_transform(parent: Element, file: Source) -> Similarity | None:
             return Similarity.of_matrix(matrix)
     except ValueError as error:
         raise InputError(
-            f"the <transform> of this {parent.tag} is no rotation with a scale: {error}",
+            f"the <transform> of this {parent.tag} is not a similarity (rotation, scale, "
+            f"translation): {error}",
             file=file,
             line=line_of(element),
         ) from error
 
 
 def between(source: Similarity, target: Similarity) -> Similarity:
-    """From one frame to another, each given by its way to the world's."""
+    """Transform from one frame to another, each given by its transform to the world's frame."""
     scale = source.scale / target.scale
     rotation = target.rotation.T @ source.rotation
     translation = target.rotation.T @ (source.translation - target.translation) / target.scale
@@ -64,29 +65,29 @@ def between(source: Similarity, target: Similarity) -> Similarity:
 def read_georeference(
     chunk: Element, world: Similarity | None, centre: Array
 ) -> tuple[Georeference | None, tuple[str, ...]]:
-    """(where on Earth ``centre`` (3,) of the cameras' frame is, notes), by the chunk's coordinate
-    system: with any that is tied to the Earth the world's frame is geocentric."""
+    """(georeference at ``centre`` (3,) in the cameras' frame, notes). The chunk's coordinate system
+    decides: with any system that is tied to the Earth the world's frame is geocentric."""
     system = (chunk.findtext("reference") or "").strip()
     if not system or system.startswith("LOCAL_CS") or world is None:
         return None, ()
     name = system.split('"')[1] if system.count('"') > 1 else system[:40]
     place = world.points(centre[None])[0]
     latitude, longitude, altitude = geodetic(place)
-    if abs(altitude) > HIGHEST:
+    if abs(altitude) > MAX_ALTITUDE:
         return None, (
-            f"the chunk's coordinate system is {name!r}, but its transform does not lead to the "
-            "Earth's surface: the scan's place is not known",
+            f"The chunk's coordinate system is {name!r}, but its transform does not lead to the "
+            "Earth's surface. The location of the scan is unknown.",
         )
     axes = [world.rotation.T @ axis for axis in east_north_up(latitude, longitude)]
     notes: tuple[str, ...] = ()
     if not any(known in system for known in SAME_DATUM):
-        notes = (f"latitude and longitude are taken for WGS84's; the scan's are {name!r}",)
+        notes = (f"Latitude and longitude are treated as WGS84; the scan uses {name!r}.",)
     degrees = float(np.degrees(latitude)), float(np.degrees(longitude))
     return Georeference(*degrees, altitude, *axes), notes
 
 
 def geodetic(place: Array) -> tuple[float, float, float]:
-    """(latitude, longitude in radians, altitude in metres) of a geocentric place (3,), metres.
+    """(latitude, longitude in radians, altitude in metres) of a geocentric point (3,), metres.
 
     Bowring's iteration (Survey Review 23, 1976); it converges in three steps near the ground.
     """
@@ -105,7 +106,7 @@ def geodetic(place: Array) -> tuple[float, float, float]:
 
 
 def east_north_up(latitude: float, longitude: float) -> tuple[Array, Array, Array]:
-    """Unit vectors (3,), geocentric frame, at a place given in radians."""
+    """Unit vectors (3,) in the geocentric frame at a latitude and longitude in radians."""
     sine, cosine = np.sin(latitude), np.cos(latitude)
     east = np.array([-np.sin(longitude), np.cos(longitude), 0.0])
     up = np.array([cosine * np.cos(longitude), cosine * np.sin(longitude), sine])

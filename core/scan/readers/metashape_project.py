@@ -1,10 +1,10 @@
-"""Metashape's and PhotoScan's projects: .psx with its folder, .psz in one file.
+"""Reader for Metashape's and PhotoScan's projects: .psx with its folder, .psz in one file.
 
-A .psx is ``<document path="{projectname}.files/project.zip"/>``; the folder beside it holds
-project.zip (the list of chunks), N/chunk.zip (sensors, cameras, transforms) and N/0/frame.zip (the
-photos' paths), each with a doc.xml. A .psz is one zip whose doc.xml holds all of it, or says where
-in the zip the rest lies. Meshes stay where they are: a project keeps them in the chunk's frame, and
-Metashape exports them.
+A .psx is ``<document path="{projectname}.files/project.zip"/>``. Its folder holds project.zip (the
+list of chunks), N/chunk.zip (sensors, cameras, transforms) and N/0/frame.zip (the photos' paths),
+each with a doc.xml. A .psz is one zip whose doc.xml holds all of it, or refers to other files in
+the zip. The project's mesh is not read, because it is in the chunk's frame; export it from
+Metashape.
 """
 
 from __future__ import annotations
@@ -17,47 +17,47 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from xml.etree.ElementTree import Element
 
 from ...errors import InputError
-from ..parsing.xml_file import LARGEST, XmlElement, line_of, read_xml
+from ..parsing.xml_file import MAX_XML_BYTES, XmlElement, line_of, read_xml
 from ..reconstruction import Reconstruction
 from .metashape import chunk_elements, select_chunk
 from .metashape_chunk import Chunk, read_chunk, with_notes
 from .metashape_zip import document, document_in, member, open_zip
 
-# path inside the project → its XML; None: there is no such file
+# path inside the project → its XML, or None where the file does not exist
 Opener = Callable[[str], bytes | None]
-LARGEST_TOGETHER = 2 * LARGEST  # bytes: all documents that are read of a project
+MAX_TOTAL_BYTES = 2 * MAX_XML_BYTES  # bytes of all documents that are read from a project
 
 
 class Documents:
-    """The XML documents of a project, read one by one and counted."""
+    """The XML documents of a project. Their total size is limited to MAX_TOTAL_BYTES."""
 
     def __init__(self, path: Path, opener: Opener) -> None:
         self.path = path
         self._opener = opener
-        self._left = LARGEST_TOGETHER
+        self._left = MAX_TOTAL_BYTES
 
     def read(self, place: str) -> tuple[XmlElement, str] | None:
-        """(root, what messages call it), None where there is no such file. Raises InputError."""
+        """(root, name for messages); None where the file does not exist. Raises InputError."""
         data = self._opener(place)
         if data is None:
             return None
         self._left -= len(data)
         if self._left < 0:
-            raise InputError("is too large for a project of Metashape's", file=self.path)
+            raise InputError("is too large for a Metashape project", file=self.path)
         name = member_name(self.path, place)
         return read_xml(data, name), name
 
 
 def member_name(path: Path, place: str) -> str:
-    """What messages call a file inside a project."""
+    """Name for messages of a file inside a project."""
     return f"{path} ({place})"
 
 
 def read_metashape_project(path: Path, images: Path | None, chunk: str | None) -> Reconstruction:
     """Cameras of a project (document versions 1.2 to 2.x). Raises InputError.
 
-    images is not needed; photos get the paths the project says. chunk: its label, where the project
-    holds several.
+    images is not needed; photos have the paths that the project holds. chunk: label of the chunk,
+    where the project holds several.
     """
     with ExitStack() as stack:
         if path.suffix.lower() == ".psx":
@@ -67,7 +67,7 @@ def read_metashape_project(path: Path, images: Path | None, chunk: str | None) -
         documents = Documents(path, opener)
         found = documents.read(start)
         if found is None:
-            raise InputError("holds no doc.xml; expected a project of Metashape's", file=path)
+            raise InputError("holds no doc.xml; expected a Metashape project", file=path)
         root, name = found
         base = PurePosixPath(start).parent
         chunks, folders = [], {}
@@ -77,18 +77,18 @@ def read_metashape_project(path: Path, images: Path | None, chunk: str | None) -
             folders[id(opened.element)] = folder
         listed = root.find("chunks")
         active = None if listed is None else listed.get("active_id")
-        chosen = select_chunk(chunks, chunk, active, path)
-        chosen = _with_photos(chosen, folders[id(chosen.element)], documents)
-    return read_chunk(chosen)
+        selected = select_chunk(chunks, chunk, active, path)
+        selected = _with_photos(selected, folders[id(selected.element)], documents)
+    return read_chunk(selected)
 
 
 def _folder(path: Path) -> tuple[Opener, str]:
-    """What opens the zips in a .psx's folder, and where to start."""
+    """(function that opens the zips in a .psx's folder, path of the first document)."""
     root = read_xml(path)
     written = root.get("path")
     if root.tag != "document" or not written:
         raise InputError(
-            "is no project of Metashape's; expected <document path=\"{projectname}.files/"
+            'is not a Metashape project; expected <document path="{projectname}.files/'
             'project.zip">',
             file=path,
             line=line_of(root),
@@ -98,14 +98,14 @@ def _folder(path: Path) -> tuple[Opener, str]:
     def opener(place: str) -> bytes | None:
         file = path.parent / place
         try:
-            there = file.is_file()
+            exists = file.is_file()
         except OSError:  # a name that no file can have
-            there = False
-        if not there:
+            exists = False
+        if not exists:
             if place == start:
                 raise InputError(
-                    f"its folder {PurePosixPath(start).parent.name!r} with {file.name!r} is not "
-                    "beside it; copy both",
+                    f"its folder {PurePosixPath(start).parent.name!r} with {file.name!r} is "
+                    "missing; copy the folder to the same place as the file",
                     file=path,
                 )
             return None
@@ -115,7 +115,7 @@ def _folder(path: Path) -> tuple[Opener, str]:
 
 
 def _archive(path: Path, stack: ExitStack) -> Opener:
-    """What opens the documents inside a .psz."""
+    """Function that opens the documents inside a .psz."""
     try:
         file = stack.enter_context(path.open("rb"))
     except OSError as error:
@@ -134,12 +134,14 @@ def _archive(path: Path, stack: ExitStack) -> Opener:
 
 
 def _inside(place: str, base: PurePosixPath, file: object, element: Element) -> str:
-    """A path below ``base``, as the project writes it. Raises InputError where it leads out."""
+    """A path below ``base``, as written in the project. Raises InputError where it leads
+    outside."""
     parts = PurePosixPath(place.replace("\\", "/")).parts
     outside = place.startswith(("/", "\\")) or PureWindowsPath(place).drive or ".." in parts
     if outside or not parts or "\0" in place:
         raise InputError(
-            f"its path {place[:80]!r} leads out of the project's folder; expected one below it",
+            f"its path {place[:80]!r} leads outside the project's folder; expected a path "
+            "inside it",
             file=str(file),
             line=line_of(element),
         )
@@ -149,7 +151,7 @@ def _inside(place: str, base: PurePosixPath, file: object, element: Element) -> 
 def _opened_chunk(
     element: XmlElement, base: PurePosixPath, documents: Documents, name: str
 ) -> tuple[Chunk, PurePosixPath]:
-    """(a chunk, where its files lie): itself, or the document it points to."""
+    """(a chunk, folder of its files): the element itself, or the document it refers to."""
     where = element.get("path")
     identity = element.get("id") or ""
     if where is None:
@@ -158,7 +160,7 @@ def _opened_chunk(
     found = documents.read(place)
     if found is None:
         raise InputError(
-            f"its chunk {identity!r} is missing: there is no {place!r}",
+            f"its chunk {identity!r} is missing; expected the file {place!r}",
             file=name,
             line=line_of(element),
         )
@@ -171,17 +173,17 @@ def _opened_chunk(
 
 
 def _with_photos(chunk: Chunk, folder: PurePosixPath, documents: Documents) -> Chunk:
-    """The chunk with the paths of its photos, which its first frame says."""
+    """The chunk with the paths of its photos from its first frame."""
     frames = chunk.element.findall("frames/frame")
     notes = []
     if len(frames) > 1:
-        notes.append(f"of {len(frames)} frames of the chunk the first is read")
+        notes.append(f"The chunk has {len(frames)} frames; the first was read.")
     frame: Element | None = frames[0] if frames else None
     if frame is not None and frame.get("path"):
         place = _inside(frame.get("path", ""), folder, chunk.file, frame)
         found = documents.read(place)
         if found is None:
-            notes.append(f"the photos' paths are not known: there is no {place!r}")
+            notes.append(f"The paths of the photos are unknown: {place!r} is missing.")
         frame = None if found is None else found[0]
         folder = PurePosixPath(place).parent
     photos = {}
@@ -192,14 +194,14 @@ def _with_photos(chunk: Chunk, folder: PurePosixPath, documents: Documents) -> C
             photos[camera.get("camera_id", "")] = _photo_path(written, folder, documents.path)
     if any(e.find(".//model") is not None for e in (chunk.element, frame) if e is not None):
         notes.append(
-            "the project's model is not read from it: export it from Metashape (File > Export > "
-            "Export Model)"
+            "The mesh inside the project was not read. Export it from Metashape (File > Export > "
+            "Export Model)."
         )
     return with_notes(replace(chunk, photos=photos), *notes)
 
 
 def _photo_path(written: str, folder: PurePosixPath, path: Path) -> str:
-    """The photo's path; one that is relative starts where its frame.zip lies."""
+    """Path of the photo; a relative path starts at the folder of its frame.zip."""
     written = written.removeprefix("file:///") if ":" in written[8:11] else written
     if written.startswith(("/", "\\")) or PureWindowsPath(written).drive or "://" in written:
         return written

@@ -1,4 +1,5 @@
-"""Metashape's cameras as written: who is aligned, who hangs on whom in a rig."""
+"""Metashape's cameras as written: which are aligned, and which get their pose from a rig's
+master."""
 
 from __future__ import annotations
 
@@ -16,13 +17,13 @@ from .metashape_values import Source, flag, numbers, properties
 
 Array = NDArray[np.float64]
 
-LONGEST_CHAIN = 10  # masters above a camera; Metashape has one
-STRAIGHT = 1e-4  # how far a rotation may be from one; files written by hand have few digits
+MAX_MASTERS = 10  # masters above a camera; Metashape writes one
+ROTATION_TOLERANCE = 1e-4  # deviation of R Rᵀ from the identity; handwritten files have few digits
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A <camera>. group: label of the folder it is in. element: for what is read later."""
+    """A <camera>. group: label of its folder. element: for what is read later."""
 
     id: str
     label: str
@@ -31,24 +32,24 @@ class Entry:
 
     @property
     def enabled(self) -> bool:
-        """Whether it is ticked in Metashape."""
+        """Whether the camera is enabled in Metashape."""
         return flag(self.element.get("enabled"), True)
 
     @property
     def master(self) -> str | None:
-        """Id of the camera whose pose it shares, None for its own."""
+        """Id of the rig's master camera; None where the camera has none."""
         master = self.element.get("master_id")
         return None if master in (None, "", self.id) else master
 
     @property
     def keyframe(self) -> bool:
-        """A viewpoint without a photo."""
+        """Whether it is a viewpoint without a photo."""
         return not (self.element.get("sensor_id") or self.element.get("master_id"))
 
 
 class Rig:
-    """The cameras and sensors of a chunk. Raises InputError for what is written twice, and, when
-    asked for, what is missing or no number."""
+    """The cameras and sensors of a chunk. Raises InputError for duplicate ids, and, when a sensor
+    or pose is read, for missing or invalid values."""
 
     def __init__(self, chunk: Element, file: Source) -> None:
         self.file = file
@@ -57,7 +58,9 @@ class Rig:
         for element, group in _cameras(cameras if cameras is not None else (), ""):
             identity = element.get("id", "")
             if not identity or identity in self.entries:
-                found = f"two cameras of the id {identity!r}" if identity else "a camera without id"
+                found = (
+                    f"two cameras with the id {identity!r}" if identity else "a camera has no id"
+                )
                 raise InputError(found, file=file, line=line_of(element))
             label = (element.get("label") or "").strip() or f"camera {identity}"
             self.entries[identity] = Entry(identity, label, group, element)
@@ -66,19 +69,19 @@ class Rig:
             identity = element.get("id", "")
             if identity in self._elements:
                 raise InputError(
-                    f"two sensors of the id {identity!r}", file=file, line=line_of(element)
+                    f"two sensors with the id {identity!r}", file=file, line=line_of(element)
                 )
             self._elements[identity] = element
         self._sensors: dict[str, Sensor] = {}
         self._poses: dict[str, Array | None] = {}
 
     def sensor(self, entry: Entry) -> Sensor:
-        """What the camera's photo was taken with."""
+        """The sensor of the camera's photo."""
         identity = entry.element.get("sensor_id", "")
         if identity not in self._sensors:
             if identity not in self._elements:
                 raise InputError(
-                    f"{entry.label!r} is of the sensor {identity!r}, which the chunk does not hold",
+                    f"{entry.label!r} refers to the sensor {identity!r}, which is not in the chunk",
                     file=self.file,
                     line=line_of(entry.element),
                 )
@@ -87,12 +90,12 @@ class Rig:
 
     @property
     def used(self) -> list[Sensor]:
-        """The sensors asked for so far."""
+        """The sensors read so far."""
         return list(self._sensors.values())
 
     @property
     def rolling(self) -> bool:
-        """Whether any photo was taken row by row."""
+        """Whether any photo was taken with a rolling shutter."""
         return any(
             element.find("rolling_shutter") is not None
             or properties(element).get("rolling_shutter", "0").lower() not in ("0", "false", "none")
@@ -100,8 +103,8 @@ class Rig:
         )
 
     def component(self, entry: Entry) -> str:
-        """Id of the component the camera belongs to, its master's where it does not say."""
-        for _ in range(LONGEST_CHAIN):
+        """Id of the camera's component; its master's where it has none."""
+        for _ in range(MAX_MASTERS):
             own = entry.element.get("component_id")
             if own is not None or entry.master not in self.entries:
                 break
@@ -119,7 +122,7 @@ class Rig:
             if entry.master is None:
                 self._poses[entry.id] = None
                 break
-            if entry.master not in self.entries or len(chain) > LONGEST_CHAIN:
+            if entry.master not in self.entries or len(chain) > MAX_MASTERS:
                 known = entry.master in self.entries
                 found = "leads back to itself" if known else "is not in the chunk"
                 raise InputError(
@@ -135,7 +138,7 @@ class Rig:
         return self._poses[chain[0].id]
 
     def _between(self, slave: Entry, master: Entry) -> Array:
-        """(4, 4) slave → master: their sensors' places in the rig."""
+        """(4, 4) slave → master, from the poses of their sensors in the rig."""
         return np.linalg.inv(self._place(master)) @ self._place(slave)
 
     def _place(self, entry: Entry) -> Array:
@@ -147,7 +150,7 @@ class Rig:
 
 
 def _cameras(parent: Element | tuple[()], group: str) -> Iterator[tuple[Element, str]]:
-    """Every <camera> in a tree of groups, with the label of the group it is in."""
+    """Every <camera> in a tree of groups, with the label of its group."""
     for child in parent:
         if child.tag == "camera":
             yield child, group
@@ -157,15 +160,16 @@ def _cameras(parent: Element | tuple[()], group: str) -> Iterator[tuple[Element,
 
 
 def _rigid(matrix: Array, element: Element | None, file: Source) -> Array:
-    """The nearest motion to a (4, 4) matrix that is one but for rounding. Raises InputError."""
+    """The rigid transform nearest to a (4, 4) matrix, which may deviate by rounding only. Raises
+    InputError."""
     matrix = matrix.reshape(4, 4)
     rotation = matrix[:3, :3]
-    small = np.abs(rotation).max() < 2  # squares of the others may be no numbers
-    square = small and np.allclose(rotation @ rotation.T, np.eye(3), atol=STRAIGHT)
+    small = np.abs(rotation).max() < 2  # squares of larger values may overflow
+    square = small and np.allclose(rotation @ rotation.T, np.eye(3), atol=ROTATION_TOLERANCE)
     if not (square and np.linalg.det(rotation) > 0 and np.allclose(matrix[3], (0, 0, 0, 1))):
         raise InputError(
-            "a transform that is no rotation and place; expected 16 numbers, rows of a 4 × 4 "
-            "matrix, without scale or mirroring",
+            "a transform that is not rigid; expected 16 numbers, the rows of a 4 × 4 "
+            "matrix, without scale or reflection",
             file=file,
             line=line_of(element),
         )

@@ -1,7 +1,7 @@
-"""Metashape's sensors: what a photo was taken with, its calibration, its place in a rig.
+"""Metashape's sensors: size, calibration and pose in a rig.
 
-All of document versions 1.2 to 2.x. PhotoScan up to 1.2 writes fx, fy, absolute cx, cy and skew;
-since then f, offsets cx, cy from the photo's centre, b1, b2. Whatever is zero is left out.
+All document versions from 1.2 to 2.x. PhotoScan up to 1.2 writes fx, fy, absolute cx, cy and skew;
+later versions write f, offsets cx, cy from the photo's centre, b1, b2. Zero values are omitted.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from .metashape_values import Source, flag, number, numbers, properties, size
 
 Array = NDArray[np.float64]
 
-# Sensor.Type of Metashape → our model
+# Metashape's Sensor.Type → lens model (lens.py)
 LENSES = {
     "frame": "METASHAPE_FRAME",
     "fisheye": "METASHAPE_FISHEYE",
     "equidistant_fisheye": "METASHAPE_FISHEYE",
     "equisolid_fisheye": "METASHAPE_EQUISOLID",
 }
-LARGEST_VALUE = 1e12  # of any parameter: beyond it squares of squares are no numbers any more
+MAX_PARAMETER = 1e12  # of any parameter: the fourth power of larger values overflows
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """width, height: pixels of the photos it was calibrated with. model, parameters: as a
-    Camera's. offset: (4, 4) from its own frame to that of the rig's master, None where it says
-    none. notes: what was assumed."""
+    """width, height: pixels of the photos it was calibrated with. model, parameters: as in Camera.
+    offset: (4, 4) from its own frame to that of the rig's master; None where the file holds none.
+    notes: assumptions made."""
 
     label: str
     width: int
@@ -46,11 +46,15 @@ class Sensor:
 
 
 def read_sensor(element: Element, file: Source) -> Sensor:
-    """One <sensor>. Raises InputError for a type that is not read and for no calibration."""
+    """One <sensor>. Raises InputError for an unsupported type or a missing calibration."""
     label = element.get("label") or f"sensor {element.get('id')}"
-    said = properties(element)
-    if flag(said.get("film_camera"), False) or element.find("film_camera") is not None:
-        raise _refused(element, file, f"{label!r} is a film camera: scans with fiducials")
+    sensor_properties = properties(element)
+    if flag(sensor_properties.get("film_camera"), False) or element.find("film_camera") is not None:
+        raise _unsupported(
+            element,
+            file,
+            f"{label!r} is a film camera (scans with fiducial marks), which is not supported",
+        )
     calibration = _calibration(element)
     kind = element.get("type") or "frame"
     if calibration is not None:
@@ -64,10 +68,12 @@ def read_sensor(element: Element, file: Source) -> Sensor:
     width, height = resolution
     if kind == "spherical":
         if width != 2 * height:
-            raise _refused(element, file, f"{label!r} is a panorama of {width} × {height} pixels")
+            raise _unsupported(
+                element, file, f"{label!r} is a panorama of {width} × {height} pixels"
+            )
         return Sensor(label, width, height, "EQUIRECTANGULAR", (width, height), offset)
     if kind not in LENSES:
-        raise _refused(element, file, f"{label!r} is of the type {kind!r}")
+        raise _unsupported(element, file, f"{label!r} has the type {kind!r}")
     if calibration is None:
         raise InputError(
             f"{label!r} has no calibration with a focal length; expected one that Align Photos "
@@ -77,11 +83,11 @@ def read_sensor(element: Element, file: Source) -> Sensor:
         )
     lens = _parameters(calibration, width, height, file)
     model, parameters = colmap_model(LENSES[kind], lens)
-    notes = tuple(_doubts(calibration, label))
+    notes = tuple(_calibration_notes(calibration, label))
     return Sensor(label, width, height, model, parameters, offset, notes)
 
 
-def _refused(element: Element, file: Source, what: str) -> InputError:
+def _unsupported(element: Element, file: Source, what: str) -> InputError:
     return InputError(
         f"{what}; expected frame, fisheye (equidistant or equisolid), or spherical twice as wide "
         "as high",
@@ -91,8 +97,8 @@ def _refused(element: Element, file: Source, what: str) -> InputError:
 
 
 def _calibration(sensor: Element) -> Element | None:
-    """The adjusted calibration, else the initial one, else any; those without a focal length only
-    for sensors that need none."""
+    """The adjusted calibration, else the initial one, else any. A calibration without a focal
+    length is returned only for sensors that need none."""
     found = sensor.findall("calibration")
     with_focal = [c for c in found if c.find("f") is not None or c.find("fx") is not None]
     order = {"adjusted": 0, "initial": 2}
@@ -126,27 +132,29 @@ def _parameters(calibration: Element, width: int, height: int, file: Source) -> 
             file=file,
             line=line_of(calibration),
         )
-    if max(abs(p) for p in astuple(lens)) > LARGEST_VALUE:
+    if max(abs(p) for p in astuple(lens)) > MAX_PARAMETER:
         raise InputError(
-            "a calibration with absurd values; expected pixels and factors",
+            "a calibration parameter above 1e12; expected pixels and factors",
             file=file,
             line=line_of(calibration),
         )
     return lens
 
 
-def _doubts(calibration: Element, label: str) -> list[str]:
-    """What a user of the calibration should know."""
+def _calibration_notes(calibration: Element, label: str) -> list[str]:
+    """Sentences about the calibration that a user should read."""
     found = []
     if calibration.get("class") == "initial":
-        found.append(f"{label!r} has only an initial calibration: it was not adjusted")
+        found.append(
+            f"The sensor {label!r} has only an initial calibration, which was not adjusted."
+        )
     if any("correction" in child.tag for child in calibration):
-        found.append(f"the additional corrections of {label!r} are not read")
+        found.append(f"The additional corrections of the sensor {label!r} were not read.")
     return found
 
 
 def _offset(sensor: Element, file: Source) -> Array | None:
-    """From the sensor's frame to its master's: x_master = rotation · x + location."""
+    """(4, 4) from the sensor's frame to its master's: x_master = rotation · x + location."""
     matrix = sensor.find("transform")
     rotation, location = sensor.find("rotation"), sensor.find("location")
     if matrix is not None and (matrix.text or "").strip():

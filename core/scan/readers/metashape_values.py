@@ -1,4 +1,4 @@
-"""Numbers and flags out of Metashape's XML, each refused with its line where it is none."""
+"""Read numbers and flags from Metashape's XML. Invalid values raise InputError with their line."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ...errors import InputError
 from ..parsing.xml_file import line_of
 
 Array = NDArray[np.float64]
-Source = Path | str  # the file that messages name
+Source = Path | str  # name of the file for messages
 
 
 def numbers(element: Element, count: int, file: Source) -> Array:
-    """(count,) the finite numbers an element's text holds. Raises InputError."""
+    """(count,) the finite numbers in an element's text. Raises InputError."""
     parts = (element.text or "").split(None, count)
     try:
         values = [float(part) for part in parts]
@@ -34,7 +34,8 @@ def numbers(element: Element, count: int, file: Source) -> Array:
 
 
 def number(parent: Element, name: str, file: Source, default: float = 0.0) -> float:
-    """The number in a child element; Metashape leaves out what is zero. Raises InputError."""
+    """The number in a child element, ``default`` where it is missing: Metashape omits zeros. Raises
+    InputError."""
     child = parent.find(name)
     if child is None or not (child.text or "").strip():
         return default
@@ -48,7 +49,8 @@ def size(element: Element | None, file: Source) -> tuple[int, int] | None:
     found = [(element.get(key) or "").strip() for key in ("width", "height")]
     if not all(text.isascii() and text.isdigit() and len(text) < 10 for text in found):
         raise InputError(
-            f"a resolution of {_shown(found[0])} × {_shown(found[1])}; expected pixels",
+            f"a resolution of {_shown(found[0])} × {_shown(found[1])}; expected two numbers "
+            "of pixels",
             file=file,
             line=line_of(element),
         )
@@ -56,18 +58,18 @@ def size(element: Element | None, file: Source) -> tuple[int, int] | None:
 
 
 def flag(text: str | None, default: bool) -> bool:
-    """true/false or 1/0."""
+    """True or false of a text: true/false or 1/0."""
     if text is None:
         return default
     return text.strip().lower() not in ("false", "0", "no", "")
 
 
 def properties(element: Element) -> dict[str, str]:
-    """What its <property name= value=> children say."""
+    """Name → value of the <property name= value=> children."""
     return {p.get("name", ""): p.get("value", "") for p in element.findall("property")}
 
 
 def _shown(text: str | None) -> str:
-    """Part of a text, for a message of one line."""
+    """The start of a text, for a message of one line."""
     short = " ".join((text or "").split())
     return repr(short if len(short) <= 40 else short[:37] + "…")

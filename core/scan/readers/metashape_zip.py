@@ -1,4 +1,5 @@
-"""One text out of a zip of Metashape's, read into memory without believing the zip."""
+"""Read one XML document from a zip of Metashape's into memory, within limits on size and
+compression."""
 
 from __future__ import annotations
 
@@ -8,13 +9,13 @@ from pathlib import Path
 from typing import BinaryIO
 
 from ...errors import UNREADABLE_NPZ, InputError
-from ..parsing.xml_file import LARGEST
+from ..parsing.xml_file import MAX_XML_BYTES
 from .metashape_values import Source
 
 DAMAGED = (*UNREADABLE_NPZ, RuntimeError, struct.error, OverflowError)
-READ_AS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # others may need any amount of memory
-DIRECTORY = 1 << 26  # bytes of a list of files; a large project's is 1 MB
-DENSEST = 500  # times; XML of numbers packs 3 to 30 times
+SUPPORTED_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # others need unlimited memory
+MAX_DIRECTORY_BYTES = 1 << 26  # bytes of the list of files; a large project has 1 MB
+MAX_COMPRESSION_RATIO = 500  # XML of numbers is compressed 3 to 30 times
 
 # .ZIP File Format Specification (APPNOTE), 4.3.14–4.3.16
 END, END_SIZE = b"PK\x05\x06", 22
@@ -25,35 +26,38 @@ END64, END64_SIZE = b"PK\x06\x06", 56
 def open_zip(file: BinaryIO, name: Source) -> zipfile.ZipFile:
     """The zip in an open file. Raises InputError."""
     try:
-        if _directory_size(file) > DIRECTORY:
-            raise InputError("lists too many files for a project of Metashape's", file=name)
+        if _directory_size(file) > MAX_DIRECTORY_BYTES:
+            raise InputError("lists too many files for a Metashape project", file=name)
         file.seek(0)
         return zipfile.ZipFile(file)
     except DAMAGED as error:
-        raise InputError(f"is a damaged zip, or none ({_short(error)})", file=name) from error
+        raise InputError(f"is not a valid zip ({_short(error)})", file=name) from error
 
 
 def member(archive: zipfile.ZipFile, entry: str, name: Source) -> bytes | None:
-    """What one entry holds, None where there is no such entry. Raises InputError."""
+    """The content of one entry; None where it does not exist. Raises InputError."""
     try:
         info = archive.getinfo(entry)
     except KeyError:
         return None
-    dense = info.file_size > (1 << 20) and info.file_size > DENSEST * max(1, info.compress_size)
-    if info.file_size > LARGEST or dense:
+    dense = info.file_size > (1 << 20) and info.file_size > MAX_COMPRESSION_RATIO * max(
+        1, info.compress_size
+    )
+    if info.file_size > MAX_XML_BYTES or dense:
         raise InputError(
-            f"its {entry!r} unpacks to {info.file_size >> 20} MB: no tool writes that", file=name
+            f"its {entry!r} unpacks to {info.file_size >> 20} MB, more than any tool writes",
+            file=name,
         )
-    if info.compress_type not in READ_AS or info.flag_bits & 1:
-        kind = "encrypted" if info.flag_bits & 1 else f"packed in method {info.compress_type}"
+    if info.compress_type not in SUPPORTED_METHODS or info.flag_bits & 1:
+        kind = "encrypted" if info.flag_bits & 1 else f"compressed with method {info.compress_type}"
         raise InputError(f"its {entry!r} is {kind}; expected a plain zip", file=name)
     try:
         with archive.open(info) as opened:
-            data = opened.read(LARGEST + 1)
+            data = opened.read(MAX_XML_BYTES + 1)
     except DAMAGED as error:
         raise InputError(f"its {entry!r} is damaged ({_short(error)})", file=name) from error
-    if len(data) > LARGEST:
-        raise InputError(f"its {entry!r} is larger than it says", file=name)
+    if len(data) > MAX_XML_BYTES:
+        raise InputError(f"its {entry!r} is larger than its declared size", file=name)
     return data
 
 
@@ -75,7 +79,7 @@ def document(archive: zipfile.ZipFile, name: Source) -> bytes:
 
 
 def _directory_size(file: BinaryIO) -> int:
-    """Bytes of the list of files at the zip's end, which zipfile reads whole."""
+    """Bytes of the list of files at the end of the zip, which zipfile reads completely."""
     length = file.seek(0, 2)
     start = max(0, length - END_SIZE - 65535 - LOCATOR_SIZE)
     file.seek(start)

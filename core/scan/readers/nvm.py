@@ -1,8 +1,8 @@
-"""VisualSFM's .nvm (NVM_V3), and the same format as COLMAP writes it.
+"""Reader for VisualSFM's .nvm (NVM_V3), and the same format as COLMAP writes it.
 
 http://ccwu.me/vsfm/doc.html#nvm, and LoadNVM in PBA's util.h: a camera is a name, focal length,
 quaternion w x y z (world → camera, x right, y down, z forward), centre, radial distortion r, 0.
-Who wrote it, and what r is: nvm_flavour.py.
+nvm_flavour.py finds out which tool wrote the file, and so the meaning of r.
 """
 
 from __future__ import annotations
@@ -27,48 +27,48 @@ Array = NDArray[np.float64]
 
 
 def read_nvm(path: Path, images: Path | None, chunk: str | None) -> Reconstruction:
-    """Cameras and points of an .nvm. chunk: which model of it ("1", "2" …), without it the one of
-    the most cameras. Raises InputError."""
+    """Cameras and points of an .nvm. chunk: number of the model ("1", "2" …); without it the model
+    with the most cameras. Raises InputError."""
     with NumberStream(path) as stream:
         fixed = _header(stream)
         models: list[NvmModel] = []
         while (model := _model(stream)) is not None:
             models.append(model)
     if not models:
-        raise InputError("holds no model (only photos that were not matched?)", file=path)
+        raise InputError("holds no model; expected matched photos", file=path)
     notes: list[str] = []
     if chunk is None:
-        chosen = max(range(len(models)), key=lambda i: len(models[i].names))
+        selected = max(range(len(models)), key=lambda i: len(models[i].names))
         if len(models) > 1:
             notes.append(
-                f"the file holds {len(models)} models: number {chosen + 1} was read, the one of "
-                "the most cameras; [scan] chunk names another"
+                f"The file holds {len(models)} models. Model {selected + 1}, which has the most "
+                "cameras, was read. [scan] chunk selects another."
             )
     elif chunk.isascii() and chunk.isdigit() and 1 <= int(chunk[:9]) <= len(models):
-        chosen = int(chunk) - 1
+        selected = int(chunk) - 1
     else:
         known = f"1 to {len(models)}"
-        raise InputError(f"no model {chunk!r}; its models are {known}", file=path, key="scan.chunk")
-    return _reconstruction(models[chosen], fixed, PhotoSizes(images, path.parent), path, notes)
+        raise InputError(f"found no model {chunk!r}; expected {known}", file=path, key="scan.chunk")
+    return _reconstruction(models[selected], fixed, PhotoSizes(images, path.parent), path, notes)
 
 
 def _header(stream: NumberStream) -> list[float] | None:
-    """fx, cx, fy, cy (, r) of "NVM_V3 FixedK …", or None."""
+    """fx, cx, fy, cy (, r) of "NVM_V3 FixedK …"; None without FixedK."""
     words = (stream.text_line() or "").split()
     if not words or words[0] != "NVM_V3":
-        raise stream.error("does not begin with NVM_V3: no .nvm of VisualSFM (or an old one)")
+        raise stream.error("does not begin with NVM_V3; expected a VisualSFM file of that version")
     if len(words) == 1:
         return None
     if words[1] == "FixedK" and len(words) in (6, 7):
         found = [as_number(word) for word in words[2:]]
-        numbers = [number for number in found if number is not None]
-        if len(numbers) == len(found) and min(numbers[0], numbers[2]) > 0:
-            return numbers
-    raise stream.error("has a first line that is not NVM_V3 [FixedK fx cx fy cy [r]]")
+        calibration = [number for number in found if number is not None]
+        if len(calibration) == len(found) and min(calibration[0], calibration[2]) > 0:
+            return calibration
+    raise stream.error("has an invalid first line; expected NVM_V3 [FixedK fx cx fy cy [r]]")
 
 
 def _model(stream: NumberStream) -> NvmModel | None:
-    """The next model, or None behind the last one: "0", a comment, or the file's end."""
+    """The next model; None after the last one: "0", a comment, or the end of the file."""
     text = stream.text_line()
     if text is None or text == "0" or text.startswith("#"):
         return None
@@ -80,24 +80,28 @@ def _model(stream: NumberStream) -> NvmModel | None:
     for _ in range(count):
         line = stream.text_line()
         if line is None:
-            raise stream.error(f"ends early: it says {count:,} cameras and holds {len(names):,}")
+            raise stream.error(
+                f"ends early: it declares {count:,} cameras and holds {len(names):,}"
+            )
         words = line.rsplit(maxsplit=10)
         found = [as_number(word) for word in words[1:]]
-        numbers = [number for number in found if number is not None]
-        if len(numbers) != 10:
-            raise stream.error("is not a camera: a name and 10 finite numbers were expected")
-        names.append(words[0].replace('"', " "))  # VisualSFM's way to write a blank
-        values.append(numbers)
+        camera_values = [value for value in found if value is not None]
+        if len(camera_values) != 10:
+            raise stream.error("is not a valid camera; expected a name and 10 finite numbers")
+        names.append(words[0].replace('"', " "))  # VisualSFM writes a blank as "
+        values.append(camera_values)
     points = stream.count("points", 2 * 7)
     tracks = Tracks(count)
     found_points = 0
     while found_points < points:
         piece, lines = stream.lines_of_numbers(points - found_points)
         if not lines:
-            raise stream.error(f"ends early: it says {points:,} points and holds {found_points:,}")
+            raise stream.error(
+                f"ends early: it declares {points:,} points and holds {found_points:,}"
+            )
         used, here = tracks.add(piece, lines, stream)
         if used != len(piece) or here != lines:
-            raise stream.error("has a point that is not whole, in or above this line")
+            raise stream.error("has an incomplete point, on this line or above")
         found_points += here
     return NvmModel(names, np.array(values).reshape(-1, 10), tracks)
 
@@ -107,7 +111,7 @@ def _reconstruction(
 ) -> Reconstruction:
     labels = labels_of(model.names, path)
     sizes = [photos.size(name) for name in model.names]
-    poses = [_pose(numbers) for numbers in model.values]
+    poses = [_pose(camera_values) for camera_values in model.values]
     flavour = NvmFlavour.of(model, poses, sizes, fixed)
     missing = sum(size is None for size in sizes)
     found = flavour.estimated_sizes(path) if missing else []
@@ -118,21 +122,21 @@ def _reconstruction(
         cameras.append(Camera(label, width, height, *lens, poses[i], name))
     if missing:
         notes.append(
-            f"photo sizes estimated from the features of {missing} photos, because the photos were "
-            "not found: give [scan] images"
+            f"The sizes of {missing} photos were estimated from their features, because the photos "
+            "were not found. Set [scan] images to the folder of the photos."
         )
     if not flavour.measured and model.values[:, 8].any():
         notes.append(
-            "the distortion is read as COLMAP writes it, because the file's observations fit that"
+            "The distortion is read as COLMAP writes it, because that fits the file's observations."
         )
     places, colours, more = sparse_points(*model.tracks.all_points())
     return reconstruction_of(cameras, path, points=places, colours=colours, notes=(*notes, *more))
 
 
-def _pose(numbers: Array) -> Pose:
-    """From quaternion w x y z and centre. A quaternion of no length makes a rotation that is none:
-    refused with the camera's name later."""
-    q = numbers[1:5]
+def _pose(camera_values: Array) -> Pose:
+    """Pose from quaternion w x y z and centre. A quaternion of length 0 gives an invalid rotation,
+    which is rejected later with the camera's name."""
+    q = camera_values[1:5]
     with np.errstate(all="ignore"):
         w, x, y, z = q / np.linalg.norm(q)
     rotation = np.array(
@@ -142,4 +146,4 @@ def _pose(numbers: Array) -> Pose:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
-    return Pose(rotation, -rotation @ numbers[5:8])
+    return Pose(rotation, -rotation @ camera_values[5:8])

@@ -1,8 +1,8 @@
-"""Who wrote an .nvm: VisualSFM and COLMAP mean different things by the same numbers.
+"""Find out which tool wrote an .nvm: VisualSFM and COLMAP give the same numbers different meanings.
 
-VisualSFM counts pixels from the photo's centre, and its r straightens what was measured
-(measured_radial_lens.py); COLMAP counts from the photo's corner and writes r = −k of its
-SIMPLE_RADIAL. Nothing in the file says which: its own observations do.
+VisualSFM counts pixels from the photo's centre, and its r undistorts measured pixels
+(measured_radial_lens.py). COLMAP counts from the photo's corner and writes r = −k of its
+SIMPLE_RADIAL. The file does not name its tool; the decision uses its observations.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from ..parsing.tracks import Tracks
 
 Array = NDArray[np.float64]
 
-ENOUGH = 8  # observations of a photo, to find its centre from
-SAME_SIZE = 6  # pixels by which estimated sizes may differ and still be one
+MIN_OBSERVATIONS = 8  # observations of a photo, to estimate its centre
+SIZE_TOLERANCE = 6  # pixels; estimated sizes that differ by less are treated as equal
 
 
 @dataclass(frozen=True)
 class NvmModel:
-    """One reconstruction of the file. values: (n, 10) numbers of each camera's line."""
+    """One reconstruction of the file. values: (n, 10) the values of each camera's line."""
 
     names: list[str]
     values: Array
@@ -36,11 +36,11 @@ class NvmModel:
 
 @dataclass(frozen=True)
 class NvmFlavour:
-    """Who wrote the file.
+    """Conventions of the tool that wrote the file.
 
-    seen: some observations of each camera (the rows of Tracks.kept). centred: its pixels count from
-    the photo's centre. measured: its r straightens what was measured (VisualSFM), else it is −k of
-    COLMAP's SIMPLE_RADIAL.
+    seen: some observations of each camera (rows of Tracks.kept). centred: whether pixels count from
+    the photo's centre. measured: True where r undistorts measured pixels (VisualSFM), False where
+    it is −k of COLMAP's SIMPLE_RADIAL.
     """
 
     model: NvmModel
@@ -58,7 +58,8 @@ class NvmFlavour:
         sizes: list[tuple[int, int] | None],
         fixed: list[float] | None,
     ) -> NvmFlavour:
-        """By the signs of the observations, and by which lens they fit better."""
+        """Decide by the signs of the observations, and by the lens with the smaller reprojection
+        error."""
         least = model.tracks.least
         kept = model.tracks.observations()
         kept = kept[np.argsort(kept[:, 0], kind="stable")]
@@ -67,13 +68,13 @@ class NvmFlavour:
         options = [cls(model, poses, seen, fixed, centred, measured) for measured in (True, False)]
         if fixed is not None or not model.values[:, 8].any():
             return options[0]
-        misses = [option._miss(sizes) for option in options]
-        if not np.isfinite(misses).any():
+        errors = [option._reprojection_error(sizes) for option in options]
+        if not np.isfinite(errors).any():
             return options[0 if centred or not np.isfinite(least).any() else 1]
-        return options[int(np.nanargmin(misses))]
+        return options[int(np.nanargmin(errors))]
 
     def lens(self, camera: int, size: tuple[int, int]) -> tuple[str, tuple[float, ...]]:
-        """(model, parameters) of a camera whose photo is this large."""
+        """(model, parameters) of a camera whose photo has this size."""
         centre = size[0] / 2, size[1] / 2
         if self.fixed is not None:
             fx, cx, fy, cy, *more = self.fixed
@@ -82,8 +83,9 @@ class NvmFlavour:
             if fx == fy:
                 return MEASURED_RADIAL, (fx, cx, cy, more[0])
             raise InputError(
-                "a fixed calibration with radial distortion and oblong pixels (fx is not fy) is "
-                "not read: no lens model is exact",
+                "a fixed calibration with radial distortion and non-square pixels (fx "
+                "differs from fy) "
+                "is not supported: no lens model is exact",
                 file="NVM_V3 FixedK",
             )
         f, r = float(self.model.values[camera, 0]), float(self.model.values[camera, 8])
@@ -94,8 +96,9 @@ class NvmFlavour:
         return "SIMPLE_RADIAL", (f, *centre, -r)
 
     def estimated_sizes(self, path: Path) -> list[tuple[int, int]]:
-        """A photo is as large as its features need; where these count from its corner, so large
-        that its middle is where the file's own points and poses put it."""
+        """(width, height) of each photo: the smallest that holds its features. Where pixels count
+        from the corner, the size also puts the photo's centre where the file's points and poses
+        imply it."""
         tracks = self.model.tracks
         with np.errstate(invalid="ignore"):
             reach: Array = 2.0 * np.maximum(np.abs(tracks.least), np.abs(tracks.most))
@@ -109,30 +112,30 @@ class NvmFlavour:
         if not good.all():
             name = self.model.names[int(np.argmin(good))]
             raise InputError(
-                f"says neither how large the photo {name!r} is nor where a feature lies in it; "
-                "give [scan] images",
+                f"holds neither the size of the photo {name!r} nor a feature in it; "
+                "set [scan] images to the folder of the photos",
                 file=path,
             )
         common: Array = np.median(reach, axis=0)
-        if not self.centred and (np.abs(reach - common) <= SAME_SIZE).all():
+        if not self.centred and (np.abs(reach - common) <= SIZE_TOLERANCE).all():
             reach = np.tile(common, (len(reach), 1))
         return [(int(w), int(h)) for w, h in np.ceil(reach)]
 
     def _middle(self, camera: int) -> Array | None:
-        """(2,) where the pixels say that the lens looks, from a camera's own observations."""
+        """(2,) the principal point in pixels, estimated from a camera's own observations."""
         seen, straight = self._seen(camera)
-        if len(seen) < ENOUGH:
+        if len(seen) < MIN_OBSERVATIONS:
             return None
         flat = make_lens(*self._about_zero(camera)).img_from_cam(straight)
         middle = np.median(seen - flat, axis=0)
         return middle if np.isfinite(middle).all() and (middle > 0).all() else None
 
-    def _miss(self, sizes: list[tuple[int, int] | None]) -> float:
-        """Mean distance in pixels between observations and projected points, each 20 at most."""
-        misses = []
+    def _reprojection_error(self, sizes: list[tuple[int, int] | None]) -> float:
+        """Mean distance in pixels between observations and projected points, each clipped to 20."""
+        errors = []
         for camera, size in enumerate(sizes):
             seen, straight = self._seen(camera)
-            if len(seen) < ENOUGH:
+            if len(seen) < MIN_OBSERVATIONS:
                 continue
             middle = self._middle(camera) if size is None else np.array(size, np.float64) / 2
             if self.centred:
@@ -141,16 +144,16 @@ class NvmFlavour:
                 continue
             flat = make_lens(*self._about_zero(camera)).img_from_cam(straight)
             off = np.linalg.norm(seen - middle - flat, axis=1)
-            misses.append(np.minimum(np.nan_to_num(off, nan=20.0), 20.0))
-        return float(np.concatenate(misses).mean()) if misses else np.nan
+            errors.append(np.minimum(np.nan_to_num(off, nan=20.0), 20.0))
+        return float(np.concatenate(errors).mean()) if errors else np.nan
 
     def _about_zero(self, camera: int) -> tuple[str, int, int, tuple[float, ...]]:
-        """make_lens's arguments for a lens whose principal point is at (0, 0)."""
+        """Arguments of make_lens for a lens with its principal point at (0, 0)."""
         model, parameters = self.lens(camera, (0, 0))
         return model, 1, 1, parameters
 
     def _seen(self, camera: int) -> tuple[Array, Array]:
-        """(pixels (n, 2), the points (n, 3) in the camera's frame) of some observations."""
+        """(pixels (n, 2), points (n, 3) in the camera's frame) of some observations."""
         rows = self.seen[camera]
         pose = self.poses[camera]
         with np.errstate(all="ignore"):

@@ -1,9 +1,9 @@
-"""OpenMVG's sfm_data.json.
+"""Reader for OpenMVG's sfm_data.json.
 
-openMVG, src/openMVG/sfm/sfm_data_io_cereal.cpp and src/openMVG/cameras: written by the cereal
-library, which names a type where it occurs first and refers to it by number later. Poses are world
-→ camera (x right, y down, z forward), the rotation row by row, with a centre. The photo's pixels
-are counted as OpenMVG's own export to COLMAP has them.
+openMVG, src/openMVG/sfm/sfm_data_io_cereal.cpp and src/openMVG/cameras. The cereal library writes
+the name of a type at its first occurrence and refers to it by number later. Poses are world →
+camera (x right, y down, z forward); the rotation is stored row by row, with a centre. Pixels are
+counted as in OpenMVG's own export to COLMAP.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ..reconstruction import Reconstruction, reconstruction_of
 
 Array = NDArray[np.float64]
 
-FIRST = 1 << 31  # added by cereal to a number where what it stands for occurs first
+FIRST_OCCURRENCE_FLAG = 1 << 31  # added by cereal to an id at its first occurrence
 MODELS = (
     "pinhole", "pinhole_radial_k1", "pinhole_radial_k3", "pinhole_brown_t2", "fisheye", "spherical",
 )  # fmt: skip
@@ -55,17 +55,22 @@ def read_openmvg(path: Path, images: Path | None, chunk: str | None) -> Reconstr
         width, height = view.whole("width", 0), view.whole("height", 0)
         if (width, height) != lens[:2] and width and height:
             raise view.error(
-                f"the photo has {width} × {height} pixels, its intrinsics {lens[0]} × {lens[1]}",
+                f"the photo has {width} × {height} pixels; its intrinsics are for {lens[0]} × "
+                f"{lens[1]}",
                 "width",
             )
         cameras.append(Camera(label, *lens, pose, name.lstrip("/")))
     notes = []
     if not poses:
         raise InputError(
-            "holds no pose (extrinsics): it was written before the reconstruction ran", file=path
+            "holds no pose (extrinsics): it was written before the reconstruction ran; "
+            "expected its output",
+            file=path,
         )
     if len(cameras) < len(views):
-        notes.append(f"{len(views) - len(cameras)} photos without a pose or a lens were left out")
+        notes.append(
+            f"Photos without a pose or a lens that were left out: {len(views) - len(cameras)}."
+        )
     points, _, more = sparse_points(_structure(data))
     return reconstruction_of(
         cameras, path, points=points, colours=np.full((len(points), 3), 128, np.uint8),
@@ -74,22 +79,22 @@ def read_openmvg(path: Path, images: Path | None, chunk: str | None) -> Reconstr
 
 
 def _structure(data: Record) -> Array:
-    """(n, 3) the landmarks."""
+    """(n, 3) positions of the landmarks."""
     values = [entry.get("value") for entry in _plain(data, "structure")]
     return Record({"structure": values}, data.file).table("structure", "X", 3)
 
 
 def _plain(data: Record, key: str) -> list[dict[str, object]]:
-    """A list of objects, as it is: for the many."""
+    """A list of objects without checks of their members, for long lists."""
     rows = data.values.get(key) or []
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise data.error("is no list of objects", key)
+        raise data.error("is not a list of objects", key)
     return rows
 
 
 def _pointed(data: Record, key: str) -> list[tuple[str, Record, str]]:
-    """(key, object, name of its type) of cereal's map of shared pointers; one that occurred before
-    is only referred to."""
+    """(key, object, name of its type) of cereal's map of shared pointers. A pointer that occurred
+    before is only a reference."""
     types: dict[int, str] = {}
     known: dict[int, Record] = {}
     found = []
@@ -97,21 +102,25 @@ def _pointed(data: Record, key: str) -> list[tuple[str, Record, str]]:
         value = entry.record("value")
         number = value.whole("polymorphic_id", 0)
         if "polymorphic_name" in value:
-            types[number % FIRST] = value.text("polymorphic_name")
+            types[number % FIRST_OCCURRENCE_FLAG] = value.text("polymorphic_name")
         pointer = value.record("ptr_wrapper")
         identity = pointer.whole("id", 0)
         if "data" in pointer:
-            known[identity % FIRST] = _unwrapped(pointer.record("data"))
-        if identity % FIRST not in known:
-            raise pointer.error(f"is {identity}, which stands for nothing", "id")
+            known[identity % FIRST_OCCURRENCE_FLAG] = _unwrapped(pointer.record("data"))
+        if identity % FIRST_OCCURRENCE_FLAG not in known:
+            raise pointer.error(f"is {identity}, which refers to no object", "id")
         found.append(
-            (entry.identity("key"), known[identity % FIRST], types.get(number % FIRST, ""))
+            (
+                entry.identity("key"),
+                known[identity % FIRST_OCCURRENCE_FLAG],
+                types.get(number % FIRST_OCCURRENCE_FLAG, ""),
+            )
         )
     return found
 
 
 def _unwrapped(record: Record) -> Record:
-    """The object with what it inherited: cereal nests a base class as value0."""
+    """The object with its inherited members: cereal nests a base class as value0."""
     values = record.values
     for _ in range(3):
         base = values.get("value0")
@@ -130,12 +139,14 @@ def _intrinsic(record: Record, kind: str) -> tuple[int, int, str, tuple[float, .
 def _lens(record: Record, kind: str, width: int, height: int) -> Lens:
     if kind not in MODELS:
         raise record.error(
-            f"the lens {kind[:40]!r} is not read; expected one of {', '.join(MODELS)}",
+            f"the lens {kind[:40]!r} is not supported; expected one of {', '.join(MODELS)}",
             "polymorphic_name",
         )
     if kind == "spherical":
         if width != 2 * height:
-            raise record.error("is a panorama that is not twice as wide as high; not read", "width")
+            raise record.error(
+                "is a panorama that is not twice as wide as high, which is not supported", "width"
+            )
         return panorama_lens(width, height)
     f = record.number("focal_length")
     cx, cy = (float(v) for v in record.numbers("principal_point", 2))

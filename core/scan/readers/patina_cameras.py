@@ -1,12 +1,12 @@
-"""Cameras of photos that were localised in a scan: Patina's own file, *.cameras.json.
+"""Reader and writer for cameras that were localised in a scan: Patina's own file, *.cameras.json.
 
-{"patina_cameras": 1, "frame": "mesh", "cameras": [{"label": …, "width": …, "height": …,
-"model": …, "parameters": […], "rotation": [[3 × 3]], "translation": [3], "photo": …, …}]}
+  {"patina_cameras": 1, "frame": "mesh", "cameras": [{"label": …, "width": …, "height": …,
+  "model": …, "parameters": […], "rotation": [[3 × 3]], "translation": [3], "photo": …, …}]}
 
-model, parameters: as core/scan/lens.py names them; rotation, translation: world → camera, x right,
-y down, z forward. frame: "mesh" where a mesh was at hand (the frame read_scan brings the scan's
-cameras into), else "cameras" (the reconstruction's own). Every number is written with all its
-digits. Other keys of a camera say how well it is known; readers pass over them.
+model, parameters: as in core/scan/lens.py. rotation, translation: world → camera, x right, y down,
+z forward. frame: "mesh" where a mesh was available (the frame that read_scan converts the scan's
+cameras to), else "cameras" (the reconstruction's own). Numbers are written with full precision.
+Further keys of a camera state its accuracy; readers ignore them.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from ...errors import InputError
 from ..camera import Camera, Pose
 from ..lens import make_lens
 from ..parsing.json_file import read_json
-from ..reconstruction import LARGEST_SIDE, Reconstruction, reconstruction_of
+from ..reconstruction import MAX_SIDE, Reconstruction, reconstruction_of
 
 KEY = "patina_cameras"
 VERSION = 1
 FRAMES = ("mesh", "cameras")
-MOST_PARAMETERS = 32
+MAX_PARAMETERS = 32
 
 
 def read_patina_cameras(
@@ -40,7 +40,7 @@ def read_patina_cameras(
         raise InputError("has no chunks; expected one in a Metashape file", file=path)
     data = read_json(path)
     if not isinstance(data, dict) or KEY not in data:
-        raise InputError(f"is no file of localised cameras (no key {KEY!r})", file=path)
+        raise InputError(f"is not a file of localised cameras; expected the key {KEY!r}", file=path)
     if data[KEY] != VERSION:
         raise InputError(f"found version {data[KEY]!r}, expected {VERSION}", file=path, key=KEY)
     if data.get("frame") not in FRAMES:
@@ -61,7 +61,7 @@ def write_patina_cameras(
     frame: str,
     more: Sequence[Mapping[str, object]] = (),
 ) -> None:
-    """Write cameras; ``more``: further keys of each."""
+    """Write cameras. ``more``: further keys of each camera."""
     entries = [
         {
             "label": camera.label,
@@ -86,14 +86,14 @@ def _camera(entry: Any, place: int, path: Path) -> Camera:
         raise InputError("expected a table", file=path, key=where)
     label, model, photo = (entry.get(name) for name in ("label", "model", "photo"))
     if not isinstance(label, str) or not label:
-        raise InputError("expected a text", file=path, key=f"{where}.label")
+        raise InputError("expected text", file=path, key=f"{where}.label")
     if not (photo is None or isinstance(photo, str)):
-        raise InputError("expected a text", file=path, key=f"{where}.photo")
+        raise InputError("expected text", file=path, key=f"{where}.photo")
     width, height = (_side(entry.get(name), name, where, path) for name in ("width", "height"))
     parameters = _numbers(entry, "parameters", None, where, path)
     rotation = _numbers(entry, "rotation", (3, 3), where, path)
     if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6) or np.linalg.det(rotation) < 0:
-        raise InputError("is no rotation matrix", file=path, key=f"{where}.rotation")
+        raise InputError("is not a rotation matrix", file=path, key=f"{where}.rotation")
     translation = _numbers(entry, "translation", (3,), where, path)
     try:
         if not isinstance(model, str):
@@ -101,10 +101,10 @@ def _camera(entry: Any, place: int, path: Path) -> Camera:
         lens = make_lens(model, width, height, parameters.tolist())
         if isinstance(lens, pycolmap.Camera) and not lens.verify_params():
             raise ValueError
-    except Exception as error:  # whatever the lens's own code makes of wrong numbers
+    except Exception as error:  # lens code raises many types for invalid values
         raise InputError(
-            f"found {str(model)[:40]!r} with {len(parameters)} parameters, expected a lens model "
-            "and as many as it has",
+            f"found {str(model)[:40]!r} with {len(parameters)} parameters; expected a lens model "
+            "and its number of parameters",
             file=path,
             key=f"{where}.model",
         ) from error
@@ -113,7 +113,7 @@ def _camera(entry: Any, place: int, path: Path) -> Camera:
 
 
 def _side(value: Any, name: str, where: str, path: Path) -> int:
-    if isinstance(value, int) and not isinstance(value, bool) and 0 < value <= LARGEST_SIDE:
+    if isinstance(value, int) and not isinstance(value, bool) and 0 < value <= MAX_SIDE:
         return value
     raise InputError("expected a number of pixels", file=path, key=f"{where}.{name}")
 
@@ -124,14 +124,14 @@ def _numbers(
     expected = "×".join(map(str, shape)) if shape else "a list of"
     try:
         flat = json.dumps(entry.get(name))
-        if any(sign in flat for sign in '"tfn{'):  # texts, true, false, null: no numbers
+        if any(sign in flat for sign in '"tfn{'):  # text, true, false, null
             raise ValueError
         values = np.array(entry.get(name), np.float64)
     except (ValueError, TypeError, OverflowError) as error:
         raise InputError(
             f"expected {expected} numbers", file=path, key=f"{where}.{name}"
         ) from error
-    fits = values.shape == shape if shape else values.ndim == 1 and len(values) <= MOST_PARAMETERS
+    fits = values.shape == shape if shape else values.ndim == 1 and len(values) <= MAX_PARAMETERS
     if not fits or not np.isfinite(values).all():
         raise InputError(f"expected {expected} finite numbers", file=path, key=f"{where}.{name}")
     return values

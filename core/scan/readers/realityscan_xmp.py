@@ -1,8 +1,8 @@
-"""RealityScan's .xmp files: one beside each photo, of its name.
+"""Reader for RealityScan's .xmp files: one per photo, with the photo's name.
 
 "RealityCapture XMP Camera Math" (Epic's knowledge base): Rotation is world → camera (x right, y
-down, z forward) row by row, Position the camera's centre; image coordinates are in units of the
-photo's larger side, from its middle. Each value is an attribute or an element of its own.
+down, z forward) row by row; Position is the camera's centre. Image coordinates are relative to the
+photo's centre, in units of its larger side. Each value is an attribute or a child element.
 """
 
 from __future__ import annotations
@@ -26,16 +26,18 @@ Array = NDArray[np.float64]
 
 NAMESPACE = "{http://www.capturingreality.com/ns/xcr/1.1#}"
 DESCRIPTION = "{http://www.w3.org/1999/02/22-rdf-syntax-ns#}Description"
-MOST_FILES = 50_000
-LARGEST = 1 << 20  # bytes of one file
+MAX_FILES = 50_000  # in a folder
+MAX_FILE_BYTES = 1 << 20  # bytes of one file
 BROWN = ("perspective", "brown3", "brown4", "brown3t2", "brown4t2")
 
 
 def read_xmp_folder(path: Path, images: Path | None) -> Reconstruction:
     """Cameras of all .xmp files in a folder, or of one file. Raises InputError."""
     files = [path] if path.is_file() else sorted(path.glob("*.xmp"))
-    if len(files) > MOST_FILES:
-        raise InputError(f"holds {len(files):,} .xmp files, more than {MOST_FILES:,}", file=path)
+    if len(files) > MAX_FILES:
+        raise InputError(
+            f"holds {len(files):,} .xmp files; expected at most {MAX_FILES:,}", file=path
+        )
     read = [(file, _description(file)) for file in files]
     found = [(file, description) for file, description in read if description is not None]
     photos = PhotoSizes(images, path if path.is_dir() else path.parent)
@@ -46,20 +48,21 @@ def read_xmp_folder(path: Path, images: Path | None) -> Reconstruction:
     ]
     if not cameras:
         raise InputError(
-            "no .xmp here holds a pose of RealityScan's (xcr:Rotation and xcr:Position): export "
+            "found no .xmp with a RealityScan pose (xcr:Rotation and xcr:Position); export "
             "them with 'Metadata (XMP)'",
             file=path,
         )
     notes = []
     if len(found) < len(files):
-        notes.append(f"{len(files) - len(found)} .xmp files without a pose were left out")
+        notes.append(f".xmp files without a pose that were left out: {len(files) - len(found)}.")
     return reconstruction_of(cameras, path, notes=tuple(notes))
 
 
 def _description(file: Path) -> Element | None:
-    """The element that holds a camera, or None: photo editors write .xmp files too."""
+    """The element that holds a camera; None where there is none (photo editors write .xmp files
+    too)."""
     try:
-        if file.stat().st_size > LARGEST:
+        if file.stat().st_size > MAX_FILE_BYTES:
             return None
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", file=file) from error
@@ -78,8 +81,8 @@ def _camera(label: str, file: Path, description: Element, photos: PhotoSizes) ->
     size = photos.size(file.stem)
     if size is None:
         raise InputError(
-            f"does not say how large its photo is, and no photo {file.stem!r} is found: give "
-            "[scan] images",
+            f"does not hold the size of its photo, and no photo {file.stem!r} was found; set "
+            "[scan] images to the folder of the photos",
             file=file,
         )
     rotation = _numbers(description, "Rotation", 9, file).reshape(3, 3)
@@ -91,7 +94,7 @@ def _camera(label: str, file: Path, description: Element, photos: PhotoSizes) ->
         found = float(_numbers(description, name, 1, file, str(expected))[0])
         if found != expected:
             raise InputError(
-                f"is {found:g}; only {expected:g} is read (align without a K+ model)",
+                f"is {found:g}; expected {expected:g}; align the photos without a K+ model",
                 file=file,
                 key=f"xcr:{name}",
             )
@@ -104,41 +107,43 @@ def _camera(label: str, file: Path, description: Element, photos: PhotoSizes) ->
 
 
 def _distortion(description: Element, file: Path) -> dict[str, float]:
-    """k1 … k4, t1, t2. Files spell coefficients with one f."""
+    """k1 … k4, t1, t2. RealityScan spells the key "Coeficients"."""
     model = (_value(description, "DistortionModel") or "perspective").strip()
     spelled = next(
         (n for n in ("DistortionCoeficients", "DistortionCoefficients")
          if _value(description, n) is not None), "DistortionCoeficients",
     )  # fmt: skip
-    numbers = _numbers(description, spelled, 6, file, "0 0 0 0 0 0", fewer=True)
+    values = _numbers(description, spelled, 6, file, "0 0 0 0 0 0", fewer=True)
     kind = model.lower()
-    if kind == "perspective" or (kind == "division" and not numbers.any()):
-        numbers = np.zeros(6)
+    if kind == "perspective" or (kind == "division" and not values.any()):
+        values = np.zeros(6)
     elif kind not in BROWN:
         raise InputError(
-            f"the lens {model[:40]!r} is not read; expected one of {', '.join(BROWN)}: choose one "
+            f"the lens {model[:40]!r} is not supported; expected one of {', '.join(BROWN)}; "
+            "choose one "
             "of Brown's models in RealityScan and export again",
             file=file,
             key="xcr:DistortionModel",
         )
-    return dict(zip(("k1", "k2", "k3", "k4", "t1", "t2"), map(float, numbers), strict=True))
+    return dict(zip(("k1", "k2", "k3", "k4", "t1", "t2"), map(float, values), strict=True))
 
 
 def _numbers(
     element: Element, name: str, count: int, file: Path, default: str | None = None,
     fewer: bool = False,
 ) -> Array:  # fmt: skip
-    """Finite numbers of an attribute or element; the rest 0 where fewer are allowed."""
+    """(count,) finite numbers of an attribute or element; missing ones are 0 where ``fewer`` is
+    set."""
     text = _value(element, name)
     text = default if text is None else text
     words = (text or "").replace(",", " ").split()
     found = [as_number(word) for word in words[: count + 1]]
-    numbers = [number for number in found if number is not None]
-    if len(numbers) != len(found) or (len(found) != count and not (fewer and len(found) < count)):
+    values = [number for number in found if number is not None]
+    if len(values) != len(found) or (len(found) != count and not (fewer and len(found) < count)):
         raise InputError(
             f"is {shown(text)}; expected {count} finite number{'s' * (count > 1)}",
             file=file,
             key=f"xcr:{name}",
             line=line_of(element),
         )
-    return np.array(numbers + [0.0] * (count - len(numbers)))
+    return np.array(values + [0.0] * (count - len(values)))

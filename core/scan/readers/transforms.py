@@ -1,8 +1,9 @@
-"""transforms.json of instant-ngp and nerfstudio.
+"""Reader for transforms.json of instant-ngp and nerfstudio.
 
-instant-ngp, docs/nerf_dataset_tips.md; nerfstudio, docs "Data conventions": transform_matrix is
-camera → world with x right, y up, z back; intrinsics for all frames or for each; pixels are counted
-as COLMAP does; k4 of a camera that is no fisheye belongs to r⁸ (not OpenCV's k4).
+instant-ngp, docs/nerf_dataset_tips.md; nerfstudio, docs "Data conventions". transform_matrix is
+camera → world with x right, y up, z back. Intrinsics are given for all frames or for each. Pixels
+are counted as in COLMAP. k4 of a camera that is not a fisheye is the coefficient of r⁸ (not
+OpenCV's k4).
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from ..reconstruction import Reconstruction, Similarity, reconstruction_of
 
 Array = NDArray[np.float64]
 
-TURN = np.diag([1.0, -1.0, -1.0])  # x right, y up, z back → x right, y down, z forward
+AXES_FLIP = np.diag([1.0, -1.0, -1.0])  # x right, y up, z back → x right, y down, z forward
 BROWN = {"OPENCV", "FULL_OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", ""}
 FISHEYE = {"OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "FISHEYE"}
 PANORAMA = {"EQUIRECTANGULAR"}
@@ -41,13 +42,13 @@ def read_transforms(path: Path, images: Path | None, chunk: str | None) -> Recon
     photos = PhotoSizes(images, path.parent)
     cameras = []
     for label, name, frame in zip(labels, names, frames, strict=True):
-        # a frame's own numbers stand above those of all
+        # a frame's own values override the common ones
         own = Record({**data.values, **frame.values}, path, frame.where)
         width, height = _size(own, name, photos)
         lens = _lens(own, width, height)
         cameras.append(Camera(label, width, height, *lens, _pose(frame), name))
     frames_of = _frames(data)
-    notes = ("sparse points lie in another file (ply_file_path), which is not read",)
+    notes = ("The sparse points are in another file (ply_file_path), which was not read.",)
     return reconstruction_of(
         cameras, path, frames=frames_of, notes=notes * ("ply_file_path" in data)
     )
@@ -60,8 +61,8 @@ def _size(record: Record, name: str, photos: PhotoSizes) -> tuple[int, int]:
     size = photos.size(name)
     if size is None:
         raise record.error(
-            f"is missing, and the photo {name[:60]!r} it could be read from is not found; "
-            "give [scan] images",
+            f"is missing, and the photo {name[:60]!r} was not found; "
+            "set [scan] images to the folder of the photos",
             "w",
         )
     return size
@@ -72,14 +73,20 @@ def _lens(record: Record, width: int, height: int) -> Lens:
     fisheye = model in FISHEYE or record.flag("is_fisheye")
     for key in ("ftheta_p0", "latlong", "rolling_shutter"):
         if record.values.get(key) not in (None, False, 0, [0, 0, 0, 0]):
-            raise record.error("is a camera of instant-ngp's own kind, which is not read", key)
+            raise record.error(
+                "is a camera model of instant-ngp's own, which is not supported", key
+            )
     if model in PANORAMA:
         if width != 2 * height:
-            raise record.error("is a panorama that is not twice as wide as high; not read", "w")
+            raise record.error(
+                "is a panorama that is not twice as wide as high, which is not supported", "w"
+            )
         return panorama_lens(width, height)
     if model not in BROWN | FISHEYE:
         known = ", ".join(sorted((BROWN | FISHEYE | PANORAMA) - {""}))
-        raise record.error(f"the lens {model[:40]!r} is not read; expected {known}", "camera_model")
+        raise record.error(
+            f"the lens {model[:40]!r} is not supported; expected one of {known}", "camera_model"
+        )
     fx, fy = _focal(record, width, height)
     cx, cy = record.number("cx", width / 2), record.number("cy", height / 2)
     radial = [record.number(f"k{i}", 0.0) for i in (1, 2, 3, 4)]
@@ -87,7 +94,7 @@ def _lens(record: Record, width: int, height: int) -> Lens:
     if fisheye:
         if any(tangential):
             raise record.error(
-                "is not 0 for a fisheye: no tool says what it means there; not read", "p1"
+                "is not 0 for a fisheye, where no tool defines its meaning; expected 0", "p1"
             )
         return fisheye_lens(fx, fy, cx, cy, radial)
     if model == "FULL_OPENCV":
@@ -99,7 +106,7 @@ def _lens(record: Record, width: int, height: int) -> Lens:
 
 
 def _focal(record: Record, width: int, height: int) -> tuple[float, float]:
-    """From pixels, or from angles of view."""
+    """(fx, fy) in pixels, from focal lengths or from angles of view."""
     focals = []
     for key, angle, size in (("fl_x", "camera_angle_x", width), ("fl_y", "camera_angle_y", height)):
         if key in record:
@@ -110,32 +117,32 @@ def _focal(record: Record, width: int, height: int) -> tuple[float, float]:
                 raise record.error(f"is {view:g}; expected an angle between 0 and π", angle)
             focals.append(size / 2 / math.tan(view / 2))
     if not focals:
-        raise record.error("is missing; expected it, or camera_angle_x", "fl_x")
+        raise record.error("is missing; expected fl_x or camera_angle_x", "fl_x")
     return focals[0], focals[-1]
 
 
 def _pose(frame: Record) -> Pose:
-    """World → camera. A scale, which some exports of Blender leave in it, turns nothing."""
+    """World → camera. A scale in the matrix, which some exports of Blender contain, is ignored."""
     try:
         placed = Similarity.of_matrix(_matrix(frame, "transform_matrix"))
     except ValueError as error:
-        raise frame.error(f"is no pose: {error}", "transform_matrix") from error
-    rotation = TURN @ placed.rotation.T
+        raise frame.error(f"is not a pose: {error}", "transform_matrix") from error
+    rotation = AXES_FLIP @ placed.rotation.T
     return Pose(rotation, -rotation @ placed.translation)
 
 
 def _matrix(record: Record, key: str) -> Array:
-    """4 × 4; written as such or without its last row."""
-    numbers = record.numbers(key, 12, 16)
-    return np.vstack([numbers.reshape(-1, 4)[:3], numbers[12:] if len(numbers) == 16 else _LAST])
+    """4 × 4 matrix, written with or without its last row."""
+    values = record.numbers(key, 12, 16)
+    return np.vstack([values.reshape(-1, 4)[:3], values[12:] if len(values) == 16 else LAST_ROW])
 
 
-_LAST = np.array([0.0, 0.0, 0.0, 1.0])
+LAST_ROW = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 def _frames(data: Record) -> dict[str, Similarity]:
-    """nerfstudio turns (applied_transform) and then scales (applied_scale) the frame that the
-    reconstruction, and a mesh of it, had: back to that one."""
+    """The frame before nerfstudio's applied_transform and applied_scale: that of the original
+    reconstruction and of a mesh made from it."""
     if "applied_transform" not in data and "applied_scale" not in data:
         return {}
     matrix = np.eye(4)
@@ -147,7 +154,7 @@ def _frames(data: Record) -> dict[str, Similarity]:
     try:
         applied = Similarity.of_matrix(matrix)
     except ValueError as error:
-        raise data.error(f"is no change of frame: {error}", "applied_transform") from error
+        raise data.error(f"is not a similarity: {error}", "applied_transform") from error
     back = applied.rotation.T / applied.scale
     original = Similarity(
         applied.rotation.T, -back @ applied.translation, 1 / (scale * applied.scale)

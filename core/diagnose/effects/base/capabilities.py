@@ -1,4 +1,4 @@
-"""What an effect needs, and how it is judged."""
+"""Requirements of effects, and the measures by which they are judged."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from .effect import Array, Effect, Vector
 
 
 class TracesRays(Effect, ABC):
-    """Moves the lamp or a photo, so that other rays through the mesh decide what is lit or seen.
+    """Moves the lamp or a photo, so that visibility has to be traced again.
 
-    Rays are expensive: they are traced again once the effect is accepted.
+    Rays are expensive: this is done once the effect is accepted.
     """
 
     @abstractmethod
@@ -48,7 +48,7 @@ class RelaxesBRDFs(Effect, ABC):
 
 
 class NeedsPhoto(Effect, ABC):
-    """Needs what the photo shows around a pixel: its gradient and its wide blur."""
+    """Needs the neighbourhood of a pixel in the photo: its gradient and its wide blur."""
 
 
 class WidensHighlights(Effect, ABC):

@@ -1,4 +1,4 @@
-"""Shadows that move with the lamp: where light grazes the object, by more than the lamp does."""
+"""Shadows of a displaced lamp. Under grazing light they move farther than the lamp."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from .image_formation import ChangesShading
 
 @dataclass(frozen=True)
 class DisplacedShadows:
-    """more: (n,) part of the light that arrives where an effect with numbers x (p,) puts the lamp,
-    less what arrives from where the capture does."""
+    """x: (p,) parameters of the effect that displaces the lamp. more: (n,) visibility of the
+    displaced lamp minus that of the lamp as the capture gives it."""
 
     x: NDArray[np.float64]
     more: Array
@@ -26,10 +26,10 @@ class DisplacedShadows:
     def of(
         cls, context: DiagnosisContext, effect: ChangesShading, x: NDArray[np.float64]
     ) -> DisplacedShadows:
-        """effect: without shadows of its own."""
+        """effect: without displaced shadows. x: (p,) its parameters."""
         pixels = context.pixels
         towards = effect.shading(ShadingState.of(pixels), x).light
-        # of both in one way: what rays from parts of a pixel miss of a fold is the same
+        # both by the same rays, so that their errors in folds cancel
         parts = pixel_part_points(context.rays, pixels)
         was, will = (
             partial_visibility(context.rays, pixels, to, parts=parts)
@@ -38,6 +38,6 @@ class DisplacedShadows:
         return cls(x, will - was)
 
     def on(self, state: ShadingState) -> ShadingState:
-        """With these shadows."""
+        """The state with these shadows."""
         visible = np.clip(state.visible + self.more, 0, 1).astype(np.float32)
         return replace(state, visible=visible)

@@ -1,5 +1,6 @@
-"""The surface that photos really show, where they do not lie as the scan says: a mesh turns within
-a few pixels by more than along a straight line, and other shadows end there."""
+"""The surface that a photo shows under a corrected camera pose.
+
+Within a few pixels the normals of a mesh do not change linearly, and other shadow edges appear."""
 
 from __future__ import annotations
 
@@ -14,15 +15,16 @@ from ...forward.partial_visibility import partial_visibility
 from ...forward.pixels import Pixels
 from .effect import Array
 
-BEFORE = 0.03  # of the object's size, from which rays look back; twice as far is another surface
-ABOUT = 2.0 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])  # pixels right and down
+RAY_OFFSET = 0.03  # of the object's size: rays start so far in front; hits beyond twice that are
+# another surface
+NEIGHBOURS = 2.0 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])  # pixels to the right and down
 
 
 @dataclass(frozen=True)
 class DisplacedView:
-    """Of a pose with numbers x (p,): more: (n, 3) the normal that pixels show, less the one that
-    they should; visible: (n,) part of the light that arrives there; known: (n,) where rays met the
-    surface that is looked for; ends: (n,) where within two pixels of it, it or the light ends."""
+    """x: (p,) pose parameters. more: (n, 3) normal under these minus the original normal. visible:
+    (n,) fraction of the light that arrives. known: (n,) whether the rays hit the expected surface.
+    ends: (n,) whether the surface or the light ends within two pixels."""
 
     x: NDArray[np.float64]
     more: Array
@@ -31,17 +33,19 @@ class DisplacedView:
     ends: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, context: DiagnosisContext, beside: Array, x: NDArray[np.float64]) -> DisplacedView:
-        """context: with what its pixels' points and normals are more a pixel to the right and down.
-        beside: (n, 3) about how far the point that is shown lies from the one that should be."""
+    def of(
+        cls, context: DiagnosisContext, displacement: Array, x: NDArray[np.float64]
+    ) -> DisplacedView:
+        """context: its pixels hold the changes of point and normal per pixel. displacement: (n, 3)
+        approximate displacement of the visible point, scan units."""
         pixels, step = context.pixels, context.pixels.step
-        met, shown = _shown(context, beside)
+        met, shown = _shown(context, displacement)
         more, visible = np.zeros_like(pixels.normal), pixels.visible.astype(np.float32)
         more[met] = shown.normal - pixels.normal[met]
         lit = _lit(context, met, shown)
         ends = np.zeros(len(pixels), bool)
-        for right, down in ABOUT:
-            aside = _shown(context, beside + right * step[:, 0] + down * step[:, 1])
+        for right, down in NEIGHBOURS:
+            aside = _shown(context, displacement + right * step[:, 0] + down * step[:, 1])
             ends |= _lit(context, *aside) != lit
         visible[met] = np.where(lit[met], 1, _turned_away(shown))
         rows = np.flatnonzero((ends & met)[met])
@@ -51,17 +55,17 @@ class DisplacedView:
 
     @property
     def dark_where_it_ends(self) -> DisplacedView:
-        """The same without light where nobody knows what a pixel shows."""
-        sure = self.known & ~self.ends
-        return replace(self, visible=np.where(sure, self.visible, np.float32(0)))
+        """The same, but dark where the visible point is uncertain."""
+        certain = self.known & ~self.ends
+        return replace(self, visible=np.where(certain, self.visible, np.float32(0)))
 
 
-def _shown(context: DiagnosisContext, beside: Array) -> tuple[NDArray[np.bool_], Pixels]:
-    """((n,) whether rays meet the surface so far beside where pixels should look, those pixels with
-    the point and the normal that they meet)."""
-    pixels, back = context.pixels, BEFORE * context.size
+def _shown(context: DiagnosisContext, displacement: Array) -> tuple[NDArray[np.bool_], Pixels]:
+    """((n,) whether the displaced rays hit the surface, those pixels with the points and normals
+    that were hit)."""
+    pixels, back = context.pixels, RAY_OFFSET * context.size
     view = pixels.view.astype(np.float64)
-    start = pixels.point + beside + back * view
+    start = pixels.point + displacement + back * view
     hits = context.rays.first_hits(start, -view)
     assert hits.distance is not None
     met = (hits.face >= 0) & (hits.distance < 2 * back)
@@ -74,7 +78,7 @@ def _shown(context: DiagnosisContext, beside: Array) -> tuple[NDArray[np.bool_],
 
 
 def _lit(context: DiagnosisContext, met: NDArray[np.bool_], shown: Pixels) -> NDArray[np.bool_]:
-    """(n,) whether light arrives at what is shown; not where nothing is."""
+    """(n,) whether light arrives at the visible point; False where the rays hit nothing."""
     facing = ~_turned_away(shown)
     rows = np.flatnonzero(facing)
     facing[rows] = ~cast_shadow(

@@ -1,8 +1,8 @@
 """The interface of an effect: one way in which the forward model may be wrong.
 
-Every effect is an ``Effect``. What else it does it says by deriving from a class of
-image_formation.py (where in the formation of a photo it acts) and of capabilities.py (what it needs
-or how it is judged). An effect that derives from none of these changes nothing.
+Every effect is an ``Effect``. It also derives from classes of image_formation.py (where in the
+formation of a photo it acts) and of capabilities.py (what it needs or how it is judged). An effect
+that derives from none of these changes nothing.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ Vector = NDArray[np.float64]
 class Effect(ABC):
     """One cause of the vocabulary, built for the pixels that it is to explain.
 
-    cause: its word in the vocabulary. deciding_photo: the photo that would tell it from others.
+    cause: its word in the vocabulary. deciding_photo: the photo that would distinguish it
+    from other causes.
     systematic_error: relative error of the effect's own numerical sums.
     """
 
@@ -43,7 +44,8 @@ class Effect(ABC):
 
     @abstractmethod
     def sentence(self, x: Vector, error: Vector) -> str:
-        """What it means, for an artist. x: (p,) parameters; error: (p,) their standard errors."""
+        """Description for the user: one or two complete sentences. x: (p,) parameters; error: (p,)
+        their standard errors."""
 
     def at_pixels(self, context: DiagnosisContext, nearest: NearestPixels) -> Effect | None:
         """The effect with the same parameters for other pixels, those of ``context``. nearest: of
@@ -85,7 +87,7 @@ class Effect(ABC):
         return len(self.parameters)
 
     @property
-    def columns(self) -> NDArray[np.intp] | None:
+    def parameter_index(self) -> NDArray[np.intp] | None:
         """(n, s) indices of the parameters that each pixel depends on, −1 none, one a slot; no
         pixel depends on two parameters of one slot. None: every pixel depends on all of them."""
         return None

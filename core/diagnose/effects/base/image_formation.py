@@ -14,7 +14,7 @@ from .effect import Array, Effect, Vector
 
 
 class ChangesShading(Effect, ABC):
-    """Surface, light or visibility are not what the capture says."""
+    """Surface, light or visibility differ from the capture's."""
 
     @abstractmethod
     def shading(self, state: ShadingState, x: Vector) -> ShadingState:
@@ -42,7 +42,7 @@ class ChangesRecording(Effect, ABC):
 
     @abstractmethod
     def recorded(self, radiance: Array, state: ShadingState, x: Vector) -> Array:
-        """(n, 3) what the camera records of this radiance."""
+        """(n, 3) recorded radiance. radiance: (n, 3) that reaches the camera."""
 
 
 class CameraEffect(ChangesRecording, ABC):
@@ -50,5 +50,5 @@ class CameraEffect(ChangesRecording, ABC):
 
 
 def changes_lamp_light(effect: Effect) -> bool:
-    """Whether the effect changes what the surface reflects of the lamp."""
+    """Whether the effect changes the reflected light of the lamp."""
     return isinstance(effect, ChangesShading | ExtendsLamp)

@@ -30,7 +30,7 @@ class PatchEffect(Effect):
         return int(self.patch.max()) + 1
 
     @property
-    def columns(self) -> NDArray[np.intp]:
+    def parameter_index(self) -> NDArray[np.intp]:
         return parameter_columns(self.patch, len(self.parameters) // self.count)
 
     @property

@@ -1,4 +1,4 @@
-"""Small parts of the surface, each seen by several photos."""
+"""Patches: small parts of the surface, each visible in several photos."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 from ...forward.diagnosis_context import DiagnosisContext
 
 ACROSS = 24  # patches over the object's size
-FEWEST = 12  # pixels that say something of a patch
+MIN_PIXELS = 12  # of a patch; smaller ones are ignored
 
 
 def surface_patches(context: DiagnosisContext, across: int = ACROSS) -> NDArray[np.intp]:
-    """(n,) number of each pixel's patch: cubes of space, the two sides of a thin wall apart; −1 of
-    patches that too few pixels show."""
+    """(n,) number of each pixel's patch, −1 where a patch has fewer than MIN_PIXELS pixels. Patches
+    are cubes of space, with the two sides of a thin wall separated. across: cubes over the object's
+    size."""
     pixels = context.pixels
     place = np.floor((pixels.point - context.centre) / (context.size / across)).astype(np.int64)
     axis = np.abs(pixels.normal).argmax(axis=1)
@@ -23,12 +24,12 @@ def surface_patches(context: DiagnosisContext, across: int = ACROSS) -> NDArray[
     key = ((place[:, 0] * wide[1] + place[:, 1]) * wide[2] + place[:, 2]) * 2 + side
     _, of, count = np.unique(key, return_inverse=True, return_counts=True)
     of = of.ravel()
-    number = np.where(count >= FEWEST, np.cumsum(count >= FEWEST) - 1, -1)
+    number = np.where(count >= MIN_PIXELS, np.cumsum(count >= MIN_PIXELS) - 1, -1)
     return np.asarray(number[of], np.intp)
 
 
 def median_of(patch: NDArray[np.intp], values: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(p,) of each patch's pixels; patch: (n,) of each pixel, −1 none; values: (n,)."""
+    """(p,) median of values (n,) in each patch; patch: (n,) of each pixel, −1 none."""
     known = np.flatnonzero(patch >= 0)
     order = known[np.lexsort((values[known], patch[known]))]
     count = np.bincount(patch[known])
