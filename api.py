@@ -126,15 +126,15 @@ class FitResult:
 @dataclass(frozen=True)
 class Finding:
     """One cause that was tested. cause: its name (docs/method/diagnosis.md); sentence: its meaning;
-    accepted: whether it predicts held-out regions of the photos significantly better; doubted: the
-    reason why the second fit ignores it, else None. gain, standard_error: increase of the log
+    accepted: whether it predicts held-out regions of the photos significantly better; contradicted:
+    the evidence against it, else None. gain, standard_error: increase of the log
     likelihood of held-out regions, nats; p_value: probability of such a gain by chance. parameters:
     name → (value, standard error, unit)."""
 
     cause: str
     sentence: str
     accepted: bool
-    doubted: str | None
+    contradicted: str | None
     gain: float
     standard_error: float
     p_value: float
@@ -369,7 +369,7 @@ def _finding(cause: Mapping[str, Any]) -> Finding:
         cause=cause["cause"],
         sentence=cause["sentence"],
         accepted=cause["accepted"],
-        doubted=cause["doubted"],
+        contradicted=cause["doubted"],
         gain=cause["held_out_gain"],
         standard_error=cause["standard_error"],
         p_value=cause["p_value"],

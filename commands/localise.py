@@ -56,10 +56,10 @@ def run(arguments: argparse.Namespace) -> None:
         for found in result.placed:
             print(f"  {found.sentence()}")
         print(f'wrote {out / name}; add extra = "{name}" to [scan] of the capture file')
-    if result.refused:
-        more = f" (and {len(result.refused) - 1} more)" if len(result.refused) > 1 else ""
+    if result.rejected:
+        more = f" (and {len(result.rejected) - 1} more)" if len(result.rejected) > 1 else ""
         count = f"{len(result.placed)} of {len(photos)} photos localised; "
-        raise PatinaError(f"{count}{result.refused[0]}{more}")
+        raise PatinaError(f"{count}{result.rejected[0]}{more}")
 
 
 def _photos(given: list[Path]) -> list[Path]:

@@ -15,7 +15,7 @@ def atomic_path(path: Path, ending: str = ".part") -> Iterator[Path]:
     succeeds.
 
     ending: of the temporary name, for writers that choose the format by it (".part.exr"). The name
-    cannot be predicted: a symbolic link that somebody put there would be written through. Where the
+    cannot be predicted: a symbolic link at a predictable name would be written through. Where the
     block raises, ``path`` is unchanged and the unfinished file is removed. Raises OSError.
     """
     partial = path.with_name(f"{path.name}.{secrets.token_hex(8)}{ending}")

@@ -31,11 +31,11 @@ OUTPUT_FILE = "localised.cameras.json"
 
 @dataclass(frozen=True)
 class LocalisedPhotos:
-    """placed: localised photos; refused: a sentence about each photo that was rejected; notes:
+    """placed: localised photos; rejected: a sentence about each photo that was rejected; notes:
     sentences about unused photos. frame: see patina_cameras.py."""
 
     placed: tuple[Localised, ...]
-    refused: tuple[str, ...]
+    rejected: tuple[str, ...]
     notes: tuple[str, ...]
     frame: str
 
@@ -137,7 +137,7 @@ class LocaliseJob(Job):
         finally:
             pool.shutdown(cancel_futures=True)
         placed: list[Localised] = []
-        refused: list[str] = []
+        rejected: list[str] = []
         for place, path in enumerate(self._photos):
             work.at("localising", READ_FRACTION + (1 - READ_FRACTION) * place / len(self._photos))
             try:
@@ -145,12 +145,12 @@ class LocaliseJob(Job):
                     path, features_of(path), self._lenses[place], self._scan, first, landmarks, lift
                 )
             except Unsupported as error:
-                refused.append(str(error))
+                rejected.append(str(error))
                 continue
             label = self._labels[place]
             placed.append(replace(found, camera=replace(found.camera, label=label)))
         frame = "mesh" if self._mesh is not None else "cameras"
-        return LocalisedPhotos(tuple(placed), tuple(refused), (*self._notes, *unreadable), frame)
+        return LocalisedPhotos(tuple(placed), tuple(rejected), (*self._notes, *unreadable), frame)
 
 
 def features_of(path: Path) -> Features:

@@ -131,7 +131,7 @@ def test_lit_photos_are_localised(scene: Path, tmp_path: Path) -> None:
     job = LocaliseJob(cameras, scene / "photos", photos, mesh, threads=2)
     job.drain()
     result = job.result
-    assert len(result.refused) == 1 and "other.jpg" in result.refused[0]
+    assert len(result.rejected) == 1 and "other.jpg" in result.rejected[0]
     read = read_reconstruction(result.write(tmp_path))
     assert [c.label for c in read.cameras] == ["lit_0.jpg", "lit_1.jpg"]
     for camera, found, (view, _) in zip(read.cameras, result.placed, lit_views(), strict=True):
