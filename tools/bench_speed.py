@@ -248,8 +248,8 @@ def _candidates(count: int, components: int):  # type: ignore[no-untyped-def]
 def _select(candidates: str, count: str) -> dict[str, Any]:
     import numpy as np
 
-    from patina.core.fit.candidate_tree import angle_cells
-    from patina.core.fit.selection import choose_from_cells
+    from tools.candidate_search.candidate_tree import angle_cells
+    from tools.candidate_search.cell_selection import choose_from_cells
 
     angles, rows = _candidates(int(candidates), int(count))
     start = time.perf_counter()
@@ -264,8 +264,8 @@ def _nielsen(candidates: str, count: str) -> dict[str, Any]:
     import numpy as np
 
     from patina.core.fit import selection
-    from patina.core.fit.candidate_tree import CandidateTree, angle_cells
     from patina.core.fit.condition_bound import ConditionBound
+    from tools.candidate_search.candidate_tree import CandidateTree, angle_cells
 
     angles, rows = _candidates(int(candidates), int(count))
     start = time.perf_counter()

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from patina.core.angles import Angles
 from patina.core.basis import default_basis
-from patina.core.fit.candidate_tree import angle_cells
 from patina.core.fit.condition_bound import ConditionBound, condition_numbers
-from patina.core.fit.selection import choose, choose_from_cells
+from patina.core.fit.selection import choose
+from tools.candidate_search.candidate_tree import angle_cells
+from tools.candidate_search.cell_selection import choose_from_cells
 from tools.plain_selection import choose_plainly
 
 CASES = {

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import Angles
-from .condition_bound import (
+from patina.core.angles import Angles
+from patina.core.fit.condition_bound import (
     FIRST_BATCH,
     ROUNDING,
     ROUNDING_32,

@@ -1,0 +1,1 @@
+"""The search of a well-conditioned set among very many candidates."""
