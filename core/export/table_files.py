@@ -26,12 +26,6 @@ def table_pixels(table: TabulatedBRDF) -> NDArray[np.float32]:
     return np.moveaxis(table.values, 0, -1).reshape(n_h * n_d, n_p, 3)
 
 
-def table_from_pixels(pixels: NDArray[np.floating]) -> TabulatedBRDF:
-    """The table of such pixels: the inverse of :func:`table_pixels`."""
-    values = np.moveaxis(np.asarray(pixels).reshape(*merl_grid.SHAPE, 3), -1, 0)
-    return TabulatedBRDF(np.ascontiguousarray(values, np.float32))
-
-
 def write_exr_material(folder: Path, material: FittedMaterial, table: TabulatedBRDF) -> list[str]:
     """Write NAME_table.exr and NAME_coefficients.exr; returns their names."""
     name = identifier(material.name)
