@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import shutil
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -16,6 +18,9 @@ from .environment import test_python
 from .extension import pack
 from .import_rules import check_imports
 from .wheels import PYTHONS
+
+PLAIN_TESTS = (ROOT / "tests/core",)
+BPY_TESTS = (ROOT / "tests/wheel", ROOT / "tests/hunt")
 
 
 def lint(python: Path) -> int:
@@ -48,19 +53,30 @@ def types(python: Path) -> int:
 
 
 def python_tests(python: Path, arguments: Sequence[str]) -> int:
-    """Run pytest on the given paths, or else on tests/core, tests/wheel and tests/hunt."""
-    folders = [
-        path
-        for path in (ROOT / "tests/core", ROOT / "tests/wheel", ROOT / "tests/hunt")
-        if path.is_dir()
-    ]
-    named = any(Path(word.split("::")[0]).exists() for word in arguments)
-    return call(
-        [
-            python, "-m", "pytest", "--rootdir", ROOT, "-c", ROOT / "pyproject.toml",
-            *arguments, *([] if named else folders),
-        ]
-    )  # fmt: skip
+    """Run pytest; without arguments all folders, those with bpy in a second process."""
+    if arguments:
+        named = any(Path(word.split("::")[0]).exists() for word in arguments)
+        folders = [] if named else [*PLAIN_TESTS, *BPY_TESTS]
+        return call([*_pytest(python), *arguments, *folders])
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as output:
+        with_bpy = subprocess.Popen(
+            [*_pytest(python), *map(str, BPY_TESTS)], stdout=output, stderr=subprocess.STDOUT
+        )
+        try:
+            code = call([*_pytest(python), *PLAIN_TESTS])
+            other = with_bpy.wait()
+        finally:
+            with_bpy.kill()  # does nothing where it has ended
+            with_bpy.wait()
+        output.seek(0)
+        shutil.copyfileobj(output, sys.stdout)
+    return code or other
+
+
+def _pytest(python: Path) -> list[str]:
+    """The command without folders."""
+    words = [python, "-m", "pytest", "--rootdir", ROOT, "-c", ROOT / "pyproject.toml"]
+    return [str(word) for word in words]
 
 
 def blender_tests() -> int:
