@@ -19,7 +19,7 @@ from patina.core.diagnose.solver.model import Model
 from patina.core.fit.held_out import HeldOutErrors
 from patina.core.jobs import highlight_deconvolution_passes
 from patina.core.jobs.highlight_deconvolution_passes import fit_with_deconvolution
-from tests.core.test_corrected import rows_of, table_of
+from tests.core.test_sample_correction import rows_of, table_of
 from tests.make_lit_ball import GLOSSY, changed, lit_ball
 
 WIDE = np.array([np.radians(14.0)])
