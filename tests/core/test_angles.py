@@ -25,7 +25,7 @@ def random_directions(seed: int, n: int = 500) -> tuple[np.ndarray, np.ndarray]:
     theta_d=st.floats(1e-6, np.pi / 2 - 1e-6),
     phi_d=st.floats(0, np.pi - 1e-6),
 )
-def test_angles_to_directions_and_back(theta_h: float, theta_d: float, phi_d: float) -> None:
+def test_angles_to_directions_round_trip(theta_h: float, theta_d: float, phi_d: float) -> None:
     angles = Angles(*(np.array([x]) for x in (theta_h, theta_d, phi_d)))
     light, view = light_view(*angles)
     assert np.allclose(np.linalg.norm(light, axis=-1), 1) and np.allclose(
@@ -34,13 +34,13 @@ def test_angles_to_directions_and_back(theta_h: float, theta_d: float, phi_d: fl
     back = half_difference(np.broadcast_to(NORMAL, light.shape), light, view)
     assert np.allclose(back.theta_h, theta_h, atol=1e-9)
     assert np.allclose(back.theta_d, theta_d, atol=1e-9)
-    # φd = 0 and φd = π are one direction; its error grows as the arms it turns on get short
-    turn = np.abs((back.phi_d - phi_d + np.pi / 2) % np.pi - np.pi / 2)
-    assert turn < 1e-9 / (np.sin(theta_h) * np.sin(theta_d)) + 1e-9
+    # φd = 0 and φd = π are the same direction; the error of φd grows as θh or θd approaches 0
+    phi_d_error = np.abs((back.phi_d - phi_d + np.pi / 2) % np.pi - np.pi / 2)
+    assert phi_d_error < 1e-9 / (np.sin(theta_h) * np.sin(theta_d)) + 1e-9
 
 
 @given(seed=st.integers(0, 10_000))
-def test_swapping_light_and_view_changes_nothing(seed: int) -> None:
+def test_angles_are_reciprocal(seed: int) -> None:
     light, view = random_directions(seed, 50)
     normal = np.broadcast_to(NORMAL, light.shape)
     a, b = half_difference(normal, light, view), half_difference(normal, view, light)
@@ -49,7 +49,7 @@ def test_swapping_light_and_view_changes_nothing(seed: int) -> None:
 
 
 @given(seed=st.integers(0, 10_000))
-def test_any_common_rotation_changes_nothing(seed: int) -> None:
+def test_angles_are_invariant_under_common_rotation(seed: int) -> None:
     light, view = random_directions(seed, 50)
     normal = np.broadcast_to(NORMAL, light.shape)
     q, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
@@ -62,15 +62,15 @@ def test_any_common_rotation_changes_nothing(seed: int) -> None:
 
 
 @given(seed=st.integers(0, 10_000))
-def test_cosines_are_those_of_the_directions(seed: int) -> None:
+def test_cosines_match_the_directions(seed: int) -> None:
     light, view = random_directions(seed)
     angles = half_difference(np.broadcast_to(NORMAL, light.shape), light, view)
     cos_i, cos_o = cosines(*angles)
-    # folding φd may have swapped the two
+    # folding φd may have swapped light and view
     assert np.allclose(np.sort([cos_i, cos_o], axis=0), np.sort([light[:, 2], view[:, 2]], axis=0))
 
 
-def test_the_poles_are_exact() -> None:
+def test_angles_are_exact_at_the_poles() -> None:
     up = NORMAL[None]
     straight = half_difference(up, up, up)
     assert straight.theta_h[0] == 0 and straight.theta_d[0] == 0
@@ -80,28 +80,28 @@ def test_the_poles_are_exact() -> None:
     assert mirror.theta_h[0] == 0 and np.isclose(mirror.theta_d[0], tilt)
     retro = half_difference(up, light, light)
     assert np.isclose(retro.theta_h[0], tilt) and retro.theta_d[0] < 1e-12
-    tiny = np.radians(1e-5)  # acos would read 0 here
+    tiny = np.radians(1e-5)  # acos would return 0 here
     light = np.array([[np.sin(tiny), 0, np.cos(tiny)]])
     assert np.isclose(half_difference(up, light, light).theta_h[0], tiny, rtol=1e-9)
 
 
-def test_opposite_directions_stay_finite() -> None:
+def test_opposite_directions_give_finite_angles() -> None:
     angles = half_difference(NORMAL[None], np.array([[1.0, 0, 0]]), np.array([[-1.0, 0, 0]]))
     assert all(np.isfinite(a).all() for a in angles)
 
 
 @given(phi=st.floats(-50, 50))
-def test_folded_azimuth_lies_in_range(phi: float) -> None:
+def test_folded_phi_d_is_in_range(phi: float) -> None:
     folded = fold_phi_d(np.array([phi]))
     assert 0 <= folded[0] < np.pi
     assert np.isclose(np.sin(folded[0] - phi), 0, atol=1e-9)
 
 
-def test_cell_centres_and_edges_fall_into_their_own_cell() -> None:
+def test_cell_centres_and_edges_map_to_their_own_cell() -> None:
     for offset in (0.5, 1e-9):
         ih, idx, ip = merl_grid.index(merl_grid.node_angles(offset))
         expected = np.indices(merl_grid.SHAPE)
-        assert (ih == expected[0]).mean() > 0.999  # a rounding of the square root at an edge
+        assert (ih == expected[0]).mean() > 0.999  # the square root may round across a cell edge
         assert (idx == expected[1]).mean() > 0.98
         assert (ip == expected[2]).mean() > 0.98
     assert int(merl_grid.visible(merl_grid.node_angles(0.5)).sum()) == 1_096_216

@@ -1,4 +1,4 @@
-"""Work beside the job: values, results and errors arrive, and nobody waits long to be heard."""
+"""Background work: values, results and errors are delivered, and the caller never blocks long."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from patina.core.concurrency.steps import drained
 from patina.core.errors import FitError
 
 
-def slow_steps(seconds: float, seen: list[str]) -> Generator[float, None, str]:
+def slow_steps(seconds: float, completed: list[str]) -> Generator[float, None, str]:
     yield 0.0
     time.sleep(seconds)
-    seen.append("first")
+    completed.append("first")
     yield 0.5
-    seen.append("second")
+    completed.append("second")
     return "result"
 
 
-def test_the_result_and_every_value_arrive_in_order() -> None:
-    seen: list[str] = []
+def test_values_and_result_arrive_in_order() -> None:
+    completed: list[str] = []
     values = []
-    steps = steps_in_background(slow_steps(0.3, seen))
+    steps = steps_in_background(slow_steps(0.3, completed))
     while True:
         try:
             values.append(next(steps))
@@ -34,40 +34,40 @@ def test_the_result_and_every_value_arrive_in_order() -> None:
             assert end.value == "result"
             break
     assert sorted(set(values)) == [0.0, 0.5] and values == sorted(values)
-    assert values.count(0.0) > 3  # a yield every twentieth of a second
-    assert seen == ["first", "second"]
+    assert values.count(0.0) > 3  # yields every 0.05 s
+    assert completed == ["first", "second"]
 
 
-def test_who_leaves_need_not_wait_and_the_rest_is_not_done() -> None:
-    seen: list[str] = []
-    steps = steps_in_background(slow_steps(0.5, seen))
+def test_close_returns_at_once_and_stops_the_remaining_work() -> None:
+    completed: list[str] = []
+    steps = steps_in_background(slow_steps(0.5, completed))
     next(steps)
-    next(steps)  # the half second has begun
-    since = time.perf_counter()
+    next(steps)  # the 0.5 s sleep has begun
+    start = time.perf_counter()
     steps.close()
-    assert time.perf_counter() - since < 0.3
+    assert time.perf_counter() - start < 0.3
     for thread in [t for t in threading.enumerate() if t.name.startswith("patina")]:
         thread.join(5)
-    assert seen == ["first"]
+    assert completed == ["first"]
 
 
-def test_errors_pass_through() -> None:
+def test_errors_of_background_steps_are_raised() -> None:
     def fails() -> Generator[float, None, None]:
         yield 0.1
         raise FitError("too few samples")
 
     with pytest.raises(FitError, match="too few"):
         drained(steps_in_background(fails()))
-    with pytest.raises(TimeoutError):  # the work's own, not the waiting's
+    with pytest.raises(TimeoutError):  # raised by the work itself, not by the wait
 
-        def late() -> None:
+        def raise_timeout() -> None:
             raise TimeoutError
 
-        drained(in_background(late, 0.0))
+        drained(in_background(raise_timeout, 0.0))
 
 
-class Slow(Job):
-    """A piece of a third of a second, then another."""
+class SlowJob(Job):
+    """Two steps; the first one takes 0.3 s."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -81,45 +81,45 @@ class Slow(Job):
             yield Step("second", 0.5)
             self.done.append("second")
         finally:
-            self.done.append("let go")
+            self.done.append("released")
 
 
-def test_who_steps_a_job_alongside_never_waits() -> None:
-    job, longest, steps = Slow(), 0.0, 0
-    alongside = BackgroundJob(job)
+def test_stepping_a_background_job_never_blocks() -> None:
+    job, longest_step, steps = SlowJob(), 0.0, 0
+    background = BackgroundJob(job)
     while True:
-        since = time.perf_counter()
-        going = alongside.step()
-        longest = max(longest, time.perf_counter() - since)
-        if not going:
+        start = time.perf_counter()
+        is_running = background.step()
+        longest_step = max(longest_step, time.perf_counter() - start)
+        if not is_running:
             break
         steps += 1
         time.sleep(0.01)
-    assert longest < 0.1 and steps > 5
-    assert job.done == ["first", "second", "let go"]
+    assert longest_step < 0.1 and steps > 5
+    assert job.done == ["first", "second", "released"]
     assert [stage.name for stage in job.stages] == ["first", "second"] and job.now.fraction == 1.0
 
 
-def test_a_job_alongside_that_is_dropped_ends_after_its_piece() -> None:
-    job = Slow()
-    alongside = BackgroundJob(job)
+def test_closed_background_job_ends_after_its_current_step() -> None:
+    job = SlowJob()
+    background = BackgroundJob(job)
     while job.now.stage != "first":
         time.sleep(0.01)
-    since = time.perf_counter()
-    alongside.close()
-    assert time.perf_counter() - since < 0.2
+    start = time.perf_counter()
+    background.close()
+    assert time.perf_counter() - start < 0.2
     for thread in [t for t in threading.enumerate() if t.name.startswith("patina")]:
         thread.join(5)
-    assert job.done == ["first", "let go"]
+    assert job.done == ["first", "released"]
 
 
-def test_errors_of_a_job_alongside_pass_through() -> None:
-    class Fails(Slow):
+def test_errors_of_a_background_job_are_raised() -> None:
+    class FailingJob(SlowJob):
         def run(self) -> Iterator[Step]:
             yield Step("first", 0.0)
             raise FitError("too few samples")
 
-    alongside = BackgroundJob(Fails())
+    background = BackgroundJob(FailingJob())
     with pytest.raises(FitError, match="too few"):
-        while alongside.step():
+        while background.step():
             time.sleep(0.01)

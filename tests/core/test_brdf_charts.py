@@ -1,5 +1,5 @@
-"""Charts of a BRDF: shapes with known sizes, samples where the slices are, the same on page and
-screen."""
+"""BRDF charts: curves have the right size, samples lie on the curves, and the raster image agrees
+with the SVG drawing."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def flat(rho: float) -> Callable[[Angles], np.ndarray]:
     return lambda a: np.full((len(a.theta_h), 3), rho)
 
 
-def shiny(a: Angles) -> np.ndarray:
+def glossy(a: Angles) -> np.ndarray:
     lobe = 0.05 + 2.0 * np.exp(-((np.asarray(a.theta_h) / 0.1) ** 2))
     return np.repeat(lobe[:, None], 3, axis=1) * np.array([1.0, 0.8, 0.5])
 
@@ -53,8 +53,8 @@ def table_of(theta_h: np.ndarray, theta_d: np.ndarray) -> SampleTable:
     )  # fmt: skip
 
 
-def test_a_slice_stays_in_its_plane() -> None:
-    """At the mirror direction no azimuth is defined; the slice keeps the plane's own."""
+def test_slice_stays_in_the_plane_of_incidence() -> None:
+    """At the mirror direction φd is undefined; the slice uses the azimuth of the plane."""
     for incidence in (15, 45, 70):
         theta_o, angles = slice_angles(np.radians(incidence))
         assert not angles.phi_d.any() and angles.theta_h.min() < 1e-6
@@ -69,7 +69,7 @@ def polylines(drawing: Drawing, colour: str) -> list[np.ndarray]:
     return [np.array([p.split(",") for p in e.get("points").split()], float) for e in found]
 
 
-def test_polar_chart_is_wellformed_and_scaled() -> None:
+def test_polar_chart_is_well_formed_and_scaled() -> None:
     drawing = polar([Subject("x", flat(0.3))], 45)
     for colour in Show().colours:
         (line,) = polylines(drawing, colour)
@@ -78,71 +78,73 @@ def test_polar_chart_is_wellformed_and_scaled() -> None:
     assert line[:, 1].min() == pytest.approx(172 - 150 * 0.5, abs=0.2)
 
 
-def test_the_shaded_interval_lies_around_the_curve() -> None:
+def test_shaded_interval_spans_its_bounds() -> None:
     subject = Subject("x", flat(0.3), lambda a: (flat(0.2)(a), flat(9.0)(a)))
     tree = ElementTree.fromstring(svg(polar([subject], 45)))
     shapes = [e for e in tree.iter() if e.tag.endswith("polygon")]
     assert len(shapes) == 3
     height = [172 - float(p.split(",")[1]) for p in shapes[0].get("points").split()]
-    assert max(height) == pytest.approx(150, abs=0.1)  # as far as the chart reaches
+    assert max(height) == pytest.approx(150, abs=0.1)  # clipped at the chart's radius
     n = len(height) // 2
     assert max(height[:n]) == pytest.approx(150 * np.cbrt(0.2 / 0.5), abs=0.1)
 
 
-def test_samples_of_a_slice_lie_on_its_curve() -> None:
-    """Samples made in the plane of incidence, light and view either way round, and some beside it:
-    only the former are drawn, each at its own direction and on the curve of its BRDF."""
+def test_samples_in_the_plane_lie_on_the_polar_curve() -> None:
+    """Samples in the plane of incidence (also with light and view swapped) are drawn at their own
+    direction on the BRDF's curve; samples outside the plane are not drawn."""
     incidence, out = np.radians(40.0), np.radians([-60.0, -20.0, 10.0, 35.0, 70.0])
     light = np.tile([-np.sin(incidence), 0.0, np.cos(incidence)], (5, 1))
     view = np.stack([np.sin(out), np.zeros(5), np.cos(out)], axis=1)
-    lean = np.radians([20.0, 30.0, 40.0, 50.0, 60.0])
-    aside = np.stack([np.zeros(5), np.sin(lean), np.cos(lean)], axis=1)
-    up = np.tile([0.0, 0.0, 1.0], (5, 1))
-    every = [half_difference(up, a, b) for a, b in ((light, view), (view, light), (light, aside))]
-    angles = Angles(*(np.concatenate(parts) for parts in zip(*every, strict=True)))
-    points = points_of(angles, shiny(angles))
-    rows, places = in_slice(points, incidence)
+    theta_aside = np.radians([20.0, 30.0, 40.0, 50.0, 60.0])
+    aside = np.stack([np.zeros(5), np.sin(theta_aside), np.cos(theta_aside)], axis=1)
+    normals = np.tile([0.0, 0.0, 1.0], (5, 1))
+    all_angles = [
+        half_difference(normals, a, b) for a, b in ((light, view), (view, light), (light, aside))
+    ]
+    angles = Angles(*(np.concatenate(parts) for parts in zip(*all_angles, strict=True)))
+    points = points_of(angles, glossy(angles))
+    rows, theta_o = in_slice(points, incidence)
     assert set(rows.tolist()) == set(range(10))
-    for row, place in zip(rows.tolist(), places.tolist(), strict=True):
-        assert np.abs(out - place).min() < 1e-3, (row, np.degrees(place))
-    drawing = polar([Subject("x", shiny, None, points)], 40)
+    for row, angle in zip(rows.tolist(), theta_o.tolist(), strict=True):
+        assert np.abs(out - angle).min() < 1e-3, (row, np.degrees(angle))
+    drawing = polar([Subject("x", glossy, None, points)], 40)
     (dots,) = [p for p in drawing.parts if isinstance(p, Dots)]
     curves = np.concatenate([p.points for p in drawing.parts if isinstance(p, Line)])
-    far = np.hypot(*(dots.points[:, None] - curves[None]).transpose(2, 0, 1)).min(axis=1)
-    assert np.median(far) < 1.5, far
+    distances = np.hypot(*(dots.points[:, None] - curves[None]).transpose(2, 0, 1)).min(axis=1)
+    assert np.median(distances) < 1.5, distances
 
 
-def test_the_highlights_samples_lie_on_its_curve() -> None:
+def test_samples_lie_on_the_highlight_curve() -> None:
     theta_h = np.linspace(0.01, 1.2, 60)
     angles = Angles(theta_h, np.full(60, np.radians(20.0)), np.full(60, np.pi / 2))
-    points = points_of(angles, shiny(angles))
+    points = points_of(angles, glossy(angles))
     for scale in ("cube_root", "linear", "log"):
-        drawing = highlight_curve([Subject("x", shiny, None, points)], 20, Show(scale, True, "r"))
+        drawing = highlight_curve([Subject("x", glossy, None, points)], 20, Show(scale, True, "r"))
         (dots,) = [p for p in drawing.parts if isinstance(p, Dots)]
         (line,) = polylines(drawing, Show(channels="r").colours[0])
         expected = np.interp(dots.points[:, 0], line[:, 0], line[:, 1])
         assert np.abs(expected - dots.points[:, 1]).max() < 1.5
 
 
-def test_points_are_few_and_spread_and_do_not_depend_on_order() -> None:
+def test_point_subset_is_small_spread_and_independent_of_order() -> None:
     rng = np.random.default_rng(1)
-    crowd = np.full(40_000, 0.5), np.full(40_000, 0.5)
-    few = rng.uniform(0, 0.05, 50), rng.uniform(0.2, 1.0, 50)
-    table = table_of(*(np.concatenate(parts) for parts in zip(crowd, few, strict=True)))
+    dense = np.full(40_000, 0.5), np.full(40_000, 0.5)
+    sparse = rng.uniform(0, 0.05, 50), rng.uniform(0.2, 1.0, 50)
+    table = table_of(*(np.concatenate(parts) for parts in zip(dense, sparse, strict=True)))
     found = MeasuredPoints.of(table, 1000)
     assert len(found) <= 1000
-    assert (found.angles.theta_h < 0.06).sum() == 50, "the crowd pushed the highlight out"
+    assert (found.angles.theta_h < 0.06).sum() == 50, "dense samples displaced the highlight"
     shuffled = MeasuredPoints.of(table.select(rng.permutation(len(table))), 1000)
     assert np.array_equal(np.sort(found.angles.theta_h), np.sort(shuffled.angles.theta_h))
-    again = MeasuredPoints.from_rows(found.rows())
-    assert np.array_equal(again.rho, found.rho) and np.array_equal(again.photo, found.photo)
+    restored = MeasuredPoints.from_rows(found.rows())
+    assert np.array_equal(restored.rho, found.rho) and np.array_equal(restored.photo, found.photo)
     assert not len(MeasuredPoints.of(SampleTable.empty()))
     subject = Subject("x", flat(0.1), None, found)
     assert best_sampled_theta_d(subject) == pytest.approx(np.degrees(0.5), abs=4)
 
 
-def test_area_of_shapes() -> None:
-    """A triangle and a square with half-covered pixels: area, and nothing outside of them."""
+def test_polygon_coverage_equals_its_area() -> None:
+    """Coverage of a triangle and of a square with partly covered pixels adds up to the area."""
     corners = np.array([[10.0, 10.0], [40.0, 10.0], [10.0, 50.0]])
     found = inside(corners, 60, 60)
     assert found.sum() == pytest.approx(600, rel=0.01)
@@ -151,8 +153,8 @@ def test_area_of_shapes() -> None:
     assert square.sum() == pytest.approx(9, rel=0.2) and square[2:4, 2:4].min() == 1
 
 
-def test_raster_shows_what_the_drawing_says() -> None:
-    paper = [int(PAPER[k : k + 2], 16) for k in (1, 3, 5)]
+def test_raster_matches_the_drawing() -> None:
+    paper_colour = [int(PAPER[k : k + 2], 16) for k in (1, 3, 5)]
     picture = Picture(40.0, 5.0, 10.0, 10.0, np.full((2, 2, 3), 9, np.uint8))
     line = Line(np.array([[0.0, 50.0], [60.0, 50.0]]), "#0000ff", 2.0, (10.0, 10.0))
     dot = Dots(np.array([[30.0, 30.0]]), np.array([[0, 255, 0]], np.uint8), 4.0)
@@ -163,13 +165,13 @@ def test_raster_shows_what_the_drawing_says() -> None:
         assert image.shape == (60 * scale, 60 * scale, 3)
         assert at(10, 10) == [255, 0, 0] and at(45, 10) == [9, 9, 9] and at(30, 30) == [0, 255, 0]
         assert np.abs(np.subtract(at(5, 50), [0, 0, 255])).max() < 5
-        assert at(15, 50) == paper and at(55, 20) == paper
+        assert at(15, 50) == paper_colour and at(55, 20) == paper_colour
 
 
-def test_every_chart_of_one_and_of_two() -> None:
+def test_every_chart_draws_one_or_two_subjects() -> None:
     angles = Angles(np.array([0.1, 0.4]), np.array([0.3, 0.3]), np.array([1.5, 1.5]))
     subject = Subject(
-        "x", shiny, lambda a: (0.8 * shiny(a), 1.2 * shiny(a)), points_of(angles, shiny(angles))
+        "x", glossy, lambda a: (0.8 * glossy(a), 1.2 * glossy(a)), points_of(angles, glossy(angles))
     )
     for kind in CHARTS:
         for other in (None, Subject("y", flat(0.1))):
@@ -181,10 +183,10 @@ def test_every_chart_of_one_and_of_two() -> None:
             ElementTree.fromstring(svg(drawing))
             assert raster(drawing, 1.0).std() > 3
     with pytest.raises(PatinaError, match="measured"):
-        chart("interval", Subject("x", shiny), None, View())
+        chart("interval", Subject("x", glossy), None, View())
 
 
-def test_a_ratio_of_two_is_white_where_they_agree() -> None:
+def test_ratio_chart_is_white_where_two_brdfs_agree() -> None:
     drawing = ratio_slice(Subject("a", flat(0.2)), Subject("b", flat(0.4)), 90)
     pixels = drawing.parts[0].pixels
     assert pixels[60, 60].tolist() == [180, 4, 38], "twice as bright"

@@ -1,4 +1,5 @@
-"""Every mistake in a capture: one line that names the file and the key, before anything is made."""
+"""Mistakes in a capture file: a one-line error names the file and the key before any result is
+written."""
 
 from __future__ import annotations
 
@@ -22,7 +23,7 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def edited(ball: Path, tmp_path: Path, change: Callable[[str], str]) -> Path:
-    """A capture beside a copy of the files, its text changed."""
+    """A copy of the capture and its files, with the text changed."""
     import shutil
 
     folder = tmp_path / "copy"
@@ -34,21 +35,21 @@ def edited(ball: Path, tmp_path: Path, change: Callable[[str], str]) -> Path:
     return folder / ball.name
 
 
-def after_light_2(added: str) -> Callable[[str], str]:
-    return lambda t: t.replace('light = "lamp2"\n', f'light = "lamp2"\n{added}\n', 1)
+def inserted_after_light_2(line: str) -> Callable[[str], str]:
+    return lambda t: t.replace('light = "lamp2"\n', f'light = "lamp2"\n{line}\n', 1)
 
 
 def replaced(old: str, new: str) -> Callable[[str], str]:
     return lambda t: t.replace(old, new, 1)
 
 
-def added(tail: str) -> Callable[[str], str]:
+def appended(tail: str) -> Callable[[str], str]:
     return lambda t: f"{t}\n{tail}\n"
 
 
 TEXT_MISTAKES = {
-    "unknown key": (added("[fit]\nsample = 3"), r"\[fit\.sample\].*unknown key"),
-    "unknown table": (added("[fitt]"), r"\[fitt\].*unknown key"),
+    "unknown key": (appended("[fit]\nsample = 3"), r"\[fit\.sample\].*unknown key"),
+    "unknown table": (appended("[fitt]"), r"\[fitt\].*unknown key"),
     "missing photo": (replaced("lit_2.exr", "gone.exr"), r"photo 2\.file.*no such file"),
     "missing mesh": (replaced("mesh.ply", "gone.ply"), r"scan\.mesh.*no such file"),
     "missing key": (replaced('camera = "view_02.jpg"\n', ""), r"photo 2\.camera.*missing"),
@@ -59,99 +60,99 @@ TEXT_MISTAKES = {
         replaced("irradiance = [3.0, 3.0, 3.0]", "irradiance = [3.0]"),
         r"light 1\.irradiance.*three numbers",
     ),
-    "text for a number": (added('[fit]\nsamples = "six"'), r"fit\.samples.*whole number"),
+    "text for a number": (appended('[fit]\nsamples = "six"'), r"fit\.samples.*whole number"),
     "near light with an irradiance": (replaced("direction", "position"), "has no irradiance"),
-    "not TOML": (added("[[["), "not valid TOML"),
+    "not TOML": (appended("[[["), "not valid TOML"),
     "unknown face attribute": (
-        added('[[material]]\nname = "a"\nfaces = "x"'),
+        appended('[[material]]\nname = "a"\nfaces = "x"'),
         r"material 1\.faces.*no integer face attribute",
     ),
     "mask of no material": (
-        after_light_2('masks = {gold = "lit_1.exr"}'),
+        inserted_after_light_2('masks = {gold = "lit_1.exr"}'),
         r"photo 2\.masks\.gold.*no \[\[material\]\]",
     ),
 }
 
 
 @pytest.mark.parametrize("mistake", TEXT_MISTAKES)
-def test_mistakes_in_the_text(ball: Path, tmp_path: Path, mistake: str) -> None:
+def test_mistakes_in_the_text_are_reported(ball: Path, tmp_path: Path, mistake: str) -> None:
     change, message = TEXT_MISTAKES[mistake]
     path = edited(ball, tmp_path, change)
-    refused(path, message)
+    check_rejected(path, message)
 
 
-def refused(path: Path, message: str) -> None:
+def check_rejected(path: Path, message: str) -> None:
     with pytest.raises(PatinaError, match=message) as caught:
         FitJob(read_capture(path)).drain()
     text = str(caught.value)
     assert "\n" not in text and path.name in text, text
 
 
-def test_the_line_is_named(ball: Path, tmp_path: Path) -> None:
+def test_error_names_the_line(ball: Path, tmp_path: Path) -> None:
     path = edited(ball, tmp_path, lambda t: t.replace("view_02.jpg", "view_99.jpg"))
     line = path.read_text().splitlines().index('camera = "view_99.jpg"') + 1
-    refused(path, rf"ball\.capture\.toml:{line}: \[photo 2\.camera\]")
+    check_rejected(path, rf"ball\.capture\.toml:{line}: \[photo 2\.camera\]")
 
 
-def copy_with(ball: Path, tmp_path: Path) -> Path:
+def unchanged_copy(ball: Path, tmp_path: Path) -> Path:
     return edited(ball, tmp_path, lambda t: t + "\n")
 
 
-def test_photo_of_another_size(ball: Path, tmp_path: Path) -> None:
-    path = copy_with(ball, tmp_path)
+def test_photo_of_another_size_is_rejected(ball: Path, tmp_path: Path) -> None:
+    path = unchanged_copy(ball, tmp_path)
     made.write_exr(path.parent / "lit_2.exr", np.ones((90, 121, 3)))
-    refused(path, r"photo 2\.file.*121 × 90.*120 × 90")
+    check_rejected(path, r"photo 2\.file.*121 × 90.*120 × 90")
 
 
-def test_pixels_that_are_no_numbers(ball: Path, tmp_path: Path) -> None:
-    path = copy_with(ball, tmp_path)
+def test_nan_pixels_are_rejected(ball: Path, tmp_path: Path) -> None:
+    path = unchanged_copy(ball, tmp_path)
     pixels = np.ones((90, 120, 3))
     pixels[4, 5] = np.nan
     made.write_exr(path.parent / "lit_2.exr", pixels)
-    refused(path, r"photo 2\.file.*1 pixels that are NaN")
+    check_rejected(path, r"photo 2\.file.*1 pixels that are NaN")
 
 
-def test_truncated_photo(ball: Path, tmp_path: Path) -> None:
-    path = copy_with(ball, tmp_path)
+def test_truncated_photo_is_rejected(ball: Path, tmp_path: Path) -> None:
+    path = unchanged_copy(ball, tmp_path)
     photo = path.parent / "lit_2.exr"
     photo.write_bytes(photo.read_bytes()[:700])
-    refused(path, r"photo 2\.file")
+    check_rejected(path, r"photo 2\.file")
 
 
-def test_mesh_without_faces(ball: Path, tmp_path: Path) -> None:
-    path = copy_with(ball, tmp_path)
+def test_mesh_without_faces_is_rejected(ball: Path, tmp_path: Path) -> None:
+    path = unchanged_copy(ball, tmp_path)
     made.write_ply(path.parent / "mesh.ply", np.eye(3), np.zeros((0, 3), int))
-    refused(path, r"mesh\.ply.*no faces")
+    check_rejected(path, r"mesh\.ply.*no faces")
 
 
-def test_mesh_in_another_frame(ball: Path, tmp_path: Path) -> None:
-    path = copy_with(ball, tmp_path)
+def test_mesh_in_another_coordinate_frame_is_rejected(ball: Path, tmp_path: Path) -> None:
+    path = unchanged_copy(ball, tmp_path)
     vertices, faces = made.sphere_mesh(2)
     made.write_ply(path.parent / "mesh.ply", vertices + np.array([500, 0, 0]), faces)
-    refused(path, r"scan\.mesh.*not in the frame")
+    check_rejected(path, r"scan\.mesh.*not in the frame")
 
 
-def test_broken_meshes(ball: Path, tmp_path: Path) -> None:
-    path = copy_with(ball, tmp_path)
+def test_damaged_meshes_are_rejected(ball: Path, tmp_path: Path) -> None:
+    path = unchanged_copy(ball, tmp_path)
     mesh = path.parent / "mesh.ply"
-    whole = mesh.read_bytes()
-    for broken in (b"", b"ply\n", whole[:400], whole[: len(whole) // 2], b"\x00" * 64):
-        mesh.write_bytes(broken)
-        refused(path, r"mesh\.ply")
+    original = mesh.read_bytes()
+    for content in (b"", b"ply\n", original[:400], original[: len(original) // 2], b"\x00" * 64):
+        mesh.write_bytes(content)
+        check_rejected(path, r"mesh\.ply")
     vertices, faces = made.sphere_mesh(2)
     vertices[3] = np.nan
     made.write_ply(mesh, vertices, faces)
-    refused(path, r"NaN or infinite")
+    check_rejected(path, r"NaN or infinite")
     faces[0, 0] = 99999
     made.write_ply(mesh, np.nan_to_num(vertices), faces)
-    refused(path, r"mesh\.ply")
+    check_rejected(path, r"mesh\.ply")
 
 
-def test_broken_cameras(ball: Path, tmp_path: Path) -> None:
-    path = copy_with(ball, tmp_path)
+def test_missing_cameras_are_rejected(ball: Path, tmp_path: Path) -> None:
+    path = unchanged_copy(ball, tmp_path)
     cameras = path.parent / "sparse" / "images.bin"
     cameras.unlink()
-    refused(path, r"scan\.cameras.*no COLMAP model")
+    check_rejected(path, r"scan\.cameras.*no COLMAP model")
 
 
 def with_gold_mask(ball: Path, tmp_path: Path, mask: np.ndarray) -> Path:
@@ -168,29 +169,29 @@ def with_gold_mask(ball: Path, tmp_path: Path, mask: np.ndarray) -> Path:
     return path
 
 
-def test_everything_masked(ball: Path, tmp_path: Path) -> None:
+def test_mask_without_any_pixel_is_rejected(ball: Path, tmp_path: Path) -> None:
     path = with_gold_mask(ball, tmp_path, np.zeros((90, 120)))
-    refused(path, r"material 1\.name.*all pixels are masked")
+    check_rejected(path, r"material 1\.name.*all pixels are masked")
 
 
-def test_mask_of_another_size(ball: Path, tmp_path: Path) -> None:
+def test_mask_of_another_size_is_rejected(ball: Path, tmp_path: Path) -> None:
     path = with_gold_mask(ball, tmp_path, np.zeros((90, 121)))
-    refused(path, r"photo 1\.masks\.gold.*121 × 90")
+    check_rejected(path, r"photo 1\.masks\.gold.*121 × 90")
 
 
-def test_light_from_behind_everything(ball: Path, tmp_path: Path) -> None:
+def test_light_behind_every_surface_is_rejected(ball: Path, tmp_path: Path) -> None:
     rotation, _ = next(iter(made.poses(3)))
     behind = rotation.T @ np.array([0.0, 0.0, 1.0])  # along the first camera's view
-    given = ", ".join(f"{x:.9g}" for x in behind)
+    direction = ", ".join(f"{x:.9g}" for x in behind)
     path = edited(
         ball, tmp_path,
         lambda t: t.replace(t[t.index("direction = ["): t.index("]", t.index("direction = [")) + 1],
-                            f"direction = [{given}]", 1),
+                            f"direction = [{direction}]", 1),
     )  # fmt: skip
-    refused(path, r"light 1\.direction.*behind every surface")
+    check_rejected(path, r"light 1\.direction.*behind every surface")
 
 
-def test_a_good_capture_is_read_whole(ball: Path) -> None:
+def test_valid_capture_is_read_completely(ball: Path) -> None:
     capture = read_capture(ball)
     assert [light.name for light in capture.lights] == ["lamp1", "lamp2", "lamp3"]
     assert capture.materials[0].name == "surface"
@@ -199,32 +200,32 @@ def test_a_good_capture_is_read_whole(ball: Path) -> None:
         read_capture(ball.with_name("nothing.toml"))
 
 
-def test_the_method_is_ours_unless_the_papers_is_asked_for(tmp_path: Path) -> None:
+def test_default_method_is_measured_unless_the_file_selects_paper(tmp_path: Path) -> None:
     path = made.make_capture(tmp_path / "ball", photos=1)
-    plain = read_capture(path).fit
-    assert plain.method == "measured" and plain.unused == ()
+    default = read_capture(path).fit
+    assert default.method == "measured" and default.unused == ()
     text = path.read_text()
     path.write_text(text + '\n[fit]\nmethod = "paper"\ntrials = 3\n')
-    asked = read_capture(path).fit
-    assert asked.method == "paper" and asked.paper.trials == 3 and asked.unused == ()
+    requested = read_capture(path).fit
+    assert requested.method == "paper" and requested.paper.trials == 3 and requested.unused == ()
     path.write_text(text + '\n[fit]\nmethod = "papers"\n')
     with pytest.raises(InputError, match=r"fit\.method.*'papers'.*'measured' or 'paper'"):
         read_capture(path)
 
 
-def test_settings_of_the_other_method_are_told(tmp_path: Path) -> None:
-    """They change nothing, and a user who set them should know."""
+def test_unused_settings_of_the_other_method_are_reported(tmp_path: Path) -> None:
+    """Settings of the other method have no effect; a warning lists them."""
     path = made.make_capture(
         tmp_path / "ball", photos=1, extra="[fit]\neta = 10\nsamples = 8\nshadow_margin = 2"
     )
     capture = read_capture(path)
     assert capture.fit.unused == ("samples", "eta")
-    (said,) = capture_data.unused_settings(capture)
-    assert "samples, eta" in said and 'method = "paper"' in said
+    (warning,) = capture_data.unused_settings(capture)
+    assert "samples, eta" in warning and 'method = "paper"' in warning
 
 
-def test_margins_of_the_caller_are_for_what_the_file_does_not_say(tmp_path: Path) -> None:
+def test_margins_of_the_caller_apply_where_the_file_sets_none(tmp_path: Path) -> None:
     path = made.make_capture(tmp_path / "ball", photos=2, extra="[fit]\nmask_margin = 4")
-    told = Margins(silhouette=7, shadow=8, mask=9, cosine=0.3)
-    assert read_capture(path, told).fit.margins == Margins(7, 8, 4, 0.3)
+    margins = Margins(silhouette=7, shadow=8, mask=9, cosine=0.3)
+    assert read_capture(path, margins).fit.margins == Margins(7, 8, 4, 0.3)
     assert read_capture(path).fit.margins == Margins(mask=4)

@@ -1,4 +1,4 @@
-"""What a capture file may say of lights, tone, brackets and painted materials."""
+"""Lights, tone, exposure brackets and painted materials in a capture file."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def ball(tmp_path: Path) -> Path:
 
 
 def with_light(path: Path, *lines: str) -> Path:
-    """All photos under one light that these lines describe."""
+    """Rewrite the capture so that all photos use one light, described by these lines."""
     text = path.read_text()
     scan, photos = text.partition("[[light]]")[0], text[text.index("[[photo]]") :]
     for i in range(1, 7):
@@ -37,7 +37,7 @@ def with_light(path: Path, *lines: str) -> Path:
     return path
 
 
-WRONG = {
+LIGHT_MISTAKES = {
     "two ways": (["direction = [0, 0, 1]", "position = [0, 0, 1]"], "found direction and position"),
     "no way": (["irradiance = [1, 1, 1]"], "found none of them"),
     "near with irradiance": (["position = [0, 0, 1]", "irradiance = [1, 1, 1]"], "expected intens"),
@@ -79,9 +79,9 @@ WRONG = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("mistake", WRONG)
-def test_mistakes_are_named(ball: Path, mistake: str) -> None:
-    lines, message = WRONG[mistake]
+@pytest.mark.parametrize("mistake", LIGHT_MISTAKES)
+def test_error_names_the_light_and_the_file(ball: Path, mistake: str) -> None:
+    lines, message = LIGHT_MISTAKES[mistake]
     path = with_light(ball, *lines)
     with pytest.raises(InputError, match=message) as caught:
         read_capture(path)
@@ -95,8 +95,8 @@ def lights_of(path: Path):
     return find_lights(capture, scan, LitPhotos.open(capture))
 
 
-def test_the_sun_by_place_and_time(ball: Path) -> None:
-    """Noon at the equator on the March equinox: the sun stands overhead within a degree."""
+def test_sun_direction_from_place_and_time(ball: Path) -> None:
+    """Noon at the equator on the March equinox: the sun is overhead within 1°."""
     lines = 'time = "2021-03-20T12:07:30Z", north = [0, 2, 0], up = [0, 0, 3]'
     found = lights_of(with_light(ball, f"sun = {{latitude = 0.0, longitude = 0.0, {lines}}}"))
     light = found.by_name["lamp"]
@@ -106,21 +106,22 @@ def test_the_sun_by_place_and_time(ball: Path) -> None:
     assert "elevation" in " ".join(found.notes)
 
 
-def test_the_sun_needs_north(ball: Path) -> None:
+def test_sun_without_north_is_rejected(ball: Path) -> None:
     path = with_light(ball, 'sun = {latitude = 50, longitude = 8, time = "2021-06-01T12:00:00Z"}')
     with pytest.raises(InputError, match=r"light 1\.sun.*north"):
         lights_of(path)
 
 
-def test_the_sun_at_night(ball: Path) -> None:
+def test_sun_below_the_horizon_is_rejected(ball: Path) -> None:
     time = 'time = "2021-06-01T00:00:00Z", north = [0, 1, 0], up = [0, 0, 1]'
     path = with_light(ball, f"sun = {{latitude = 50.0, longitude = 8.0, {time}}}")
     with pytest.raises(InputError, match="below the horizon"):
         lights_of(path)
 
 
-def test_exif_of_a_photo_places_the_sun(ball: Path, shared: Path) -> None:
-    """The drone photo's time has no zone of its own: its GPS time is used, or asked for."""
+def test_sun_direction_from_photo_exif(ball: Path, shared: Path) -> None:
+    """The EXIF time of the drone photo has no time zone: the error asks for one, and a time in the
+    capture file replaces it."""
     photo = shared / "data" / "real" / "brighton_sun.jpg"
     path = with_light(ball, "sun = {north = [0, 1, 0], up = [0, 0, 1]}")
     text = path.read_text().replace('"lit_1.exr"', f'"{photo}"')
@@ -135,7 +136,7 @@ def test_exif_of_a_photo_places_the_sun(ball: Path, shared: Path) -> None:
     assert np.degrees(np.arctan2(east, north)) % 360 == pytest.approx(257.9, abs=0.5)
 
 
-def test_a_white_target_gives_the_irradiance(ball: Path) -> None:
+def test_white_target_gives_the_irradiance(ball: Path) -> None:
     folder = ball.parent
     white = np.full((60, 80, 3), 0.05)
     white[20:40, 30:60] = np.array([0.9, 0.8, 0.7]) / np.pi * 0.5 * 4
@@ -153,13 +154,13 @@ def test_a_white_target_gives_the_irradiance(ball: Path) -> None:
     assert light.irradiance == pytest.approx(np.array([3.6, 3.2, 2.8]) / 0.8, rel=1e-3)
 
 
-def test_a_chart_gives_the_irradiance(ball: Path) -> None:
-    """Patches of reflectance R under E show R E n·l / π: both come back."""
-    greys, strength = [0.05, 0.1, 0.2, 0.4, 0.8], 2.0
-    scale = np.full((40, 200, 3), 0.01)
+def test_chart_gives_the_irradiance(ball: Path) -> None:
+    """Patches of reflectance R under irradiance E have radiance R E n·l / π; both are recovered."""
+    greys, irradiance_over_pi = [0.05, 0.1, 0.2, 0.4, 0.8], 2.0
+    grey_scale = np.full((40, 200, 3), 0.01)
     for i, grey in enumerate(greys):
-        scale[:, 40 * i : 40 * i + 40] = grey * strength * 0.8 / np.pi
-    made.write_exr(ball.parent / "scale.exr", scale)
+        grey_scale[:, 40 * i : 40 * i + 40] = grey * irradiance_over_pi * 0.8 / np.pi
+    made.write_exr(ball.parent / "scale.exr", grey_scale)
     chart = f'photo = "scale.exr", corners = [[20, 20], [180, 20]], reflectance = {greys}'
     path = with_light(ball, "direction = [0, 0.6, 0.8]")
     text = path.read_text()
@@ -169,7 +170,7 @@ def test_a_chart_gives_the_irradiance(ball: Path) -> None:
     light = find_lights(capture, capture_data.open_scan(capture), photos).by_name["lamp"]
     assert light.irradiance == pytest.approx(np.full(3, np.pi / 0.8))
     # a Lambertian of reflectance 0.3 under the lamp: decoded, ρ = L / (E n·l) is 0.3 / π
-    encoded = np.full((1, 1, 3), 0.3 * strength * 0.8 / np.pi)
+    encoded = np.full((1, 1, 3), 0.3 * irradiance_over_pi * 0.8 / np.pi)
     radiance = photos.curve(0).decode(encoded)
     assert radiance / (light.irradiance * 0.8) == pytest.approx(0.3 / np.pi, rel=0.02)
     path.write_text(path.read_text().replace('light = "lamp", normal', 'light = "sun", normal'))
@@ -177,8 +178,8 @@ def test_a_chart_gives_the_irradiance(ball: Path) -> None:
         read_capture(path)
 
 
-def test_a_white_target_is_read_with_the_photos_curve(ball: Path) -> None:
-    """A 16-bit PNG of linear numbers says nothing of its own: the photos' transfer holds for it."""
+def test_white_target_uses_the_transfer_of_the_photos(ball: Path) -> None:
+    """A 16-bit PNG states no transfer function: the one set for the photos is used."""
     folder = ball.parent
     make_photos.write_png(folder / "white.png", np.full((60, 80, 3), 32768, np.uint16))
     made.write_png(folder / "mask.png", np.full((60, 80), 255))
@@ -194,7 +195,7 @@ def test_a_white_target_is_read_with_the_photos_curve(ball: Path) -> None:
     assert any("read as sRGB" in note for note in read_photo(folder / "white.png").info.notes)
 
 
-def test_strengths_for_all_lights_or_none(ball: Path) -> None:
+def test_irradiance_given_for_only_some_lights_is_rejected(ball: Path) -> None:
     path = ball
     text = path.read_text().replace("irradiance = [3.0, 3.0, 3.0]\n", "", 1)
     path.write_text(text)
@@ -202,7 +203,7 @@ def test_strengths_for_all_lights_or_none(ball: Path) -> None:
         read_capture(path)
 
 
-def test_exposures_that_only_some_photos_state(ball: Path) -> None:
+def test_exposure_known_for_only_some_photos_is_rejected(ball: Path) -> None:
     path, folder = ball, ball.parent
     pixels = np.full((90, 120, 3), 128, np.uint8)
     write_jpeg(folder / "one.jpg", pixels, exposure=1 / 60)
@@ -213,11 +214,13 @@ def test_exposures_that_only_some_photos_state(ball: Path) -> None:
         LitPhotos.open(read_capture(path))
 
 
-def test_exif_exposures_count_from_the_first(ball: Path) -> None:
+def test_exif_exposures_are_relative_to_the_first_photo(ball: Path) -> None:
     path, folder = ball, ball.parent
     for i in range(1, 7):
         exposure = 1 / 50 if i == 1 else 1 / 200
-        level = 200 if i == 1 else 108  # sRGB: 0.5776 and 0.1500: a quarter of it and a bit
+        level = (
+            200 if i == 1 else 108
+        )  # sRGB levels 200 and 108 decode to 0.5776 and 0.1500, about a quarter
         write_jpeg(folder / f"{i}.jpg", np.full((90, 120, 3), level, np.uint8), exposure)
         path.write_text(path.read_text().replace(f'"lit_{i}.exr"', f'"{i}.jpg"'))
     photos = LitPhotos.open(read_capture(path))
@@ -226,7 +229,7 @@ def test_exif_exposures_count_from_the_first(ball: Path) -> None:
     assert second.mean() / first.mean() == pytest.approx(0.1500 / 0.5776 * 4, rel=0.02)
 
 
-def test_exposures_of_two_units_do_not_mix(ball: Path) -> None:
+def test_stated_and_exif_exposures_are_not_mixed(ball: Path) -> None:
     pixels = np.full((90, 120, 3), 128, np.uint8)
     text = ball.read_text()
     for i in range(1, 7):
@@ -237,7 +240,7 @@ def test_exposures_of_two_units_do_not_mix(ball: Path) -> None:
         LitPhotos.open(read_capture(ball))
 
 
-def test_a_flash_does_not_depend_on_the_shutter(ball: Path) -> None:
+def test_exposure_times_that_differ_are_rejected_for_a_flash(ball: Path) -> None:
     path = with_light(ball, "mounted = [0, 0, 0]")
     text = path.read_text()
     for i in range(1, 7):
@@ -250,7 +253,7 @@ def test_a_flash_does_not_depend_on_the_shutter(ball: Path) -> None:
         LitPhotos.open(read_capture(path))
 
 
-def test_a_colour_that_no_face_wears(ball: Path) -> None:
+def test_vertex_colour_without_any_face_is_rejected(ball: Path) -> None:
     vertices, faces = made.sphere_mesh(2)
     lines = ["ply", "format ascii 1.0", f"element vertex {len(vertices)}"]
     lines += [f"property double {axis}" for axis in "xyz"]
@@ -264,7 +267,7 @@ def test_a_colour_that_no_face_wears(ball: Path) -> None:
         capture_data.open_scan(read_capture(ball))
 
 
-def test_near_and_distant_lights_need_strengths(ball: Path) -> None:
+def test_near_and_distant_lights_without_intensity_are_rejected(ball: Path) -> None:
     text = ball.read_text().replace("irradiance = [3.0, 3.0, 3.0]\n", "")
     first = text.index("direction")
     end = text.index("\n", first)
@@ -273,28 +276,28 @@ def test_near_and_distant_lights_need_strengths(ball: Path) -> None:
         read_capture(ball)
 
 
-def test_clipped_pixels_are_no_samples(ball: Path) -> None:
-    whole, _ = sampled(ball)
+def test_clipped_pixels_are_excluded_from_the_samples(ball: Path) -> None:
+    all_samples, _ = sampled(ball)
     text = ball.read_text()
     ball.write_text(text.replace('file = "lit_1.exr"', 'file = "lit_1.exr"\nsaturation = 0.2'))
     job = FitJob(read_capture(ball))
     job.drain()
     assert job.result is not None
-    bright = (whole.radiance[whole.photo == 0] >= 0.2 * 0.99).any(axis=1)
+    clipped = (all_samples.radiance[all_samples.photo == 0] >= 0.2 * 0.99).any(axis=1)
     per_photo = job.result.materials[0].per_photo
-    assert bright.sum() > 100
-    assert per_photo[0] == pytest.approx((whole.photo == 0).sum() - bright.sum(), abs=20)
+    assert clipped.sum() > 100
+    assert per_photo[0] == pytest.approx((all_samples.photo == 0).sum() - clipped.sum(), abs=20)
 
 
-def test_materials_painted_on_the_vertices(ball: Path) -> None:
-    """Two colours on the mesh's vertices split it into two materials."""
+def test_materials_from_vertex_colours(ball: Path) -> None:
+    """Two vertex colours split the mesh into two materials."""
     vertices, faces = made.sphere_mesh()
-    upper = vertices[:, 2] > made.CENTRE[2]
+    is_upper = vertices[:, 2] > made.CENTRE[2]
     lines = ["ply", "format ascii 1.0", f"element vertex {len(vertices)}"]
     lines += [f"property double {axis}" for axis in "xyz"]
     lines += [f"property uchar {c}" for c in ("red", "green", "blue")]
     lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
-    for position, up in zip(vertices, upper, strict=True):
+    for position, up in zip(vertices, is_upper, strict=True):
         colour = "250 10 10" if up else "10 10 250"
         lines.append(" ".join(f"{x:.9g}" for x in position) + f" {colour}")
     lines += ["3 " + " ".join(map(str, face)) for face in faces]
@@ -306,13 +309,13 @@ def test_materials_painted_on_the_vertices(ball: Path) -> None:
     job.drain()
     assert job.result is not None
     centre = vertices[faces].mean(axis=1)[:, 2]
-    far = np.abs(centre - made.CENTRE[2]) > 0.1
-    assert ((centre > made.CENTRE[2]) == (job.result.face_material == 0))[far].all()
+    off_boundary = np.abs(centre - made.CENTRE[2]) > 0.1
+    assert ((centre > made.CENTRE[2]) == (job.result.face_material == 0))[off_boundary].all()
     assert min(m.samples for m in job.result.materials) > 1000
 
 
-def test_photos_that_were_localised_later(ball: Path) -> None:
-    """A camera of an extra file takes a photo like one of the scan's."""
+def test_cameras_of_an_extra_file_are_available(ball: Path) -> None:
+    """A camera from an extra cameras file can be used like a camera of the scan."""
     capture = read_capture(ball)
     camera = capture_data.open_scan(capture).cameras[0]
     entry = {
@@ -324,14 +327,14 @@ def test_photos_that_were_localised_later(ball: Path) -> None:
     (ball.parent / "later.cameras.json").write_text(json.dumps(extra))
     text = ball.read_text().replace('camera = "view_01.jpg"', 'camera = "later"')
     ball.write_text(text.replace("[scan]", '[scan]\nextra = "later.cameras.json"'))
-    later = read_capture(ball)
-    scan = capture_data.open_scan(later)
-    pose = capture_data.camera_of(later, scan, 0).pose
+    extended = read_capture(ball)
+    scan = capture_data.open_scan(extended)
+    pose = capture_data.camera_of(extended, scan, 0).pose
     assert np.allclose(pose.translation, camera.pose.translation)
     entry["label"] = "view_02.jpg"
     (ball.parent / "later.cameras.json").write_text(json.dumps(extra))
     with pytest.raises(PatinaError, match=r"scan\.extra.*already"):
-        capture_data.open_scan(later)
+        capture_data.open_scan(extended)
 
 
 def write_jpeg(path: Path, pixels: np.ndarray, exposure: float) -> None:

@@ -1,4 +1,4 @@
-"""A job that is dropped lets go of what it holds, and leaves BLAS as it was."""
+"""A closed job releases its resources and restores the number of BLAS threads."""
 
 from __future__ import annotations
 
@@ -11,52 +11,54 @@ from patina.core.concurrency.job import Job, Step
 from patina.core.concurrency.thread_pool import thread_count, thread_pool
 
 
-class Counting(Job):
-    """Three steps, and what became of them."""
+class CountingJob(Job):
+    """A job of three steps that records whether it was cleaned up."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.let_go = False
+        self.released = False
         self.threads: set[int] = set()
 
     def run(self) -> Iterator[Step]:
         try:
             for k in range(3):
-                self.threads = blas()
+                self.threads = blas_threads()
                 yield Step("counting", k / 3)
         finally:
-            self.let_go = True
+            self.released = True
 
 
-def blas() -> set[int]:
-    """Threads of every BLAS that is loaded."""
+def blas_threads() -> set[int]:
+    """The thread counts of all loaded BLAS libraries."""
     np.linalg.inv(np.eye(3))
-    return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
+    return {
+        library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"
+    }
 
 
-def test_dropped_in_the_middle() -> None:
-    before, job = blas(), Counting()
-    assert job.step() and not job.let_go
+def test_closing_a_running_job_releases_its_resources() -> None:
+    before, job = blas_threads(), CountingJob()
+    assert job.step() and not job.released
     assert job.threads == {1}
     job.close()
-    assert job.let_go and blas() == before
-    assert not job.step(), "nothing is left to do"
+    assert job.released and blas_threads() == before
+    assert not job.step(), "a closed job has no further steps"
 
 
-def test_drained() -> None:
-    before, job = blas(), Counting()
+def test_drained_job_is_finished_and_released() -> None:
+    before, job = blas_threads(), CountingJob()
     job.drain()
-    assert job.let_go and blas() == before and job.now.fraction == 1.0
-    job.close()  # of what is done there is nothing to drop
+    assert job.released and blas_threads() == before and job.now.fraction == 1.0
+    job.close()  # closing a finished job does nothing
 
 
-def test_never_begun() -> None:
-    job = Counting()
+def test_closing_a_job_that_never_started() -> None:
+    job = CountingJob()
     job.close()
-    assert not job.step() and not job.let_go
+    assert not job.step() and not job.released
 
 
-def test_a_crew_of_one_is_none() -> None:
+def test_thread_count_and_pool_of_one_thread() -> None:
     assert (
         thread_count(0) == thread_count(1) == 1
         and thread_count(7) == 7

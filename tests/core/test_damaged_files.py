@@ -1,4 +1,4 @@
-"""Damaged files: one line that names the file; never a hang, a crash, or a wrong number."""
+"""Damaged files: a one-line error names the file; never a hang, a crash or a wrong value."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def broken(model: Path, folder: Path, name: str, change: Callable[[bytes], bytes]) -> Path:
+def damaged_copy(model: Path, folder: Path, name: str, change: Callable[[bytes], bytes]) -> Path:
     copy = folder / "broken"
     shutil.rmtree(copy, ignore_errors=True)
     shutil.copytree(model, copy)
@@ -43,8 +43,10 @@ def broken(model: Path, folder: Path, name: str, change: Callable[[bytes], bytes
 @pytest.mark.parametrize("name", FILES)
 @settings(max_examples=40, deadline=5000, suppress_health_check=list(HealthCheck))
 @given(part=st.floats(0, 1, exclude_max=True))
-def test_truncated_models_are_refused(model: Path, tmp_path: Path, name: str, part: float) -> None:
-    copy = broken(model, tmp_path, name, lambda data: data[: int(len(data) * part)])
+def test_truncated_colmap_models_are_rejected(
+    model: Path, tmp_path: Path, name: str, part: float
+) -> None:
+    copy = damaged_copy(model, tmp_path, name, lambda data: data[: int(len(data) * part)])
     with pytest.raises(InputError, match=name):
         read_colmap(copy)
 
@@ -52,13 +54,15 @@ def test_truncated_models_are_refused(model: Path, tmp_path: Path, name: str, pa
 @pytest.mark.parametrize("name", FILES)
 @settings(max_examples=40, deadline=5000, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
-def test_flipped_bytes_are_refused_or_harmless(
+def test_changed_bytes_are_rejected_or_harmless(
     model: Path, tmp_path: Path, name: str, data: st.DataObject
 ) -> None:
     size = (model / name).stat().st_size
     place = data.draw(st.integers(0, size - 1))
     value = data.draw(st.integers(0, 255))
-    copy = broken(model, tmp_path, name, lambda b: b[:place] + bytes([value]) + b[place + 1 :])
+    copy = damaged_copy(
+        model, tmp_path, name, lambda b: b[:place] + bytes([value]) + b[place + 1 :]
+    )
     try:
         cameras = read_colmap(copy).cameras
     except InputError as error:
@@ -71,16 +75,16 @@ def test_flipped_bytes_are_refused_or_harmless(
 
 @pytest.mark.parametrize("count", [2**31, 2**40, 2**63, 2**64 - 1])
 @pytest.mark.parametrize("name", FILES)
-def test_absurd_counts_are_refused(model: Path, tmp_path: Path, name: str, count: int) -> None:
-    copy = broken(model, tmp_path, name, lambda data: struct.pack("<Q", count) + data[8:])
+def test_impossible_counts_are_rejected(model: Path, tmp_path: Path, name: str, count: int) -> None:
+    copy = damaged_copy(model, tmp_path, name, lambda data: struct.pack("<Q", count) + data[8:])
     with pytest.raises(InputError, match=name):
         read_colmap(copy)
 
 
-def test_numbers_no_camera_has(model: Path, tmp_path: Path) -> None:
+def test_impossible_focal_lengths_are_rejected(model: Path, tmp_path: Path) -> None:
     focal = 8 + 4 + 4 + 16  # count, id, model, size
     for value in (-200.0, 0.0, float("nan"), float("inf")):
-        copy = broken(
+        copy = damaged_copy(
             model, tmp_path, "cameras.bin",
             lambda b, v=value: b[:focal] + struct.pack("<d", v) + b[focal + 8 :],
         )  # fmt: skip
@@ -88,29 +92,29 @@ def test_numbers_no_camera_has(model: Path, tmp_path: Path) -> None:
             read_colmap(copy)
     text = tmp_path / "text"
     made.write_colmap(text, 2, text=True)
-    listed = (text / "cameras.txt").read_text()
-    (text / "cameras.txt").write_text(listed.replace("200", "-200"))
+    cameras_text = (text / "cameras.txt").read_text()
+    (text / "cameras.txt").write_text(cameras_text.replace("200", "-200"))
     with pytest.raises(InputError):
         read_colmap(text)
 
 
-def test_genuine_models_pass(shared: Path) -> None:
+def test_real_colmap_models_are_read(shared: Path) -> None:
     models = shared / "data" / "cameras" / "colmap"
     counts = {p.name: len(read_colmap(p).cameras) for p in sorted(models.iterdir()) if p.is_dir()}
     assert set(counts.values()) == {11, 18} and len(counts) >= 4
 
 
-def test_a_ply_that_ends_early(tmp_path: Path) -> None:
+def test_truncated_ply_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "mesh.ply"
     made.write_ply(path, *made.sphere_mesh(2))
-    whole = path.read_bytes()
+    original = path.read_bytes()
     for part in np.linspace(0.02, 0.98, 23):
-        path.write_bytes(whole[: int(len(whole) * part)])
+        path.write_bytes(original[: int(len(original) * part)])
         with pytest.raises(InputError, match=r"mesh\.ply"):
             read_mesh(path)
 
 
-def test_wrong_obj_files(tmp_path: Path) -> None:
+def test_invalid_obj_files_are_rejected(tmp_path: Path) -> None:
     path = tmp_path / "mesh.obj"
     for text in (
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n",
@@ -138,7 +142,7 @@ def write_channels(path: Path, names: list[str], pixels: np.ndarray, **more: int
     out.close()
 
 
-def test_channels_are_read_by_name(tmp_path: Path) -> None:
+def test_exr_channels_are_read_by_name(tmp_path: Path) -> None:
     path = tmp_path / "photo.exr"
     pixels = np.arange(4 * 5 * 4, dtype=np.float32).reshape(4, 5, 4)
     write_channels(path, ["R", "G", "B", "Z"], pixels)
@@ -151,7 +155,7 @@ def test_channels_are_read_by_name(tmp_path: Path) -> None:
             read_radiance(path)
 
 
-def test_cropped_disguised_and_broken_photos(tmp_path: Path) -> None:
+def test_cropped_and_mislabelled_photos_are_rejected(tmp_path: Path) -> None:
     path = tmp_path / "photo.exr"
     write_channels(path, ["R", "G", "B"], np.ones((4, 5, 3)), full_width=9, full_height=9)
     with pytest.raises(InputError, match="cropped"):
@@ -164,33 +168,37 @@ def test_cropped_disguised_and_broken_photos(tmp_path: Path) -> None:
         read_radiance(tmp_path / "p.bmp")
 
 
-def test_masks(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_damaged_masks_are_rejected_and_alpha_masks_are_read(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "mask.png"
     mask = np.zeros((6, 7))
     mask[2:4] = 255
     made.write_png(path, mask)
     assert np.array_equal(read_mask(path), mask > 0)
-    whole = path.read_bytes()
-    for part in (0, 4, 20, len(whole) // 2, len(whole) - 3):
-        path.write_bytes(whole[:part])
+    original = path.read_bytes()
+    for part in (0, 4, 20, len(original) // 2, len(original) - 3):
+        path.write_bytes(original[:part])
         with pytest.raises(InputError, match=r"mask\.png"):
             read_mask(path)
-    path.write_bytes(whole[:45] + bytes([whole[45] ^ 255]) + whole[46:])
+    path.write_bytes(original[:45] + bytes([original[45] ^ 255]) + original[46:])
     with pytest.raises(InputError, match="damaged"):
         read_mask(path)
-    assert capfd.readouterr().err == ""  # libpng says nothing of its own
+    assert capfd.readouterr().err == ""  # libpng prints nothing itself
     spec = oiio.ImageSpec(7, 6, 4, "uint8")
     out = oiio.ImageOutput.create(str(path))
     out.open(str(path), spec)
-    shape = np.full((6, 7, 4), 255, np.uint8)
-    shape[..., 3] = mask
-    out.write_image(shape)
+    rgba = np.full((6, 7, 4), 255, np.uint8)
+    rgba[..., 3] = mask
+    out.write_image(rgba)
     out.close()
-    assert np.array_equal(read_mask(path), mask > 0)  # white, cut out by its alpha
+    assert np.array_equal(
+        read_mask(path), mask > 0
+    )  # a white image whose alpha channel is the mask
 
 
 @pytest.mark.parametrize("damage", ["black", "negative", "far too bright"])
-def test_photos_of_no_light(tmp_path: Path, damage: str) -> None:
+def test_photos_without_plausible_light_are_rejected(tmp_path: Path, damage: str) -> None:
     path = made.make_capture(tmp_path / "ball", photos=2)
     factor = {"black": 0.0, "negative": -1.0, "far too bright": 1e9}[damage]
     for photo in path.parent.glob("*.exr"):
@@ -199,7 +207,7 @@ def test_photos_of_no_light(tmp_path: Path, damage: str) -> None:
         FitJob(read_capture(path)).drain()
 
 
-def test_broken_encodings(tmp_path: Path) -> None:
+def test_invalid_npz_files_are_rejected(tmp_path: Path) -> None:
     path = tmp_path / "x.npz"
     for content in (b"", b"PK", b"not a zip"):
         path.write_bytes(content)
@@ -222,7 +230,7 @@ def test_broken_encodings(tmp_path: Path) -> None:
         ('[scan]\ncameras = "a\\u0000b"', r"scan\.cameras.*no such file"),
     ],
 )
-def test_hostile_texts(tmp_path: Path, text: str, message: str) -> None:
+def test_hostile_capture_files_are_rejected(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "x.capture.toml"
     path.write_text(text)
     with pytest.raises(InputError, match=message) as caught:
@@ -243,7 +251,7 @@ MATERIALS = {
 
 
 @pytest.mark.parametrize("name", MATERIALS)
-def test_names_no_file_can_have(tmp_path: Path, name: str) -> None:
+def test_invalid_material_names_are_rejected(tmp_path: Path, name: str) -> None:
     path = made.make_capture(tmp_path / "ball", photos=2, extra=f'[[material]]\nname = "{name}"')
     with pytest.raises(InputError, match=MATERIALS[name]):
         read_capture(path)
@@ -259,13 +267,13 @@ def test_names_no_file_can_have(tmp_path: Path, name: str) -> None:
         ("[fit]\neta = " + "9" * 400, r"fit\.eta"),
     ],
 )
-def test_settings_that_cannot_be(tmp_path: Path, extra: str, message: str) -> None:
+def test_impossible_settings_are_rejected(tmp_path: Path, extra: str, message: str) -> None:
     path = made.make_capture(tmp_path / "ball", photos=2, extra=extra)
     with pytest.raises(InputError, match=message):
         read_capture(path)
 
 
-def test_a_byte_order_mark_is_no_mistake(tmp_path: Path) -> None:
+def test_byte_order_mark_and_crlf_are_accepted(tmp_path: Path) -> None:
     path = made.make_capture(tmp_path / "ball", photos=2)
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
     assert len(read_capture(path).photos) == 2

@@ -1,4 +1,4 @@
-"""The program's default against the paper's method, on captures whose truth is known."""
+"""The default method compared with the paper's, on captures with a known BRDF."""
 
 from __future__ import annotations
 
@@ -23,16 +23,21 @@ from patina.core.samples import SampleTable
 from tests import make_capture as made
 from tests.sampled import sampled, sampled_materials
 
-SCAN, BALL = 40_000, 6_000  # samples: fewer than there are keep these tests short
+MAX_SCAN_SAMPLES, MAX_BALL_SAMPLES = (
+    40_000,
+    6_000,
+)  # largest sample counts, which keep these tests short
 
 
-def fitted(path: Path, name: str, table: SampleTable, method: str, most: int = SCAN) -> Estimate:
-    """What the job finds by a method, from some of the samples."""
+def fitted_estimate(
+    path: Path, name: str, table: SampleTable, method: str, max_samples: int = MAX_SCAN_SAMPLES
+) -> Estimate:
+    """The estimate of a method from at most ``max_samples`` samples."""
     capture = read_capture(path)
     capture = replace(capture, fit=replace(capture.fit, method=method))
-    if len(table) > most:
-        some = np.random.default_rng(0).choice(len(table), most, replace=False)
-        table = table.select(np.sort(some))
+    if len(table) > max_samples:
+        subset = np.random.default_rng(0).choice(len(table), max_samples, replace=False)
+        table = table.select(np.sort(subset))
     return drained(estimate(table, default_basis(), capture, name))
 
 
@@ -42,71 +47,71 @@ def log_rms(found: Estimate, truth: TabulatedBRDF) -> float:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["bunny_bronze", "bunny_red", "bunny_fabric"])
-def test_half_the_papers_error_on_real_reconstructions(shared: Path, name: str) -> None:
-    """Meshes of three stereo pipelines; the basis has seen the materials, for both alike."""
+def test_error_is_half_the_papers_on_real_reconstructions(shared: Path, name: str) -> None:
+    """Meshes of three stereo pipelines; both methods use a basis trained on these materials."""
     folder = shared / "data" / "scans" / name
     weights = np.array(json.loads((folder / "truth.json").read_text())["weights"], np.float32)
     truth = TabulatedBRDF.from_function(lambda angles: nbrdf.evaluate(weights, angles))
     path = folder / "scan.capture.toml"
     table = sampled_materials(path)["surface"]
-    ours, papers = (fitted(path, "surface", table, m) for m in ("measured", "paper"))
-    assert log_rms(ours, truth) < 0.5 * log_rms(papers, truth)
-    assert ours.held_out is not None and papers.held_out is not None
-    assert ours.held_out.typical < papers.held_out.typical
+    default, paper = (fitted_estimate(path, "surface", table, m) for m in ("measured", "paper"))
+    assert log_rms(default, truth) < 0.5 * log_rms(paper, truth)
+    assert default.held_out is not None and paper.held_out is not None
+    assert default.held_out.typical < paper.held_out.typical
 
 
 @pytest.mark.slow
-def test_the_demo_is_nearer_to_its_truth(root: Path) -> None:
-    """The glaze was rendered by Cycles' Principled: no material of the basis."""
+def test_error_on_the_demo_is_below_the_papers(root: Path) -> None:
+    """The glaze was rendered with Cycles' Principled BSDF and is not in the basis."""
     folder = root / "assets" / "demo"
     path = folder / "demo.capture.toml"
-    given = json.loads((folder / "truth.json").read_text())["materials"]["glaze"]
+    principled = json.loads((folder / "truth.json").read_text())["materials"]["glaze"]
     truth = TabulatedBRDF.from_function(
         Principled(
-            base_color=np.array(given["Base Color"]),
-            roughness=given["Roughness"],
-            ior=given["IOR"],
-            specular_ior_level=given["Specular IOR Level"],
+            base_color=np.array(principled["Base Color"]),
+            roughness=principled["Roughness"],
+            ior=principled["IOR"],
+            specular_ior_level=principled["Specular IOR Level"],
         ).evaluate
     )
     for name, table in sampled_materials(path).items():
-        ours, papers = (fitted(path, name, table, m) for m in ("measured", "paper"))
+        default, paper = (fitted_estimate(path, name, table, m) for m in ("measured", "paper"))
         if name == "glaze":
-            assert log_rms(ours, truth) < 0.6 * log_rms(papers, truth)
-        assert ours.held_out is not None and papers.held_out is not None
-        assert ours.held_out.typical < 0.6 * papers.held_out.typical
-        assert ours.held_out.error < papers.held_out.error
+            assert log_rms(default, truth) < 0.6 * log_rms(paper, truth)
+        assert default.held_out is not None and paper.held_out is not None
+        assert default.held_out.typical < 0.6 * paper.held_out.typical
+        assert default.held_out.error < paper.held_out.error
 
 
 @pytest.mark.slow
-def test_the_default_recovers_a_ball(tmp_path: Path) -> None:
-    """A Blinn lobe on an exact mesh, which no measured material has: the default's BRDF is right
-    where photos looked, and better than the paper's."""
+def test_default_recovers_the_brdf_of_a_ball(tmp_path: Path) -> None:
+    """A Blinn lobe, which no measured material has, on an exact mesh: at the sampled directions the
+    default's BRDF is accurate and better than the paper's."""
     path = made.make_capture(tmp_path / "ball")
     table, _ = sampled(path)
     error = {}
     for method in ("measured", "paper"):
-        brdf = fitted(path, "surface", table, method, BALL).fit.brdf
+        brdf = fitted_estimate(path, "surface", table, method, MAX_BALL_SAMPLES).fit.brdf
         error[method] = np.median(np.abs(np.log(brdf.evaluate(table.angles) / table.rho)))
     assert error["measured"] < 0.05 and error["measured"] < 0.5 * error["paper"]
 
 
 @pytest.mark.slow
-def test_a_photo_that_is_far_too_bright_is_named(tmp_path: Path) -> None:
-    """Its exposure is given as half of what it was."""
+def test_warning_names_a_photo_that_is_far_too_bright(tmp_path: Path) -> None:
+    """The exposure of one photo is stated as half of its true value."""
     path = made.make_capture(tmp_path / "ball")
     table, _ = sampled(path)
     factor = np.where(table.photo == 1, np.float32(2), np.float32(1))[:, None]
     table = replace(table, rho=factor * table.rho, radiance=factor * table.radiance)
-    found = fitted(path, "surface", table, "measured", BALL)
+    found = fitted_estimate(path, "surface", table, "measured", MAX_BALL_SAMPLES)
     assert isinstance(found.fit, MeasuredResult)
     assert max(found.fit.gains, key=found.fit.gains.__getitem__) == 1
-    said = quality_warnings(found, read_capture(path))
-    assert any("lit_2.exr" in told and "brighter" in told for told in said)
+    warnings = quality_warnings(found, read_capture(path))
+    assert any("lit_2.exr" in warning and "brighter" in warning for warning in warnings)
 
 
-def test_held_out_error_is_that_of_the_samples() -> None:
-    """A BRDF that is a tenth too bright misses every photo by a tenth."""
+def test_held_out_error_equals_the_brdf_error() -> None:
+    """A BRDF that is 10 % too bright has a held-out error of 10 % in every photo."""
     n = 200
     basis, rng = default_basis(), np.random.default_rng(0)
     brdf = PrincipalBRDF(basis, np.zeros((3, 5)))

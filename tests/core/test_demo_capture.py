@@ -44,7 +44,7 @@ def read_photo(path: Path) -> np.ndarray:
 
 
 def read_mask(path: Path) -> np.ndarray:
-    """The size and colour type stand in the header; the pixels need a reader."""
+    """The first channel of an 8-bit mask."""
     import OpenImageIO as oiio
 
     return oiio.ImageBuf(str(path)).get_pixels(oiio.UINT8)[..., 0]
@@ -58,26 +58,26 @@ def image_of(model: pycolmap.Reconstruction, name: str) -> pycolmap.Image:
 
 def project(model: pycolmap.Reconstruction, name: str, points: np.ndarray) -> np.ndarray:
     image = image_of(model, name)
-    seen = image.cam_from_world() * points
-    assert (seen[:, 2] > 0).all()
-    return np.asarray(model.camera(image.camera_id).img_from_cam(seen))
+    in_camera = image.cam_from_world() * points
+    assert (in_camera[:, 2] > 0).all()
+    return np.asarray(model.camera(image.camera_id).img_from_cam(in_camera))
 
 
-def test_the_folder_is_small() -> None:
+def test_demo_folder_is_small() -> None:
     assert sum(path.stat().st_size for path in FOLDER.rglob("*") if path.is_file()) < 2.5e6
 
 
-def test_every_file_that_is_named_exists_and_no_other(capture: dict) -> None:
-    named = {"README.md", "truth.json", "demo.capture.toml", capture["scan"]["mesh"]}
+def test_folder_holds_exactly_the_referenced_files(capture: dict) -> None:
+    referenced = {"README.md", "truth.json", "demo.capture.toml", capture["scan"]["mesh"]}
     for photo in capture["photo"]:
-        named |= {photo["file"], *photo["masks"].values()}
-    there = {path.relative_to(FOLDER).as_posix() for path in FOLDER.rglob("*") if path.is_file()}
-    sparse = {name for name in there if name.startswith(capture["scan"]["cameras"] + "/")}
-    assert named == there - sparse
+        referenced |= {photo["file"], *photo["masks"].values()}
+    present = {path.relative_to(FOLDER).as_posix() for path in FOLDER.rglob("*") if path.is_file()}
+    sparse = {name for name in present if name.startswith(capture["scan"]["cameras"] + "/")}
+    assert referenced == present - sparse
     assert {"sparse/cameras.bin", "sparse/images.bin", "sparse/points3D.bin"} <= sparse
 
 
-def test_lamps_and_materials_are_complete(capture: dict) -> None:
+def test_lights_and_materials_are_complete(capture: dict) -> None:
     lamps = {light["name"]: light for light in capture["light"]}
     assert len(lamps) == 4 and len(capture["photo"]) == 8
     for light in lamps.values():
@@ -89,7 +89,7 @@ def test_lamps_and_materials_are_complete(capture: dict) -> None:
         assert set(photo["masks"]) == materials
 
 
-def test_photos_masks_and_calibration_have_one_size(
+def test_photos_masks_and_cameras_have_the_same_size(
     capture: dict, model: pycolmap.Reconstruction
 ) -> None:
     for photo in capture["photo"]:
@@ -103,7 +103,7 @@ def test_photos_masks_and_calibration_have_one_size(
             assert struct.unpack(">IIBB", header[16:26]) == (camera.width, camera.height, 8, 0)
 
 
-def test_masks_are_apart_and_show_lit_surface(capture: dict) -> None:
+def test_masks_are_disjoint_and_cover_lit_surface(capture: dict) -> None:
     for photo in capture["photo"]:
         bright = read_photo(FOLDER / photo["file"]).max(-1) > 0.02
         masks = {name: read_mask(FOLDER / file) for name, file in photo["masks"].items()}
@@ -114,7 +114,7 @@ def test_masks_are_apart_and_show_lit_surface(capture: dict) -> None:
         assert (clay & bright).sum() > 200, photo["file"]
 
 
-def test_the_model_is_whole(model: pycolmap.Reconstruction) -> None:
+def test_colmap_model_is_complete(model: pycolmap.Reconstruction) -> None:
     assert model.num_reg_images() == 24
     assert model.num_points3D() > 500
     assert model.compute_mean_reprojection_error() < 0.6
@@ -123,7 +123,7 @@ def test_the_model_is_whole(model: pycolmap.Reconstruction) -> None:
     assert camera.principal_point_x != camera.width / 2
 
 
-def test_the_object_is_in_every_frame(model: pycolmap.Reconstruction, points: np.ndarray) -> None:
+def test_object_is_inside_every_photo(model: pycolmap.Reconstruction, points: np.ndarray) -> None:
     for image in model.images.values():
         camera = model.camera(image.camera_id)
         pixels = project(model, image.name, points)
@@ -131,20 +131,22 @@ def test_the_object_is_in_every_frame(model: pycolmap.Reconstruction, points: np
         assert np.ptp(pixels, axis=0).max() > 0.7 * camera.width
 
 
-def test_masks_lie_where_the_mesh_is_seen(
+def test_masks_align_with_the_projected_mesh(
     capture: dict, model: pycolmap.Reconstruction, points: np.ndarray
 ) -> None:
-    """Photos are not flipped or shifted: masks (a pixel smaller) end where the mesh does."""
+    """Photos are not flipped or shifted: masks (eroded by a pixel) end where the mesh does."""
     for photo in capture["photo"]:
         masks = [read_mask(FOLDER / file) > 0 for file in photo["masks"].values()]
         rows, columns = np.nonzero(np.logical_or(*masks))
         pixels = project(model, photo["camera"], points)
-        inner = np.array([columns.min(), rows.min(), -columns.max() - 1, -rows.max() - 1])
-        outer = np.concatenate([pixels.min(0), -pixels.max(0)])
-        assert (inner - outer > 0).all() and (inner - outer < 3.5).all(), photo["file"]
+        mask_bounds = np.array([columns.min(), rows.min(), -columns.max() - 1, -rows.max() - 1])
+        mesh_bounds = np.concatenate([pixels.min(0), -pixels.max(0)])
+        assert (mask_bounds - mesh_bounds > 0).all() and (mask_bounds - mesh_bounds < 3.5).all(), (
+            photo["file"]
+        )
 
 
-def test_the_truth_belongs_to_the_capture(capture: dict) -> None:
+def test_truth_file_matches_the_capture(capture: dict) -> None:
     truth = json.loads((FOLDER / "truth.json").read_text(encoding="utf-8"))
     assert "checks only" in truth["notice"]
     assert set(truth["materials"]) == {material["name"] for material in capture["material"]}

@@ -1,4 +1,4 @@
-"""The command's words; what it runs has tests of its own."""
+"""The command line of the experiments; the experiments themselves are tested elsewhere."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from tools.experiments import __main__ as command
 from tools.experiments import estimators, runs, store
 
 
-def test_an_unknown_experiment_is_named(
+def test_error_names_an_unknown_experiment(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("sys.argv", ["experiments", "figure12"])
-    with pytest.raises(SystemExit) as end:
+    with pytest.raises(SystemExit) as exit_info:
         command.main()
-    assert end.value.code == 2
+    assert exit_info.value.code == 2
     assert "'figure12'" in capsys.readouterr().err
 
 
-def test_without_the_reference_data_it_says_so(
+def test_missing_reference_data_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     monkeypatch.setattr("sys.argv", ["experiments", "check"])
@@ -30,7 +30,7 @@ def test_without_the_reference_data_it_says_so(
     assert "found no reference data" in capsys.readouterr().err
 
 
-def test_results_are_kept_apart_from_quick_ones(
+def test_quick_results_are_stored_separately(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("PATINA_CACHE", str(tmp_path))
@@ -40,16 +40,20 @@ def test_results_are_kept_apart_from_quick_ones(
     assert json.loads(store.path("goals", True).read_text("utf-8")) == [{"a": 1}]
 
 
-def test_records_come_in_the_order_of_the_tasks() -> None:
-    kept: list[int] = []
+def test_records_keep_the_order_of_the_tasks() -> None:
+    saved_counts: list[int] = []
     found = runs.run_all(
-        "x", lambda n: [{"n": n}, {"n": -n}], [3, 1, 2], 1, keep=lambda r: kept.append(len(r))
+        "x",
+        lambda n: [{"n": n}, {"n": -n}],
+        [3, 1, 2],
+        1,
+        keep=lambda r: saved_counts.append(len(r)),
     )
-    assert kept == [2, 4, 6]
+    assert saved_counts == [2, 4, 6]
     assert [r["n"] for r in found] == [3, -3, 1, -1, 2, -2]
 
 
-def test_only_the_estimators_asked_for_are_run() -> None:
+def test_only_the_selected_estimators_run() -> None:
     try:
         estimators.select(["paper"])
         assert list(estimators.rows()) == ["paper"]

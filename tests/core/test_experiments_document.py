@@ -1,4 +1,4 @@
-"""Tables, charts and the document's marked parts, from records written by hand."""
+"""Tables, charts and the marked sections of the document, from hand-written records."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def rows_of(table: str) -> dict[str, list[str]]:
     return {row[0]: row[1:] for row in cells[2:]}
 
 
-def test_goals_are_medians_of_ratios_per_case() -> None:
+def test_goals_are_medians_of_ratios_per_material() -> None:
     found = [
         *(record("paper", "pink-fabric", x, seed=i) for i, x in enumerate((0.2, 0.4, 0.9))),
         record("ours", "pink-fabric", 0.1, peak=1.1),
@@ -36,29 +36,38 @@ def test_goals_are_medians_of_ratios_per_case() -> None:
         record("ours", "bluebook", 9.0, in_basis=True),
     ]
     rows = rows_of(goal_table.goals(found))
-    # ratios 0.25 (against the median seed), 0.3 and 1.2: the median is 0.3, one material is worse
+    # ratios to the paper's median: 0.25, 0.3 and 1.2; their median is 0.3, one material is worse
     assert rows["log-relative RMS (≤ 80°), ours ÷ paper"][1:3] == ["0.30", "yes"]
-    worst = rows["worse than the paper in no material (both measures)"]
-    assert "1.2" in worst[1] and "bluebook" in worst[1] and worst[2] == "**no**"
+    worse_row = rows["worse than the paper in no material (both measures)"]
+    assert "1.2" in worse_row[1] and "bluebook" in worse_row[1] and worse_row[2] == "**no**"
     picture = next(v for k, v in rows.items() if k.startswith("PSNR"))
     assert picture[1].startswith("41.0 dB") and "25.0 dB" in picture[1] and picture[2] == "yes"
-    flat = next(v for k, v in rows.items() if k.startswith("flat"))
-    assert flat[1].startswith("1.10") and flat[2] == "yes"
+    peak_row = next(v for k, v in rows.items() if k.startswith("flat"))
+    assert peak_row[1].startswith("1.10") and peak_row[2] == "yes"
 
 
-def test_a_missing_estimator_is_said_to_be_missing() -> None:
+def test_goal_of_a_missing_estimator_is_not_measured() -> None:
     rows = rows_of(goal_table.goals([record("paper", "alum-bronze", 0.3)]))
     assert rows["log-relative RMS (≤ 80°), ours ÷ paper"][1:3] == [goal_table.NOT_MEASURED, ""]
 
 
-def test_held_out_is_compared_with_the_true_image_error() -> None:
-    told = {"held_out_rms": 0.12, "image_rms": 0.1, "held_out_typical": 0.03, "image_typical": 0.02}
-    rows = rows_of(goal_table.goals([record("ours", "alum-bronze", 0.1, **told)]))
-    held = next(v for k, v in rows.items() if k.startswith("reported"))
-    assert "typical 1.50" in held[1] and "rms 1.20" in held[1] and held[2] == "**no**"
+def test_held_out_error_is_compared_with_the_true_image_error() -> None:
+    extra = {
+        "held_out_rms": 0.12,
+        "image_rms": 0.1,
+        "held_out_typical": 0.03,
+        "image_typical": 0.02,
+    }
+    rows = rows_of(goal_table.goals([record("ours", "alum-bronze", 0.1, **extra)]))
+    reported_row = next(v for k, v in rows.items() if k.startswith("reported"))
+    assert (
+        "typical 1.50" in reported_row[1]
+        and "rms 1.20" in reported_row[1]
+        and reported_row[2] == "**no**"
+    )
 
 
-def test_rank_correlation_of_a_known_order() -> None:
+def test_rank_correlation_of_a_known_order_is_one() -> None:
     def run(errors: list[float]) -> records.Record:
         return {
             "material": "alum-bronze",
@@ -69,25 +78,30 @@ def test_rank_correlation_of_a_known_order() -> None:
         }
 
     found = tables.similarity([run([5.0, 4.0, 3.0, 2.0, 1.0])])
-    assert "-1.00 ± 0.00" in found and "| 0.33 |" in found  # chosen 1, median 3
+    assert (
+        "-1.00 ± 0.00" in found and "| 0.33 |" in found
+    )  # error of the most similar candidate 1, median 3
     assert "+1.00" in tables.similarity([run([1.0, 2.0, 3.0, 4.0, 5.0])])
 
 
-def test_only_some_estimators_replace_their_own_records() -> None:
+def test_run_of_some_estimators_replaces_only_their_records() -> None:
     old = [record("paper", "a", 1.0), record("ours", "a", 2.0)]
     new = [record("ours", "a", 0.5)]
-    kept = runs.merged(old, new, ["ours"], ended=True)
-    assert [(r["estimator"], r["log_rms"]) for r in kept] == [("paper", 1.0), ("ours", 0.5)]
+    merged_records = runs.merged(old, new, ["ours"], ended=True)
+    assert [(r["estimator"], r["log_rms"]) for r in merged_records] == [
+        ("paper", 1.0),
+        ("ours", 0.5),
+    ]
     assert runs.merged(old, new, None, ended=True) == new
 
 
-def test_a_run_that_is_broken_off_loses_none_of_the_last() -> None:
+def test_interrupted_run_keeps_the_records_of_the_last_run() -> None:
     old = [record("ours", "a", 2.0), record("ours", "b", 3.0)]
-    kept = runs.merged(old, [record("ours", "a", 0.5)], None, ended=False)
-    assert [(r["material"], r["log_rms"]) for r in kept] == [("b", 3.0), ("a", 0.5)]
+    merged_records = runs.merged(old, [record("ours", "a", 0.5)], None, ended=False)
+    assert [(r["material"], r["log_rms"]) for r in merged_records] == [("b", 3.0), ("a", 0.5)]
 
 
-def test_only_the_marked_part_is_replaced() -> None:
+def test_only_the_marked_section_is_replaced() -> None:
     text = "a\n<!-- begin x -->\nold\n<!-- end x -->\nb <!-- begin y -->1<!-- end y -->"
     found = document.replaced(text, "x", "new \\1\n")
     assert found == text.replace("old", "new \\1")
@@ -103,7 +117,9 @@ def test_only_the_marked_part_is_replaced() -> None:
     ],
     ids=["experiments", "appearance"],
 )
-def test_the_document_has_every_part(file: Path, markers: dict[str, object]) -> None:
+def test_document_has_every_marked_section_and_picture(
+    file: Path, markers: dict[str, object]
+) -> None:
     text = file.read_text("utf-8")
     for marker in markers:
         assert f"<!-- begin {marker} -->" in text and f"<!-- end {marker} -->" in text
@@ -115,20 +131,20 @@ def test_the_document_has_every_part(file: Path, markers: dict[str, object]) -> 
                 ElementTree.parse(picture)
 
 
-def test_charts_put_values_in_their_place() -> None:
+def test_chart_coordinates_and_labels() -> None:
     chart = svg.Chart("t < 1", "x", "y", (1.0, 100.0), (0.0, 2.0), x_log=True)
     assert chart.x(10.0) == pytest.approx((chart.x(1.0) + chart.x(100.0)) / 2)
     assert chart.y(1.0) == pytest.approx((chart.y(0.0) + chart.y(2.0)) / 2)
-    assert chart.y(2.0) < chart.y(0.0)  # pixels run downwards
+    assert chart.y(2.0) < chart.y(0.0)  # pixel rows run downwards
     chart.line([1, 10, 100], [0.0, 1.0, 2.0], svg.COLOURS[0])
     chart.whisker(10, 0.5, 1.5, svg.INK)
-    whole = svg.sheet([chart.drawing()], 1, (300, 220), svg.legend([("a & b", "#000", "bar")]))
-    root = ElementTree.fromstring(whole)
-    words = [e.text for e in root.iter("{http://www.w3.org/2000/svg}text")]
-    assert "t < 1" in words and "a & b" in words and {"1", "10", "100", "0", "2"} <= set(words)
+    sheet = svg.sheet([chart.drawing()], 1, (300, 220), svg.legend([("a & b", "#000", "bar")]))
+    root = ElementTree.fromstring(sheet)
+    texts = [e.text for e in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert "t < 1" in texts and "a & b" in texts and {"1", "10", "100", "0", "2"} <= set(texts)
 
 
-def test_a_sweep_shows_medians_in_order() -> None:
+def test_sweep_table_shows_medians_in_order() -> None:
     found = [
         {"sweep": "photos", "where": "knot", "value": v, "label": f"{v:g}", "material": m,
          "estimator": "paper", "log_rms": 1 / v + d, "specular_l2": 0.5}
@@ -140,12 +156,12 @@ def test_a_sweep_shows_medians_in_order() -> None:
     ElementTree.fromstring(figures.sweep(found, ["photos"], {"photos": "lit photos"}))
 
 
-def test_half_circle_radius_is_the_cube_root() -> None:
+def test_half_circle_radius_is_the_cube_root_of_the_brdf() -> None:
     from tools.experiments.half_circle import BASE, RADIUS, WIDTH, half_circle, slice_angles
 
     theta, _ = slice_angles(np.radians(45))
-    drawn = half_circle("x", [(np.full((len(theta), 3), 0.125), "")], 45, 1.0)
-    root = ElementTree.fromstring(f"<g>{drawn}</g>")
+    markup = half_circle("x", [(np.full((len(theta), 3), 0.125), "")], 45, 1.0)
+    root = ElementTree.fromstring(f"<g>{markup}</g>")
     line = next(root.iter("polyline")).get("points") or ""
     points = np.array([[float(x) for x in p.split(",")] for p in line.split()])
     radius = np.hypot(points[:, 0] - WIDTH / 2, points[:, 1] - BASE)

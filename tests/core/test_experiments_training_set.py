@@ -1,4 +1,4 @@
-"""A basis without some of its materials, against components computed from scratch."""
+"""A basis without some training materials, compared with one trained from scratch."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ NAMES = ("chalk", "slate", "satin", "gloss", "velvet")
 GRID = AngleGrid(12, 7, 6, float(np.radians(2.0)))
 
 
-class Lobes:
-    """Analytic columns: a diffuse part and a lobe in θh, another for every channel."""
+class AnalyticLobes:
+    """Analytic training columns: a diffuse part and a lobe in θh that differs per channel."""
 
     def __init__(self, which: list[int]) -> None:
         self.which = which
-        pick = np.random.default_rng(0).choice(90 * 90 * 180, 4000, replace=False)
-        centres = [a.ravel()[pick] for a in merl_grid.node_angles(0.5)]
-        seen = merl_grid.visible(Angles(*centres))
-        self.cells = Angles(*(a[seen] for a in centres))
+        chosen_cells = np.random.default_rng(0).choice(90 * 90 * 180, 4000, replace=False)
+        centres = [a.ravel()[chosen_cells] for a in merl_grid.node_angles(0.5)]
+        visible = merl_grid.visible(Angles(*centres))
+        self.cells = Angles(*(a[visible] for a in centres))
 
     @property
     def columns(self) -> int:
@@ -48,17 +48,19 @@ class Lobes:
 
 
 @pytest.fixture(scope="module")
-def whole() -> TrainingSet:
-    return TrainingSet.compute(Lobes([0, 1, 2, 3, 4]), NAMES, "analytic lobes", GRID)
+def full_set() -> TrainingSet:
+    return TrainingSet.compute(AnalyticLobes([0, 1, 2, 3, 4]), NAMES, "analytic lobes", GRID)
 
 
 @pytest.mark.parametrize("without", [(), ("satin",), ("chalk", "velvet")])
-def test_agrees_with_training_on_the_rest(whole: TrainingSet, without: tuple[str, ...]) -> None:
-    kept = [i for i, name in enumerate(NAMES) if name not in without]
-    expected = train(Lobes(kept), "analytic lobes", 4, GRID)
-    found = whole.basis(without, 4)
-    assert found.columns == 3 * len(kept)
-    assert found.materials == tuple(NAMES[i] for i in kept)
+def test_basis_equals_one_trained_without_the_materials(
+    full_set: TrainingSet, without: tuple[str, ...]
+) -> None:
+    remaining = [i for i, name in enumerate(NAMES) if name not in without]
+    expected = train(AnalyticLobes(remaining), "analytic lobes", 4, GRID)
+    found = full_set.basis(without, 4)
+    assert found.columns == 3 * len(remaining)
+    assert found.materials == tuple(NAMES[i] for i in remaining)
     np.testing.assert_allclose(found.mean, expected.mean, atol=2e-5)
     np.testing.assert_allclose(found.log_reference, expected.log_reference, atol=2e-5)
     np.testing.assert_allclose(found.explained, expected.explained, atol=1e-6)
@@ -66,10 +68,10 @@ def test_agrees_with_training_on_the_rest(whole: TrainingSet, without: tuple[str
     np.testing.assert_allclose(found.components, expected.components, atol=2e-3 * scale)
 
 
-def test_training_coefficients_give_the_columns_back(whole: TrainingSet) -> None:
-    """With every component kept, row i of ``training`` must reproduce column i itself."""
-    lobes = Lobes([0, 1, 3, 4])
-    basis = whole.basis(("satin",), 11)
+def test_training_coefficients_reproduce_the_columns(full_set: TrainingSet) -> None:
+    """With all components, row i of ``training`` reproduces training column i."""
+    lobes = AnalyticLobes([0, 1, 3, 4])
+    basis = full_set.basis(("satin",), 11)
     assert isinstance(basis, TrainedBasis) and basis.training is not None
     nodes = Angles(*(a.ravel() for a in GRID.nodes()))
     cos_i, cos_o = cosines(*nodes)
@@ -80,35 +82,35 @@ def test_training_coefficients_give_the_columns_back(whole: TrainingSet) -> None
     np.testing.assert_allclose(basis.training.T @ basis.training, np.eye(11), atol=1e-9)
 
 
-def test_what_is_left_out_leaves_no_trace(whole: TrainingSet) -> None:
-    """Two sets that differ only in one material give the same basis without it."""
+def test_excluded_material_does_not_affect_the_basis(full_set: TrainingSet) -> None:
+    """Two training sets that differ in one material give the same basis without that material."""
 
-    class Other(Lobes):
+    class OtherSatin(AnalyticLobes):
         def at(self, angles: Angles) -> np.ndarray:
             out = super().at(angles)
             out[6:9] = 7.0 + angles.theta_h
             return out
 
-    other = TrainingSet.compute(Other([0, 1, 2, 3, 4]), NAMES, "other", GRID)
-    a, b = whole.basis(("satin",), 4), other.basis(("satin",), 4)
+    other = TrainingSet.compute(OtherSatin([0, 1, 2, 3, 4]), NAMES, "other", GRID)
+    a, b = full_set.basis(("satin",), 4), other.basis(("satin",), 4)
     np.testing.assert_allclose(a.components, b.components, atol=2e-3 * np.abs(a.components).max())
-    assert not np.allclose(whole.basis((), 4).mean, other.basis((), 4).mean, atol=0.01)
+    assert not np.allclose(full_set.basis((), 4).mean, other.basis((), 4).mean, atol=0.01)
 
 
-def test_kept_on_disk(whole: TrainingSet, tmp_path: Path) -> None:
+def test_training_set_file_round_trip(full_set: TrainingSet, tmp_path: Path) -> None:
     file = tmp_path / "set.npz"
-    whole.save(file)
-    again = TrainingSet.load(file)
-    assert again.materials == NAMES and again.grid == GRID
-    np.testing.assert_array_equal(again.logs, whole.logs)
-    np.testing.assert_array_equal(again.products, whole.products)
+    full_set.save(file)
+    loaded = TrainingSet.load(file)
+    assert loaded.materials == NAMES and loaded.grid == GRID
+    np.testing.assert_array_equal(loaded.logs, full_set.logs)
+    np.testing.assert_array_equal(loaded.products, full_set.products)
     file.write_bytes(file.read_bytes()[:1000])
     with pytest.raises(InputError, match=r"set\.npz"):
         TrainingSet.load(file)
 
 
-def test_refuses_what_it_does_not_have(whole: TrainingSet) -> None:
+def test_unknown_materials_and_too_many_components_are_rejected(full_set: TrainingSet) -> None:
     with pytest.raises(PatinaError, match="marble"):
-        whole.basis(("marble",), 4)
+        full_set.basis(("marble",), 4)
     with pytest.raises(PatinaError, match="12 training columns"):
-        whole.basis(("satin",), 12)
+        full_set.basis(("satin",), 12)

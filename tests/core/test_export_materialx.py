@@ -1,4 +1,4 @@
-"""MaterialX documents: well-formed, and valid by the MaterialX library where that is at hand."""
+"""MaterialX documents are well-formed, and valid according to the MaterialX library if installed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from patina.core.appearance.lobe_stack import Lobe, LobeStack, blended
 from patina.core.appearance.principled import Principled
 from patina.core.export import materialx
 
-STACK = LobeStack(
+PLAIN_STACK = LobeStack(
     diffuse=np.array([0.3, 0.2, 0.1]),
     diffuse_roughness=0.25,
     lobes=(
@@ -24,14 +24,14 @@ STACK = LobeStack(
         Lobe(np.array([0.2, 0.1, 0.05]), np.array([0.9, 0.8, 0.7]), 0.4),
     ),
 )
-TURNED = LobeStack(
+ANGLE_DEPENDENT_STACK = LobeStack(
     diffuse=np.array([0.3, 0.2, 0.1]),
     diffuse_roughness=0.0,
     lobes=(Lobe(np.full(3, 0.1), np.ones(3), 0.3, f0_edge=np.array([0.5, 0.4, 0.3])),),
     diffuse_mid=np.array([0.2, 0.3, 0.4]),
     diffuse_edge=np.array([0.1, 0.5, 0.9]),
 )
-# runs on its own: the library carries what other modules of the tests may carry in other versions
+# runs in its own process: the library may bundle other versions of modules that tests load
 CHECK = """
 import json, sys
 import MaterialX as mx
@@ -62,7 +62,7 @@ print(json.dumps([valid, message, undefined, unknown, graph]))
 """
 
 
-def document(tmp_path: Path, stack: LobeStack = STACK) -> Path:
+def document(tmp_path: Path, stack: LobeStack = PLAIN_STACK) -> Path:
     root = materialx.document()
     materialx.add_lobe_stack(root, "gold", stack)
     materialx.add_open_pbr(root, "gold_openpbr", Principled(coat_weight=0.3, metallic=0.2))
@@ -70,96 +70,103 @@ def document(tmp_path: Path, stack: LobeStack = STACK) -> Path:
     return tmp_path / "gold.mtlx"
 
 
-def checked(file: Path) -> list:
-    """What the MaterialX library says of a document."""
+def library_report(file: Path) -> list:
+    """[valid, message, undefined nodes, unknown inputs, graph] from the MaterialX library."""
     if importlib.util.find_spec("MaterialX") is None:
         pytest.skip("the MaterialX package is not installed")
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", CHECK, file], capture_output=True, text=True, timeout=60
     )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1])
+    assert completed.returncode == 0, completed.stderr
+    return json.loads(completed.stdout.splitlines()[-1])
 
 
-def test_every_reference_leads_to_a_node_of_its_type(tmp_path: Path) -> None:
+def test_every_reference_names_a_node_of_its_type(tmp_path: Path) -> None:
     root = ET.parse(document(tmp_path)).getroot()
     nodes = {node.get("name"): node for node in root}
     assert len(nodes) == len(root) and root.get("version") == "1.39"
     for node in root:
         for entry in node.findall("input"):
-            named = entry.get("nodename")
-            assert (named is None) != (entry.get("value") is None)
-            if named is not None:
-                assert nodes[named].get("type") == entry.get("type")
+            reference = entry.get("nodename")
+            assert (reference is None) != (entry.get("value") is None)
+            if reference is not None:
+                assert nodes[reference].get("type") == entry.get("type")
     materials = [n.get("name") for n in root if n.tag == "surfacematerial"]
     assert materials == ["gold", "gold_openpbr"]
     assert not list(tmp_path.glob("*.part"))
 
 
-def test_roughness_is_alpha_and_the_top_lobe_lies_on_top(tmp_path: Path) -> None:
+def test_roughness_is_alpha_and_lobes_are_layered_in_order(tmp_path: Path) -> None:
     root = ET.parse(document(tmp_path)).getroot()
     nodes = {node.get("name"): node for node in root}
 
-    def told(node: ET.Element, name: str) -> str | None:
+    def entry_of(node: ET.Element, name: str) -> str | None:
         found = node.find(f"input[@name='{name}']")
         return None if found is None else found.get("value") or found.get("nodename")
 
     surface = nodes["gold_surface"]
-    first = nodes[told(surface, "bsdf")]
-    top = nodes[told(first, "top")]
-    alpha = [float(v) for v in told(top, "roughness").split(",")]
+    first = nodes[entry_of(surface, "bsdf")]
+    top = nodes[entry_of(first, "top")]
+    alpha = [float(v) for v in entry_of(top, "roughness").split(",")]
     assert alpha == pytest.approx([0.01, 0.01])
-    second = nodes[told(first, "base")]
-    assert nodes[told(second, "base")].tag == "oren_nayar_diffuse_bsdf"
+    second = nodes[entry_of(first, "base")]
+    assert nodes[entry_of(second, "base")].tag == "oren_nayar_diffuse_bsdf"
 
 
-def test_a_stack_without_lobes_is_its_diffuse_base(tmp_path: Path) -> None:
-    bare = LobeStack(np.full(3, 0.5), 0.0, ())
-    root = ET.parse(document(tmp_path, bare)).getroot()
+def test_stack_without_lobes_has_only_a_diffuse_base(tmp_path: Path) -> None:
+    diffuse_only = LobeStack(np.full(3, 0.5), 0.0, ())
+    root = ET.parse(document(tmp_path, diffuse_only)).getroot()
     assert not root.findall("layer") and root.find("oren_nayar_diffuse_bsdf") is not None
 
 
-def test_colours_that_turn_are_the_stacks_own(tmp_path: Path) -> None:
-    """The graph of mix nodes, computed here, against the stack's own blending."""
-    root = ET.parse(document(tmp_path, TURNED)).getroot()
+def test_angle_dependent_colours_match_the_stack(tmp_path: Path) -> None:
+    """The graph of mix nodes, evaluated here, gives the colours of the stack's own blending."""
+    root = ET.parse(document(tmp_path, ANGLE_DEPENDENT_STACK)).getroot()
     nodes = {node.get("name"): node for node in root}
     cos = np.linspace(0.05, 1, 7)
 
-    def value(name: str):
+    def node_value(name: str):
         node = nodes[name]
-        told = {i.get("name"): i for i in node.findall("input")}
+        inputs = {i.get("name"): i for i in node.findall("input")}
 
-        def of(key: str):
-            entry = told[key]
+        def input_value(key: str):
+            entry = inputs[key]
             if entry.get("nodename"):
-                return value(entry.get("nodename"))
+                return node_value(entry.get("nodename"))
             return np.array([float(v) for v in entry.get("value").split(",")])
 
         if node.tag == "facingratio":
             return cos[:, None]
         if node.tag == "subtract":
-            return of("in1") - of("in2")
+            return input_value("in1") - input_value("in2")
         if node.tag == "multiply":
-            return of("in1") * of("in2")
+            return input_value("in1") * input_value("in2")
         assert node.tag == "mix"
-        return of("bg") * (1 - of("mix")) + of("fg") * of("mix")
+        return input_value("bg") * (1 - input_value("mix")) + input_value("fg") * input_value("mix")
 
     diffuse = nodes["gold_diffuse"].find("input[@name='color']").get("nodename")
-    expected = blended(cos, TURNED.diffuse, TURNED.diffuse_mid, TURNED.diffuse_edge)
-    assert np.allclose(value(diffuse), expected, atol=1e-6)
-    lobe = TURNED.lobes[0]
+    expected = blended(
+        cos,
+        ANGLE_DEPENDENT_STACK.diffuse,
+        ANGLE_DEPENDENT_STACK.diffuse_mid,
+        ANGLE_DEPENDENT_STACK.diffuse_edge,
+    )
+    assert np.allclose(node_value(diffuse), expected, atol=1e-6)
+    lobe = ANGLE_DEPENDENT_STACK.lobes[0]
     f0 = nodes["gold_lobe1"].find("input[@name='color0']").get("nodename")
-    assert np.allclose(value(f0), blended(cos, lobe.f0, lobe.f0_mid, lobe.f0_edge), atol=1e-6)
+    assert np.allclose(node_value(f0), blended(cos, lobe.f0, lobe.f0_mid, lobe.f0_edge), atol=1e-6)
 
 
-def test_the_library_finds_turned_colours_valid(tmp_path: Path) -> None:
-    valid, message, undefined, unknown, _ = checked(document(tmp_path, TURNED))
+def test_library_accepts_angle_dependent_colours(tmp_path: Path) -> None:
+    valid, message, undefined, unknown, _ = library_report(
+        document(tmp_path, ANGLE_DEPENDENT_STACK)
+    )
     assert valid, message
     assert undefined == [] and unknown == []
 
 
-def test_the_library_finds_it_valid_and_reads_the_same(tmp_path: Path) -> None:
-    valid, message, undefined, unknown, graph = checked(document(tmp_path))
+def test_library_accepts_the_document_and_reads_its_values(tmp_path: Path) -> None:
+    valid, message, undefined, unknown, graph = library_report(document(tmp_path))
     assert valid, message
     assert undefined == [] and unknown == []
     assert graph["gold_openpbr"][0] == "open_pbr_surface"

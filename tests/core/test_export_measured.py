@@ -1,4 +1,4 @@
-"""RGL's measured format: the container, what it interpolates to, and colours as spectra."""
+"""RGL's measured BSDF format: the container, interpolated values, and colours as spectra."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ SIZES = {1: "<u1", 10: "<f4"}
 
 
 def read_tensor(path: Path) -> dict[str, np.ndarray]:
-    """The container by its description alone."""
+    """A reader of the container, written from its specification."""
     raw = path.read_bytes()
     assert raw[:12] == b"tensor_file\0" and raw[12:14] == b"\1\0"
-    (count,), place, found = struct.unpack_from("<I", raw, 14), 18, {}
+    (count,), position, found = struct.unpack_from("<I", raw, 14), 18, {}
     for _ in range(count):
-        (length,) = struct.unpack_from("<H", raw, place)
-        name = raw[place + 2 : place + 2 + length].decode()
-        place += 2 + length
-        rank, kind, offset = struct.unpack_from("<HBQ", raw, place)
-        shape = struct.unpack_from(f"<{rank}Q", raw, place + 11)
-        place += 11 + 8 * rank
+        (length,) = struct.unpack_from("<H", raw, position)
+        name = raw[position + 2 : position + 2 + length].decode()
+        position += 2 + length
+        rank, kind, offset = struct.unpack_from("<HBQ", raw, position)
+        shape = struct.unpack_from(f"<{rank}Q", raw, position + 11)
+        position += 11 + 8 * rank
         size = int(np.prod(shape))
         found[name] = np.frombuffer(raw, SIZES[kind], size, offset).reshape(shape)
     return found
@@ -37,27 +37,27 @@ def grey(angles: Angles) -> np.ndarray:
     return np.full((len(np.ravel(angles.theta_h)), 3), [0.1, 0.2, 0.3])
 
 
-def test_the_file_is_what_both_renderers_check_for(tmp_path: Path) -> None:
+def test_file_has_the_fields_that_renderers_check(tmp_path: Path) -> None:
     pictures = measured_bsdf.pictures(grey)
     tensor_file.write(tmp_path / "a.bsdf", pictures.fields("a description"))
     found = read_tensor(tmp_path / "a.bsdf")
     side, count = measured_bsdf.SIDE, measured_bsdf.ELEVATIONS
-    waves = len(spectra.WAVELENGTHS)
+    wavelength_count = len(spectra.WAVELENGTHS)
     assert bytes(found["description"]).decode() == "a description"
     assert found["theta_i"].shape == (count,) and found["phi_i"].shape == (1,)
     assert found["vndf"].shape[:2] == (1, count) and found["ndf"].ndim == found["sigma"].ndim == 2
     assert found["luminance"].shape == (1, count, side, side)
-    assert found["spectra"].shape == (1, count, waves, side, side)
-    assert found["wavelengths"].shape == (waves,) and found["jacobian"].tolist() == [1]
+    assert found["spectra"].shape == (1, count, wavelength_count, side, side)
+    assert found["wavelengths"].shape == (wavelength_count,) and found["jacobian"].tolist() == [1]
     assert all(np.isfinite(a).all() and (a >= 0).all() for a in found.values() if a.dtype != "u1")
     assert (found["luminance"] > 0).all() and (np.diff(found["theta_i"]) > 0).all()
-    # f cos(theta_o) = ndf/(4 sigma) * spectra, straight up: both cosines are 1
+    # f cos(theta_o) = ndf/(4 sigma) * spectra; at normal incidence both cosines are 1
     assert found["ndf"][0, 0] / (4 * found["sigma"][0, 0]) * found["spectra"][0, 0, :, 0, 0] == (
         pytest.approx(spectra.BASIS @ [0.1, 0.2, 0.3], rel=1e-5)
     )
 
 
-def test_a_matte_and_a_glossy_surface_come_back() -> None:
+def test_matte_and_glossy_brdfs_are_reproduced() -> None:
     assert cube_root_error(measured_bsdf.pictures(grey).evaluate, grey) < 0.003
     for roughness in (0.6, 0.3, 0.15):
         model = Principled(base_color=np.array([0.4, 0.2, 0.1]), roughness=roughness)
@@ -69,8 +69,8 @@ def test_a_matte_and_a_glossy_surface_come_back() -> None:
         assert cube_root_error(measured_bsdf.pictures(reciprocal).evaluate, reciprocal) < 0.02
 
 
-def test_values_at_directions_by_vectors() -> None:
-    """Not through the module's own angles: a metal, light and view given as vectors."""
+def test_values_at_direction_vectors() -> None:
+    """A metal evaluated at light and view vectors, independently of the module's own angles."""
     model = Principled(metallic=1.0, roughness=0.4, base_color=np.array([0.9, 0.6, 0.3]))
     pictures = measured_bsdf.pictures(model.evaluate)
     rng = np.random.default_rng(5)
@@ -82,17 +82,19 @@ def test_values_at_directions_by_vectors() -> None:
     assert np.median(np.abs(found / expected - 1)) < 0.01
 
 
-def test_colours_survive_daylight() -> None:
-    """Reflectances that come back as themselves under D65, stay in [0, 1] and add up to white."""
+def test_colours_are_preserved_under_daylight() -> None:
+    """The spectra reproduce Rec. 709 primaries under D65, lie in [0, 1] and add up to white."""
     assert (spectra.BASIS >= 0).all() and (spectra.BASIS <= 1).all()
     assert np.allclose(spectra.BASIS.sum(axis=1), 1, atol=1e-6)
-    fine, coarse = np.arange(380, 771), np.arange(380, 771, 10)
-    observer = np.stack([np.interp(fine, coarse, curve) for curve in (X, Y, Z)])
-    light = np.interp(fine, coarse, D65)
-    reflected = [np.interp(fine, spectra.WAVELENGTHS, one) for one in spectra.BASIS.T]
+    wavelengths_1nm, wavelengths_10nm = np.arange(380, 771), np.arange(380, 771, 10)
+    observer = np.stack(
+        [np.interp(wavelengths_1nm, wavelengths_10nm, curve) for curve in (X, Y, Z)]
+    )
+    light = np.interp(wavelengths_1nm, wavelengths_10nm, D65)
+    reflected = [np.interp(wavelengths_1nm, spectra.WAVELENGTHS, one) for one in spectra.BASIS.T]
     for rgb, spectrum in zip(np.eye(3), reflected, strict=True):
         xyz = observer @ (light * spectrum) / (observer[1] @ light)
-        assert np.allclose(TO_REC709 @ xyz, rgb, atol=3e-3)  # the tables' rounding
+        assert np.allclose(TO_REC709 @ xyz, rgb, atol=3e-3)  # rounding of the tables
 
 
 # CIE 1931 2° observer and daylight D65, 380 to 770 nm in steps of 10 (CIE 015)

@@ -1,5 +1,5 @@
-"""Effects hidden in path-traced captures, and whether `diagnose` names them: a few of the table
-that `run.py hunt` makes."""
+"""`diagnose` finds effects simulated in path-traced captures: a few cases of the table that
+`run.py hunt` computes."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ CASES = {
     "cast_shadow": (0.03, 1, "cast_shadow"),
     "moire": (0.03, 1, "unknown"),
 }
-"""Strength, seed, and what has to be named; stripes have no name."""
+"""Strength, seed, and the expected cause; moiré is not among the known causes."""
 
 
 @pytest.mark.parametrize("cause", CASES)
-def test_what_is_hidden_is_named(cause, tmp_path):
-    strength, seed, name = CASES[cause]
+def test_simulated_cause_is_found(cause, tmp_path):
+    strength, seed, expected_cause = CASES[cause]
     truth = make(tmp_path, cause, strength, seed)
     assert truth.strength == pytest.approx(strength, rel=0.2)
     job = DiagnoseJob(FitJob(read_capture(tmp_path / CAPTURE), portable=False))
     job.drain()
     found = job.found
-    assert (found.causes or ("none",)) == (name,)
+    assert (found.causes or ("none",)) == (expected_cause,)
     if not found.accepted:
         return
     assert found.held_out_after.mean < found.held_out_before.mean
     trial = found.accepted[0]
     if cause == "cast_shadow":
-        off = trial.identified + truth.parameters["darkness"]
-        assert (np.abs(off) < np.maximum(3 * trial.standard_errors, 0.03)).all()
+        darkness_error = trial.identified + truth.parameters["darkness"]
+        assert (np.abs(darkness_error) < np.maximum(3 * trial.standard_errors, 0.03)).all()
     if cause == "vignetting":
         corner = trial.effect.gain(trial.x)[np.argmax(trial.effect.r2)]
         r2 = trial.effect.r2.max()
