@@ -115,8 +115,9 @@ def test_remaining_effects_are_refitted_without_contradicted_ones():
     assert [t.effect.cause for t in remaining.named] == ["light_intensity"]
     assert remaining.after.model.causes == ["light_intensity"]
     assert remaining.named[0].fitted is remaining.after
-    np.testing.assert_allclose(remaining.named[0].x - remaining.named[0].x.mean(), drift - drift.mean(),
-                               atol=0.04)  # fmt: skip
+    np.testing.assert_allclose(
+        remaining.named[0].x - remaining.named[0].x.mean(), drift - drift.mean(), atol=0.04
+    )  # fmt: skip
     both, one = found.held_out_after.mean, remaining.held_out_after.mean
     assert both < one < found.held_out_before.mean
     assert remaining.residual.gain > found.residual.gain
@@ -158,8 +159,8 @@ def test_vignetting_is_found_and_measured():
     gain = 1 - 0.6 * r2  # 10 % darker at the ball's outline
     found = diagnosis_of(changed(context, context.pixels.observed * gain[:, None]))
     assert found.causes == ("vignetting",)
-    ours = found.accepted[0].effect.gain(found.accepted[0].x)
-    np.testing.assert_allclose(ours / ours.max(), gain / gain.max(), atol=0.015)
+    fitted_gain = found.accepted[0].effect.gain(found.accepted[0].x)
+    np.testing.assert_allclose(fitted_gain / fitted_gain.max(), gain / gain.max(), atol=0.015)
 
 
 def test_near_light_is_found_with_its_distance():
@@ -235,11 +236,11 @@ def test_cast_shadow_may_touch_the_attached_shadow():
     that shadow belongs to it, since the mesh's shadow is slightly too small."""
     context = shadowed(lit_ball(8), 3, 0.12, 0.6)
     pixels, shown = context.pixels, lit_ball(8).pixels.observed
-    whole = unexplained_shadows(pixels, shown) >= 0
+    patch = unexplained_shadows(pixels, shown) >= 0
     for part, is_shadow in ((0.3, True), (0.7, False)):
-        in_part = whole & (pixels.x < np.quantile(pixels.x[whole], part))
+        in_part = patch & (pixels.x < np.quantile(pixels.x[patch], part))
         with_shadow_edge = replace(pixels, edge=np.where(in_part, np.float32(4), pixels.edge))
-        assert np.array_equal(unexplained_shadows(with_shadow_edge, shown) >= 0, whole & is_shadow)
+        assert np.array_equal(unexplained_shadows(with_shadow_edge, shown) >= 0, patch & is_shadow)
 
 
 def test_clipping_is_found_with_its_level():
@@ -302,7 +303,7 @@ def test_scattered_dark_pixels_are_no_shadow():
 
 
 def test_unexplained_residuals_are_no_evidence_for_an_effect():
-    """Residuals ten times the expected noise, without a cause: the scale grows, nothing is found."""
+    """Ten times the expected noise, without a cause: the residual scale grows, nothing is found."""
     context = lit_ball(4)
     rng = np.random.default_rng(5)
     noisy = context.pixels.observed * (1 + 0.15 * rng.standard_normal((len(context.pixels), 3)))
@@ -347,8 +348,8 @@ def test_eliminating_patch_parameters_gives_the_same_optimum():
             (predict_held_out_regions(fitted).cost, *fitted.model.x, *parameter_variances(fitted))
         )
     assert len(found[0][2]) > 100
-    for ours, dense in zip(*found, strict=True):
-        np.testing.assert_allclose(ours, dense, rtol=1e-3, atol=1e-5)
+    for eliminated, dense in zip(*found, strict=True):
+        np.testing.assert_allclose(eliminated, dense, rtol=1e-3, atol=1e-5)
 
 
 def test_zero_statistics_are_not_significant():

@@ -19,7 +19,7 @@ WINDOW_RADIUS = np.radians(20)
 def fitted_lobes(
     effect: EnvironmentReflection, radiance_shown: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """Nonnegative least-squares parameters for ``radiance_shown`` (n, 3) and the relative RMS residual."""
+    """Nonnegative parameters that fit ``radiance_shown`` (n, 3), and the relative RMS residual."""
     matrix = effect.reflected.reshape(len(effect.parameters), -1).T.astype(float)
     x, residual = nnls(matrix, radiance_shown.ravel().astype(float))
     return x, float(residual / np.linalg.norm(radiance_shown))

@@ -1,4 +1,4 @@
-"""MaterialX documents are well-formed, and valid according to the MaterialX library if installed."""
+"""MaterialX documents are well-formed, and valid for the MaterialX library if it is installed."""
 
 from __future__ import annotations
 

@@ -92,7 +92,7 @@ def test_only_effective_inputs_are_reported_as_dropped() -> None:
 
 
 def test_materialx_compensates_for_multiple_scattering() -> None:
-    """A rough white metal is dark with single scattering; MaterialX's compensation makes it white."""
+    """Single scattering darkens a rough white metal; MaterialX compensates for the loss."""
     white = LobeStack(np.zeros(3), 0.0, (Lobe(np.ones(3), np.ones(3), 0.9),))
     mu, phi = np.meshgrid((np.arange(150) + 0.5) / 150, (np.arange(150) + 0.5) / 150 * 2 * np.pi)
     sin = np.sqrt(1 - mu**2)

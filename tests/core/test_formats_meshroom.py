@@ -1,4 +1,4 @@
-"""Meshroom's scenes of every version and lens, read back."""
+"""Round trips of Meshroom scenes of every version and lens."""
 
 from __future__ import annotations
 
@@ -33,9 +33,14 @@ def scene() -> Scene:
 
 
 SENSOR = {"sensorWidth": 36.0, "sensorHeight": 27.0}
-OLD = {"pxFocalLength": FOCAL, "pxInitialFocalLength": -1.0, "principalPoint": [CX, CY]}
-MIDDLE = {"principalPoint": [CX - WIDTH / 2, CY - HEIGHT / 2]}
-NEW = {**SENSOR, **MIDDLE, "focalLength": FOCAL / WIDTH * 36, "initialFocalLength": -1.0}
+LENS_IN_PIXELS = {"pxFocalLength": FOCAL, "pxInitialFocalLength": -1.0, "principalPoint": [CX, CY]}
+OFFSET_FROM_CENTRE = {"principalPoint": [CX - WIDTH / 2, CY - HEIGHT / 2]}
+LENS_IN_MILLIMETRES = {
+    **SENSOR,
+    **OFFSET_FROM_CENTRE,
+    "focalLength": FOCAL / WIDTH * 36,
+    "initialFocalLength": -1.0,
+}
 
 
 @pytest.mark.parametrize(
@@ -55,19 +60,23 @@ NEW = {**SENSOR, **MIDDLE, "focalLength": FOCAL / WIDTH * 36, "initialFocalLengt
     ids=lambda value: value["type"] if isinstance(value, dict) else "",
 )
 @pytest.mark.parametrize("version", ["1.0.0", "1.2.0", "1.2.1", "1.2.4", "1.2.8"])
-def test_meshroom(
+def test_meshroom_round_trip(
     tmp_path: Path, scene: Scene, intrinsic: dict[str, object], distort: Distort, version: str
 ) -> None:
     path = tmp_path / "cameras.sfm"
     fy = FOCAL
-    if version >= "1.2.2":  # millimetres, and from the middle
-        written = {**NEW, "pixelRatio": 1.02 if version >= "1.2.5" else 1 / 1.02}
+    if version >= "1.2.2":  # millimetres, relative to the image centre
+        written = {**LENS_IN_MILLIMETRES, "pixelRatio": 1.02 if version >= "1.2.5" else 1 / 1.02}
         fy = FOCAL * 1.02
     elif version >= "1.2.0":
         fy = FOCAL * 1.03
-        written = {**OLD, "pxFocalLength": [FOCAL, fy], **(MIDDLE if version >= "1.2.1" else {})}
+        written = {
+            **LENS_IN_PIXELS,
+            "pxFocalLength": [FOCAL, fy],
+            **(OFFSET_FROM_CENTRE if version >= "1.2.1" else {}),
+        }
     else:
-        written = OLD
+        written = LENS_IN_PIXELS
     made.write_meshroom(path, scene, {**written, **intrinsic}, version)
     found = read_reconstruction(path)
     check(found, seen(scene, distort, fy=fy), scene)
@@ -84,11 +93,11 @@ def test_meshroom(
         ("1.2.14", {"focalLength": 17.595307917888562, "pixelRatio": 2}),
     ],
 )
-def test_meshrooms_versions_of_one_scene(
+def test_meshroom_versions_of_one_scene_agree(
     tmp_path: Path, scene: Scene, version: str, written: dict[str, object]
 ) -> None:
-    """Numbers of AliceVision's compatibilityData/scene_v*.json, which its own tests read as
-    fx 1000, fy 2000, offset (−26, 16), and a turn of √3 about (−1, −1, −1)."""
+    """Values of AliceVision's compatibilityData/scene_v*.json, which its own tests read as fx 1000,
+    fy 2000, offset (−26, 16) and a rotation by √3 rad about (−1, −1, −1)."""
     path = tmp_path / "scene.json"
     common = {"type": "pinhole", "width": 4092, "height": 2048, "sensorWidth": 36,
               "principalPoint": [-26, 16], "distortionParams": ""}  # fmt: skip
@@ -105,41 +114,50 @@ def test_meshrooms_versions_of_one_scene(
     lens = camera.lens
     assert np.isclose(lens.focal_length_x, 1000) and np.isclose(lens.focal_length_y, 2000)
     assert (lens.principal_point_x, lens.principal_point_y) == (2020, 1040)
-    turn = Rotation.from_rotvec([-1, -1, -1]).as_matrix()
-    assert np.allclose(camera.pose.rotation, turn)
+    rotation = Rotation.from_rotvec([-1, -1, -1]).as_matrix()
+    assert np.allclose(camera.pose.rotation, rotation)
 
 
-def test_meshroom_with_its_own_polynomials(tmp_path: Path, scene: Scene) -> None:
+def test_meshroom_specific_distortion_models(tmp_path: Path, scene: Scene) -> None:
     path = tmp_path / "cameras.json"
-    total = 1 + sum(K[:3])
-    lens = {**NEW, "type": "pinhole", "distortionType": "radialk3pt", "distortionParams": K[:3]}
+    scale = 1 + sum(K[:3])
+    lens = {
+        **LENS_IN_MILLIMETRES,
+        "type": "pinhole",
+        "distortionType": "radialk3pt",
+        "distortionParams": K[:3],
+    }
     made.write_meshroom(path, scene, lens)
     check(
         read_reconstruction(path),
-        seen(scene, brown(K[:3]), FOCAL / total, FOCAL / total),
+        seen(scene, brown(K[:3]), FOCAL / scale, FOCAL / scale),
         scene,
     )
     # equidistant: θ over half the view of the sensor's shorter side, times the circle's radius
     radius, half = 250.0, 0.5 * 27.0 / (FOCAL / WIDTH * 36)
     circle = {"fisheyeCircleCenterX": 0.0, "fisheyeCircleCenterY": 0.0}
-    lens = {**NEW, **circle, "type": "equidistant", "fisheyeCircleRadius": radius}
+    lens = {**LENS_IN_MILLIMETRES, **circle, "type": "equidistant", "fisheyeCircleRadius": radius}
     made.write_meshroom(path, scene, lens)
     check(read_reconstruction(path), seen(scene, fisheye(), radius / half, radius / half), scene)
     k = (-0.05, 0.02, 0.01)
 
-    def bent(x: float, y: float, z: float) -> Vector:
+    def equidistant_r3(x: float, y: float, z: float) -> Vector:
         u, v = fisheye()(x, y, z)
         return brown(k)(u / half, v / half, 1.0)
 
-    total = radius / (1 + sum(k))
+    scale = radius / (1 + sum(k))
     made.write_meshroom(path, scene, {**lens, "type": "equidistant_r3", "distortionParams": k})
-    check(read_reconstruction(path), seen(scene, bent, total, total), scene)
+    check(read_reconstruction(path), seen(scene, equidistant_r3, scale, scale), scene)
 
 
-def test_a_version_whose_pixel_ratio_is_not_known(tmp_path: Path, scene: Scene) -> None:
+def test_unknown_pixel_ratio_convention_is_rejected(tmp_path: Path, scene: Scene) -> None:
     path = tmp_path / "cameras.sfm"
-    made.write_meshroom(path, scene, {**NEW, "type": "pinhole", "pixelRatio": 1.0}, "1.2.10")
+    made.write_meshroom(
+        path, scene, {**LENS_IN_MILLIMETRES, "type": "pinhole", "pixelRatio": 1.0}, "1.2.10"
+    )
     check(read_reconstruction(path), seen(scene, brown()), scene)
-    made.write_meshroom(path, scene, {**NEW, "type": "pinhole", "pixelRatio": 2.0}, "1.2.10")
+    made.write_meshroom(
+        path, scene, {**LENS_IN_MILLIMETRES, "type": "pinhole", "pixelRatio": 2.0}, "1.2.10"
+    )
     with pytest.raises(InputError, match=r"pixelRatio.*1\.2\.10"):
         read_reconstruction(path)

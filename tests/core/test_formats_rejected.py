@@ -1,4 +1,4 @@
-"""What no camera is, what is not read, and what is left out: each said by name."""
+"""Invalid cameras, unsupported content and skipped entries: the message names each."""
 
 from __future__ import annotations
 
@@ -28,39 +28,47 @@ from tests.make_points_scene import WIDTH, make_scene
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder of good files, one of each format, with photos."""
+def valid_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with one valid file of each format, and the photos."""
     return write_all(tmp_path_factory.mktemp("whole"))
 
 
 @pytest.mark.parametrize("name", NAMES[:-1])
-def test_two_photos_of_one_name(whole: Path, tmp_path: Path, name: str) -> None:
+def test_two_photos_with_the_same_name_are_rejected(
+    valid_files: Path, tmp_path: Path, name: str
+) -> None:
     path = tmp_path / name
-    text = (whole / name).read_text()
+    text = (valid_files / name).read_text()
     if name == "bundle.out":
-        listed = (whole / "list.txt").read_text().replace("IMG_0003", "IMG_0004")
-        (tmp_path / "list.txt").write_text(listed)
-    if name == "reconstruction.json":  # JSON itself has one value for a name
+        list_text = (valid_files / "list.txt").read_text().replace("IMG_0003", "IMG_0004")
+        (tmp_path / "list.txt").write_text(list_text)
+    if name == "reconstruction.json":  # JSON keys are unique
         return
     path.write_text(text.replace("IMG_0003", "IMG_0004"))
-    refused(path, "two images are named 'IMG_0004.png'", images=whole / "photos")
+    refused(path, "two images are named 'IMG_0004.png'", images=valid_files / "photos")
 
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("focal", ["0", "-700"])
-def test_a_focal_length_that_is_none(whole: Path, tmp_path: Path, name: str, focal: str) -> None:
-    whole_text = (whole / name).read_text()
+def test_nonpositive_focal_length_is_rejected(
+    valid_files: Path, tmp_path: Path, name: str, focal: str
+) -> None:
+    valid_text = (valid_files / name).read_text()
     text = re.sub(
         r'(7\.0{10}e\+02(?= 1\.0)|\b700(?= 0\.)|(?<=focalLength": ")39\.4|(?<=fl_x": )700\.0|'
         r'(?<=focal_length": )700\.0|(?<=focal_x": )1\.1|39\.375)',
-        focal, whole_text, count=1,
+        focal, valid_text, count=1,
     )  # fmt: skip
-    assert text != whole_text
-    refused(damaged(whole, tmp_path, name, text.encode()), "focal length", images=whole / "photos")
+    assert text != valid_text
+    refused(
+        damaged(valid_files, tmp_path, name, text.encode()),
+        "focal length",
+        images=valid_files / "photos",
+    )
 
 
 def mirrored(content: object) -> object:
-    """The first row of what could be a rotation, negated (and the quaternion left alone)."""
+    """The content with the first row of every rotation matrix negated (quaternions unchanged)."""
     if isinstance(content, dict):
         return {key: mirrored(value) for key, value in content.items()}
     if isinstance(content, list):
@@ -73,15 +81,15 @@ def mirrored(content: object) -> object:
 
 
 @pytest.mark.parametrize("name", JSONS[:3])
-def test_a_pose_that_mirrors(whole: Path, tmp_path: Path, name: str) -> None:
-    content = mirrored(json.loads((whole / name).read_text()))
+def test_mirroring_pose_is_rejected(valid_files: Path, tmp_path: Path, name: str) -> None:
+    content = mirrored(json.loads((valid_files / name).read_text()))
     path = tmp_path / name
     path.write_text(json.dumps(content))
     message = refused(path)
     assert "mirrors" in message or "determinant" in message
 
 
-def test_lenses_that_no_model_is_exact_for(whole: Path, tmp_path: Path) -> None:
+def test_unsupported_lens_models_are_rejected(valid_files: Path, tmp_path: Path) -> None:
     scene = make_scene(3)
     for lens in ("3deanamorphic4", "3declassicld", "3deradial4", "something"):
         made.write_meshroom(tmp_path / "a.sfm", scene, {**MILLIMETRES, "type": lens})
@@ -99,12 +107,14 @@ def test_lenses_that_no_model_is_exact_for(whole: Path, tmp_path: Path) -> None:
         refused(tmp_path / "s.json", camera["projection_type"], "projection_type")
     for model in ("division", "rationalP2D1"):
         made.write_realityscan_xmp(tmp_path, scene, model, (0.1,) + (0.0,) * 5, (0.0, 0.0))
-        refused(tmp_path, model, "xcr:DistortionModel", images=whole / "photos")
+        refused(tmp_path, model, "xcr:DistortionModel", images=valid_files / "photos")
 
 
-def test_without_photos_realityscan_says_what_to_give(whole: Path, tmp_path: Path) -> None:
+def test_realityscan_without_photos_requests_the_images_folder(
+    valid_files: Path, tmp_path: Path
+) -> None:
     for name in ("cameras.csv", "IMG_0003.xmp"):
-        path = damaged(whole, tmp_path, name, (whole / name).read_bytes())
+        path = damaged(valid_files, tmp_path, name, (valid_files / name).read_bytes())
         refused(path, "set [scan] images to the folder of the photos")
     empty = tmp_path / "empty"
     empty.mkdir()
@@ -112,27 +122,27 @@ def test_without_photos_realityscan_says_what_to_give(whole: Path, tmp_path: Pat
     refused(tmp_path / "cameras.csv", "no such folder", images=tmp_path / "nowhere")
 
 
-def test_photos_are_not_looked_for_outside(whole: Path, tmp_path: Path) -> None:
-    """A path in the file that leaves its folder is only a name."""
-    inside = tmp_path / "inside"
-    inside.mkdir()
-    outside = made.write_photos(tmp_path / "outside", make_scene(1))
+def test_photos_are_not_searched_outside_the_folder(valid_files: Path, tmp_path: Path) -> None:
+    """Of a path that leaves the file's folder, only the file name is used."""
+    scan_folder = tmp_path / "inside"
+    scan_folder.mkdir()
+    outside_folder = made.write_photos(tmp_path / "outside", make_scene(1))
     row = "1,2,3,10,20,30,30"
-    (inside / "link").symlink_to(outside)
+    (scan_folder / "link").symlink_to(outside_folder)
     for name in (
-        outside / "IMG_0000.png", "../outside/IMG_0000.png", "link/IMG_0000.png",
+        outside_folder / "IMG_0000.png", "../outside/IMG_0000.png", "link/IMG_0000.png",
         "..\\outside\\IMG_0000.png", "a/../../outside/IMG_0000.png",
     ):  # fmt: skip
-        path = inside / "cameras.csv"
+        path = scan_folder / "cameras.csv"
         path.write_text(f"#name,x,y,alt,heading,pitch,roll,f\n{name},{row}\n")
         refused(path, "not found")
-        found = read(path, outside)  # the folder that the user names
+        found = read(path, outside_folder)  # the images folder given by the user
         assert isinstance(found, Reconstruction)
         assert found.cameras[0].label == "IMG_0000.png" and found.cameras[0].width == WIDTH
 
 
-def test_what_is_no_camera_is_left_out_and_said(whole: Path, tmp_path: Path) -> None:
-    content = json.loads((whole / "cameras.sfm").read_text())
+def test_entries_without_a_pose_are_skipped_and_reported(valid_files: Path, tmp_path: Path) -> None:
+    content = json.loads((valid_files / "cameras.sfm").read_text())
     content["poses"] = content["poses"][:5]
     content["structure"][0]["X"] = ["nan", "0", "0"]
     path = tmp_path / "cameras.sfm"
@@ -145,11 +155,11 @@ def test_what_is_no_camera_is_left_out_and_said(whole: Path, tmp_path: Path) -> 
     assert any(
         note.startswith("Sparse points without") and note.endswith(": 1.") for note in found.notes
     )
-    # Bundler writes zeros for a photo it could not place
-    lines = (whole / "bundle.out").read_text().splitlines()
+    # Bundler writes zeros for a photo without a pose
+    lines = (valid_files / "bundle.out").read_text().splitlines()
     lines[2:7] = ["0 0 0"] * 5
     data = "\n".join(lines).encode()
-    found = read_reconstruction(damaged(whole, tmp_path, "bundle.out", data))
+    found = read_reconstruction(damaged(valid_files, tmp_path, "bundle.out", data))
     assert len(found.cameras) == 7
     assert any(
         note.startswith("Photos without a pose") and note.endswith(": 1.") for note in found.notes
@@ -158,14 +168,14 @@ def test_what_is_no_camera_is_left_out_and_said(whole: Path, tmp_path: Path) -> 
     refused(tmp_path / "bundle.out", "list.txt", "lists 1 photos", "8 cameras")
 
 
-def test_the_cameras_of_a_rig(whole: Path, tmp_path: Path) -> None:
-    """The rig's pose, then the camera's place in it."""
-    content = json.loads((whole / "cameras.sfm").read_text())
-    turn = ["0", "1", "0", "-1", "0", "0", "0", "0", "1"]  # by columns: (x, y) → (−y, x)
-    place = {"rotation": turn, "center": ["0.5", "0", "0"]}
+def test_cameras_of_a_rig(valid_files: Path, tmp_path: Path) -> None:
+    """A rig camera's pose is the rig's pose combined with the camera's pose in the rig."""
+    content = json.loads((valid_files / "cameras.sfm").read_text())
+    rotation = ["0", "1", "0", "-1", "0", "0", "0", "0", "1"]  # column-major: (x, y) → (−y, x)
+    pose_in_rig = {"rotation": rotation, "center": ["0.5", "0", "0"]}
     content["rigs"] = [{"rigId": "77", "subPoses": [
         {"status": "constant", "pose": {"rotation": list("100010001"), "center": list("000")}},
-        {"status": "estimated", "pose": place}]}]  # fmt: skip
+        {"status": "estimated", "pose": pose_in_rig}]}]  # fmt: skip
     for view, index in zip(content["views"][:2], ("0", "1"), strict=True):
         view |= {"rigId": "77", "subPoseId": index, "isPoseIndependant": "false", "poseId": "1000"}
     path = tmp_path / "rig.sfm"
@@ -181,9 +191,9 @@ def test_the_cameras_of_a_rig(whole: Path, tmp_path: Path) -> None:
     refused(path, "subPoseId", "the rig has 2 cameras")
 
 
-def test_objects_of_openmvg_that_are_referred_to(whole: Path, tmp_path: Path) -> None:
-    """cereal writes a shared object once; a type's name too."""
-    content = json.loads((whole / "sfm_data.json").read_text())
+def test_openmvg_references_to_shared_objects(valid_files: Path, tmp_path: Path) -> None:
+    """cereal writes a shared object once and refers to it by id afterwards; type names too."""
+    content = json.loads((valid_files / "sfm_data.json").read_text())
     second = json.loads(json.dumps(content["intrinsics"][0]))
     second["key"] = 1
     second["value"] = {"polymorphic_id": 1, "ptr_wrapper": {"id": 9}}
@@ -198,8 +208,10 @@ def test_objects_of_openmvg_that_are_referred_to(whole: Path, tmp_path: Path) ->
     refused(path, "12345")
 
 
-def test_folders_tell_photos_of_one_name_apart(whole: Path, tmp_path: Path) -> None:
-    content = json.loads((whole / "transforms.json").read_text())
+def test_folder_names_distinguish_photos_with_the_same_name(
+    valid_files: Path, tmp_path: Path
+) -> None:
+    content = json.loads((valid_files / "transforms.json").read_text())
     for i, frame in enumerate(content["frames"]):
         frame["file_path"] = f"C:\\scan\\day{i % 2}\\IMG_{i // 2}.png"
     path = tmp_path / "transforms.json"
@@ -209,6 +221,6 @@ def test_folders_tell_photos_of_one_name_apart(whole: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_formats_without_chunks_say_so(whole: Path, name: str) -> None:
+def test_chunk_is_rejected_for_formats_without_chunks(valid_files: Path, name: str) -> None:
     with pytest.raises(InputError, match=r"scan\.chunk"):
-        read_reconstruction(whole / name, whole / "photos", "a chunk")
+        read_reconstruction(valid_files / name, valid_files / "photos", "a chunk")

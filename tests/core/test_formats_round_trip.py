@@ -1,4 +1,4 @@
-"""A scene written in each format, read back: its 1,000 points at the writer's own pixels."""
+"""A scene is written in each format and read back: its 1,000 points project to the same pixels."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def photos(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("k", [(0.0, 0.0), K[:2]])
-def test_bundler(tmp_path: Path, scene: Scene, photos: Path, k: Vector) -> None:
+def test_bundler_round_trip(tmp_path: Path, scene: Scene, photos: Path, k: Vector) -> None:
     path = tmp_path / "bundle" / "bundle.out"
     path.parent.mkdir()
     expected = made.write_bundler(path, scene, *k)
@@ -44,16 +44,16 @@ def test_bundler(tmp_path: Path, scene: Scene, photos: Path, k: Vector) -> None:
     check(found, expected, scene)
     check_points(found, scene)
     assert not found.notes
-    # without the photos: as large as the features need, and it says so
-    guessed = read_reconstruction(path)
-    assert any("estimated" in note and "images" in note for note in guessed.notes)
-    for camera in guessed.cameras:
+    # without photos, the image size is estimated from the features, and a note says so
+    without_photos = read_reconstruction(path)
+    assert any("estimated" in note and "images" in note for note in without_photos.notes)
+    for camera in without_photos.cameras:
         assert 0.5 * WIDTH < camera.width <= 1.1 * WIDTH
 
 
 @pytest.mark.parametrize("r", [0.0, 0.08, -0.08])
 @pytest.mark.parametrize("colmap", [False, True])
-def test_nvm(tmp_path: Path, scene: Scene, photos: Path, r: float, colmap: bool) -> None:
+def test_nvm_round_trip(tmp_path: Path, scene: Scene, photos: Path, r: float, colmap: bool) -> None:
     path = tmp_path / "model.nvm"
     expected = made.write_nvm(path, scene, r, colmap)
     found = read_reconstruction(path, photos)
@@ -63,7 +63,7 @@ def test_nvm(tmp_path: Path, scene: Scene, photos: Path, r: float, colmap: bool)
 
 
 def test_nvm_without_photos(tmp_path: Path, scene: Scene) -> None:
-    """COLMAP's pixels count from the corner: points and poses say where the middle is."""
+    """COLMAP counts pixels from the corner; the image centre is estimated from points and poses."""
     path = tmp_path / "model.nvm"
     made.write_nvm(path, scene, 0.08, colmap=True)
     found = read_reconstruction(path)
@@ -77,7 +77,7 @@ def test_nvm_with_a_fixed_calibration(tmp_path: Path, scene: Scene, photos: Path
     check(read_reconstruction(path, photos), expected, scene)
 
 
-def test_several_models_of_one_nvm(tmp_path: Path, scene: Scene, photos: Path) -> None:
+def test_nvm_with_several_models(tmp_path: Path, scene: Scene, photos: Path) -> None:
     path = tmp_path / "two.nvm"
     expected = made.write_nvm(path, scene, 0.08)
     first = path.read_text().partition("\n\n\n0")[0]
@@ -108,17 +108,27 @@ def test_several_models_of_one_nvm(tmp_path: Path, scene: Scene, photos: Path) -
         ({"is_fisheye": True, "k1": K[0]}, fisheye(K[:1])),
     ],
 )  # fmt: skip
-def test_transforms(
+def test_transforms_round_trip(
     tmp_path: Path, scene: Scene, lens: dict[str, object], distort: Distort, per_frame: bool,
     extension: bool,
 ) -> None:  # fmt: skip
     path = tmp_path / "transforms.json"
-    own = {"fl_x": FOCAL, "fl_y": FOCAL + 9, "cx": CX, "cy": CY, "w": WIDTH, "h": HEIGHT, **lens}
-    made.write_transforms(path, scene, own, extension, per_frame)
+    lens_fields = {
+        "fl_x": FOCAL,
+        "fl_y": FOCAL + 9,
+        "cx": CX,
+        "cy": CY,
+        "w": WIDTH,
+        "h": HEIGHT,
+        **lens,
+    }
+    made.write_transforms(path, scene, lens_fields, extension, per_frame)
     check(read_reconstruction(path), seen(scene, distort, fy=FOCAL + 9), scene)
 
 
-def test_transforms_by_angle_of_view_and_photo(tmp_path: Path, scene: Scene) -> None:
+def test_transforms_with_angle_of_view_and_image_size_from_photos(
+    tmp_path: Path, scene: Scene
+) -> None:
     made.write_photos(tmp_path / "photos", scene)
     path = tmp_path / "transforms.json"
     angle = 2 * math.atan(WIDTH / 2 / FOCAL)
@@ -127,23 +137,23 @@ def test_transforms_by_angle_of_view_and_photo(tmp_path: Path, scene: Scene) -> 
         check(read_reconstruction(path), seen(scene, brown(), cx=WIDTH / 2, cy=HEIGHT / 2), scene)
 
 
-def test_transforms_of_nerfstudio_know_the_frame_they_came_from(
+def test_nerfstudio_transforms_can_be_mapped_to_the_original_frame(
     tmp_path: Path, scene: Scene
 ) -> None:
-    """applied_transform and applied_scale brought the scene where the file has it."""
+    """applied_transform and applied_scale map the original frame to that of the file."""
     path = tmp_path / "transforms.json"
     applied, scale = [[0, 0, 1, 0.5], [1, 0, 0, -2.0], [0, 1, 0, 3.0]], 0.25
-    own = {"fl_x": FOCAL, "w": WIDTH, "h": HEIGHT, "applied_transform": applied,
+    lens_fields = {"fl_x": FOCAL, "w": WIDTH, "h": HEIGHT, "applied_transform": applied,
            "applied_scale": scale}  # fmt: skip
-    made.write_transforms(path, scene, own)
+    made.write_transforms(path, scene, lens_fields)
     found = read_reconstruction(path)
     original = found.moved("original")
-    here = np.array(scene.points)
+    points = np.array(scene.points)
     # p_json = scale · (A p_original)
     matrix = np.array(applied)
-    there = (here / scale - matrix[:, 3]) @ matrix[:, :3]
+    original_points = (points / scale - matrix[:, 3]) @ matrix[:, :3]
     for camera, moved in zip(found.cameras, original.cameras, strict=True):
-        assert np.abs(camera.project(here) - moved.project(there)).max() < 1e-6
+        assert np.abs(camera.project(points) - moved.project(original_points)).max() < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -156,70 +166,83 @@ def test_transforms_of_nerfstudio_know_the_frame_they_came_from(
         ("fisheye", {"fisheye": K}, fisheye(K)),
     ],
 )
-def test_openmvg(
+def test_openmvg_round_trip(
     tmp_path: Path, scene: Scene, kind: str, intrinsic: dict[str, object], distort: Distort
 ) -> None:
     path = tmp_path / "sfm_data.json"
-    own = {"focal_length": FOCAL, "principal_point": [CX, CY], **intrinsic}
-    made.write_openmvg(path, scene, kind, own)
+    lens_fields = {"focal_length": FOCAL, "principal_point": [CX, CY], **intrinsic}
+    made.write_openmvg(path, scene, kind, lens_fields)
     found = read_reconstruction(path)
     check(found, seen(scene, distort), scene)
     check_points(found, scene, colours=False)
 
 
-SIZE = max(WIDTH, HEIGHT)
-ONE = {"focal": FOCAL / SIZE}
-TWO = {"focal_x": FOCAL / SIZE, "focal_y": FOCAL / SIZE + 0.01,
-       "c_x": (CX - WIDTH / 2) / SIZE, "c_y": (CY - HEIGHT / 2) / SIZE}  # fmt: skip
-NAMED = dict(zip(("k1", "k2", "k3", "k4", "p1", "p2"), (*K, *P), strict=True))
+LONGER_SIDE = max(WIDTH, HEIGHT)
+ONE_FOCAL = {"focal": FOCAL / LONGER_SIDE}
+TWO_FOCALS = {
+    "focal_x": FOCAL / LONGER_SIDE, "focal_y": FOCAL / LONGER_SIDE + 0.01,
+    "c_x": (CX - WIDTH / 2) / LONGER_SIDE, "c_y": (CY - HEIGHT / 2) / LONGER_SIDE,
+}  # fmt: skip
+COEFFICIENTS = dict(zip(("k1", "k2", "k3", "k4", "p1", "p2"), (*K, *P), strict=True))
 
 
-def some(*names: str) -> dict[str, float]:
-    return {name: NAMED[name] for name in names}
+def values_of(*names: str) -> dict[str, float]:
+    return {name: COEFFICIENTS[name] for name in names}
 
 
 @pytest.mark.parametrize(
     ("kind", "camera", "distort"),
     [
-        ("perspective", {**ONE, **some("k1", "k2")}, brown(K[:2])),
-        ("fisheye", {**ONE, **some("k1", "k2")}, fisheye(K[:2])),
-        ("dual", {**ONE, **some("k1", "k2"), "transition": 1.0}, brown(K[:2])),
-        ("dual", {**ONE, **some("k1", "k2"), "transition": 0.0}, fisheye(K[:2])),
-        ("brown", {**TWO, **some("k1", "k2", "k3", "p1", "p2")}, brown(K[:3], P)),
-        ("radial", {**TWO, **some("k1", "k2")}, brown(K[:2])),
-        ("simple_radial", {**TWO, **some("k1")}, brown(K[:1])),
-        ("fisheye_opencv", {**TWO, **some("k1", "k2", "k3", "k4")}, fisheye(K)),
-        ("fisheye62", {**TWO, **NAMED}, fisheye(K, P)),
-        ("fisheye62", {**TWO, **some("k1", "k2", "k3", "k4"), "k5": 0.004, "k6": -0.002},
-         fisheye((*K, 0.004, -0.002))),
+        ("perspective", {**ONE_FOCAL, **values_of("k1", "k2")}, brown(K[:2])),
+        ("fisheye", {**ONE_FOCAL, **values_of("k1", "k2")}, fisheye(K[:2])),
+        ("dual", {**ONE_FOCAL, **values_of("k1", "k2"), "transition": 1.0}, brown(K[:2])),
+        ("dual", {**ONE_FOCAL, **values_of("k1", "k2"), "transition": 0.0}, fisheye(K[:2])),
+        ("brown", {**TWO_FOCALS, **values_of("k1", "k2", "k3", "p1", "p2")}, brown(K[:3], P)),
+        ("radial", {**TWO_FOCALS, **values_of("k1", "k2")}, brown(K[:2])),
+        ("simple_radial", {**TWO_FOCALS, **values_of("k1")}, brown(K[:1])),
+        ("fisheye_opencv", {**TWO_FOCALS, **values_of("k1", "k2", "k3", "k4")}, fisheye(K)),
+        ("fisheye62", {**TWO_FOCALS, **COEFFICIENTS}, fisheye(K, P)),
+        ("fisheye62", {**TWO_FOCALS, **values_of("k1", "k2", "k3", "k4"), "k5": 0.004,
+                       "k6": -0.002}, fisheye((*K, 0.004, -0.002))),
     ],
 )  # fmt: skip
-def test_opensfm(
+def test_opensfm_round_trip(
     tmp_path: Path, scene: Scene, kind: str, camera: dict[str, object], distort: Distort
 ) -> None:
     path = tmp_path / "reconstruction.json"
     made.write_opensfm(path, scene, {"projection_type": kind, **camera})
     found = read_reconstruction(path)
-    expected = seen(scene, distort, fy=FOCAL + 0.01 * SIZE)
+    expected = seen(scene, distort, fy=FOCAL + 0.01 * LONGER_SIDE)
     if "focal" in camera:
         expected = seen(scene, distort, cx=WIDTH / 2, cy=HEIGHT / 2)
     check(found, expected, scene)
     check_points(found, scene)
-    place = found.georeference
-    assert place is not None
-    assert (place.latitude, place.longitude, place.altitude) == (-33.5, 151.25, 12.0)
-    assert np.array_equal(np.stack([place.east, place.north, place.up]), np.eye(3))
+    georeference = found.georeference
+    assert georeference is not None
+    assert (georeference.latitude, georeference.longitude, georeference.altitude) == (
+        -33.5,
+        151.25,
+        12.0,
+    )
+    assert np.array_equal(
+        np.stack([georeference.east, georeference.north, georeference.up]), np.eye(3)
+    )
 
 
-def test_panoramas(tmp_path: Path, scene: Scene) -> None:
-    """A sphere's photo is twice as wide as high, in each format that has them."""
-    wide = {"width": WIDTH, "height": WIDTH // 2}
-    made.write_opensfm(tmp_path / "a.json", scene, {"projection_type": "spherical", **wide})
-    made.write_openmvg(tmp_path / "b.json", scene, "spherical", {"value0": wide})
+def test_panoramas_round_trip(tmp_path: Path, scene: Scene) -> None:
+    """Equirectangular images are twice as wide as high, in each format that supports them."""
+    image_size = {"width": WIDTH, "height": WIDTH // 2}
+    made.write_opensfm(tmp_path / "a.json", scene, {"projection_type": "spherical", **image_size})
+    made.write_openmvg(tmp_path / "b.json", scene, "spherical", {"value0": image_size})
     text = (tmp_path / "b.json").read_text().replace(f'"height": {HEIGHT}', '"height": 320')
     (tmp_path / "b.json").write_text(text)
-    own = {"camera_model": "EQUIRECTANGULAR", "w": WIDTH, "h": WIDTH // 2, "fl_x": WIDTH / 2}
-    made.write_transforms(tmp_path / "c.json", scene, own)
+    lens_fields = {
+        "camera_model": "EQUIRECTANGULAR",
+        "w": WIDTH,
+        "h": WIDTH // 2,
+        "fl_x": WIDTH / 2,
+    }
+    made.write_transforms(tmp_path / "c.json", scene, lens_fields)
     sphere = {"type": "equirectangular", "sensorWidth": 36.0, "focalLength": 36 / (2 * math.pi)}
     made.write_meshroom(tmp_path / "d.sfm", scene, {**sphere, "width": "640", "height": "320"})
     expected = seen(scene, panorama, WIDTH, WIDTH, WIDTH / 2, WIDTH / 4)
@@ -227,27 +250,27 @@ def test_panoramas(tmp_path: Path, scene: Scene) -> None:
         found = read_reconstruction(tmp_path / name)
         for camera in found.cameras:
             assert camera.panoramic
-            want = np.array(expected[camera.label])
-            assert np.abs(camera.project(np.array(scene.points)) - want).max() < CLOSE
+            expected_pixels = np.array(expected[camera.label])
+            assert np.abs(camera.project(np.array(scene.points)) - expected_pixels).max() < CLOSE
 
 
-REALITY = [
+REALITYSCAN_LENSES = [
     ((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), brown()),
     ((*K[:3], 0.0, 0.0, 0.0), brown(K[:3])),
     ((*K[:3], 0.0, P[1], P[0]), brown(K[:3], P)),
     ((*K, 0.0, 0.0), brown(K)),
     ((*K, P[1], P[0]), brown(K, P)),
 ]
-OFFSET = (CX - WIDTH / 2) / SIZE, (CY - HEIGHT / 2) / SIZE
+PRINCIPAL_POINT_OFFSET = (CX - WIDTH / 2) / LONGER_SIDE, (CY - HEIGHT / 2) / LONGER_SIDE
 
 
-@pytest.mark.parametrize(("distortion", "distort"), REALITY)
+@pytest.mark.parametrize(("distortion", "distort"), REALITYSCAN_LENSES)
 @pytest.mark.parametrize("newer", [False, True])
-def test_realityscan_csv(
+def test_realityscan_csv_round_trip(
     tmp_path: Path, scene: Scene, photos: Path, distortion: Vector, distort: Distort, newer: bool
 ) -> None:
     path = tmp_path / "cameras.csv"
-    made.write_realityscan_csv(path, scene, distortion, OFFSET, newer)
+    made.write_realityscan_csv(path, scene, distortion, PRINCIPAL_POINT_OFFSET, newer)
     check(read_reconstruction(path, photos), seen(scene, distort), scene)
 
 
@@ -257,19 +280,21 @@ def test_realityscan_csv(
      ("brown4t2", 4)],
 )  # fmt: skip
 @pytest.mark.parametrize("elements", [True, False])
-def test_realityscan_xmp(
+def test_realityscan_xmp_round_trip(
     tmp_path: Path, scene: Scene, photos: Path, model: str, which: int, elements: bool
 ) -> None:
-    distortion, distort = REALITY[which]
-    made.write_realityscan_xmp(tmp_path, scene, model, distortion, OFFSET, elements)
+    distortion, distort = REALITYSCAN_LENSES[which]
+    made.write_realityscan_xmp(tmp_path, scene, model, distortion, PRINCIPAL_POINT_OFFSET, elements)
     check(read_reconstruction(tmp_path, photos), seen(scene, distort), scene)
-    one = read_reconstruction(tmp_path / "IMG_0003.xmp", photos)
-    assert [c.label for c in one.cameras] == ["IMG_0003"] and one.cameras[0].photo == "IMG_0003.png"
+    xmp = read_reconstruction(tmp_path / "IMG_0003.xmp", photos)
+    assert [c.label for c in xmp.cameras] == ["IMG_0003"] and xmp.cameras[0].photo == "IMG_0003.png"
 
 
-def test_realityscans_two_exports_of_one_camera_agree(tmp_path: Path, scene: Scene) -> None:
-    """A camera that somebody exported both ways (forums.unrealengine.com, topic 710449; the last
-    number of the matrix is cut off there)."""
+def test_realityscan_csv_agrees_with_another_export_of_the_same_camera(
+    tmp_path: Path, scene: Scene
+) -> None:
+    """A camera that a forum post gives in both exports (forums.unrealengine.com, topic 710449; the
+    last matrix element is cut off there)."""
     photos = made.write_photos(tmp_path / "photos", scene)
     path = tmp_path / "cameras.csv"
     path.write_text(

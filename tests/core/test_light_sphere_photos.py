@@ -1,10 +1,10 @@
-"""The chrome spheres of PSBox: 12 lights, two spheres, against the directions published with them.
+"""Photos of the chrome spheres of PSBox: 12 lights and two spheres with published directions.
 
 Published values: Ying Xiong, PSBox 0.2.1 (MIT licence), github.com/yxiong/PSBox,
 data/LightProbe-1/light_directions.txt, data/LightProbe-2/…, data/light_directions.txt (merged).
-x right, y up, z towards the camera; he takes the camera for orthographic, the manually fitted
-circle, and the median of all pixels ≥ 250 of 255 for the highlight. His pixels are counted from 1,
-upwards from the bottom of the picture.
+x right, y up, z towards the camera. PSBox assumes an orthographic camera, uses the manually fitted
+circle, and takes the median of all pixels ≥ 250 of 255 as the highlight. Its pixels are counted
+from 1, upwards from the bottom of the image.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ PUBLISHED = {
 }
 
 
-def published(which) -> np.ndarray:
-    """(12, 3)"""
+def published_directions(which) -> np.ndarray:
+    """(12, 3) published unit light directions."""
     return np.array(PUBLISHED[which].split(), float).reshape(3, 12).T
 
 
-def read(path) -> np.ndarray:
+def read_srgb(path) -> np.ndarray:
     """Linear radiance of an sRGB JPEG (IEC 61966-2-1)."""
     import OpenImageIO as oiio
 
@@ -49,7 +49,7 @@ def circle_of(folder, height: int) -> Circle:
 
 
 def photo_camera(pixels: np.ndarray) -> Camera:
-    """Orthographic, a pixel a unit."""
+    """An orthographic camera with one pixel per unit."""
     height, width = pixels.shape[:2]
     pose = Pose(np.eye(3), np.array([0.0, 0.0, 10.0]))
     return Camera("photo", width, height, "ORTHOGRAPHIC", (1.0, 1.0, 0.0, 0.0), pose)
@@ -60,10 +60,10 @@ def angle(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def found_directions(folder) -> np.ndarray:
-    """(12, 3) in the published axes."""
+    """(12, 3) estimated directions in the published axes."""
     found = []
     for number in range(1, 13):
-        pixels = read(folder / f"Image_{number:02d}.JPG")
+        pixels = read_srgb(folder / f"Image_{number:02d}.JPG")
         light = light_from_sphere(
             pixels, photo_camera(pixels), circle_of(folder, len(pixels)), refine=False
         )
@@ -73,31 +73,33 @@ def found_directions(folder) -> np.ndarray:
 
 
 @pytest.mark.parametrize("probe", [1, 2])
-def test_the_twelve_published_directions(shared, probe):
+def test_light_directions_match_the_published_ones(shared, probe):
     folder = shared / f"data/real/psbox_spheres/LightProbe-{probe}"
     if not folder.is_dir():
-        pytest.skip("the photos of the chrome spheres are not here")
+        pytest.skip("the photos of the chrome spheres are not available")
     found = found_directions(folder)
-    own = [angle(a, b) for a, b in zip(found, published(probe), strict=True)]
-    merged = [angle(a, b) for a, b in zip(found, published("merged"), strict=True)]
-    assert np.median(own) < 0.5 and max(own) < 2.0
-    assert np.median(merged) < 2.0 and max(merged) < 2.0
+    errors = [angle(a, b) for a, b in zip(found, published_directions(probe), strict=True)]
+    merged_errors = [
+        angle(a, b) for a, b in zip(found, published_directions("merged"), strict=True)
+    ]
+    assert np.median(errors) < 0.5 and max(errors) < 2.0
+    assert np.median(merged_errors) < 2.0 and max(merged_errors) < 2.0
 
 
 @pytest.mark.parametrize("probe", [1, 2])
-def test_the_outline_is_the_one_drawn_by_hand(shared, probe):
-    """The photo in room light shows the outline, out of focus by some 8 pixels. The published
-    circle was clicked where that run of brightness is half way in a picture for the eye; the
-    outline fitted here is 1 % wider, where it reaches the background: 0.4° of light direction at
-    30° incidence, either way."""
+def test_refined_outline_matches_the_manual_circle(shared, probe):
+    """The photo in room light shows the outline with a defocus blur of about 8 pixels. The
+    published circle was clicked at the middle of that transition in a display image; the outline
+    fitted here is 1 % larger, at its outer end. At 30° incidence the difference changes the light
+    direction by 0.4°."""
     folder = shared / f"data/real/psbox_spheres/LightProbe-{probe}"
     if not folder.is_dir():
-        pytest.skip("the photos of the chrome spheres are not here")
-    pixels = read(folder / "ref.JPG")
+        pytest.skip("the photos of the chrome spheres are not available")
+    pixels = read_srgb(folder / "ref.JPG")
     camera, circle = photo_camera(pixels), circle_of(folder, len(pixels))
-    rough = Circle((circle.centre[0] + 12, circle.centre[1] - 9), circle.radius * 1.04)
-    light = light_from_sphere(pixels, camera, rough)
+    rough_circle = Circle((circle.centre[0] + 12, circle.centre[1] - 9), circle.radius * 1.04)
+    light = light_from_sphere(pixels, camera, rough_circle)
     assert light.refined
-    middle = camera.project(light.sphere.centre[None])[0]
-    assert np.abs(middle - circle.centre).max() < 2.0
+    fitted_centre = camera.project(light.sphere.centre[None])[0]
+    assert np.abs(fitted_centre - circle.centre).max() < 2.0
     assert light.sphere.radius == pytest.approx(circle.radius, rel=0.013)

@@ -1,6 +1,6 @@
-"""The sun against published almanac values, and times with and without a zone.
+"""Sun positions compared with published almanac values, and times with and without a time zone.
 
-Sources of the numbers:
+Sources of the reference values:
 H1  JPL Horizons (DE431), 29° N 81° W 10 m, "Azi_(r-appr)_Elev" with refraction, every 10 days from
     1900 to 2100, as kept in cosinekitty/astronomy, generate/horizons/Sun.txt
 H2  JPL Horizons (DE431), 0° N 0° E, airless, the same repository,
@@ -24,7 +24,7 @@ from patina.core.errors import InputError
 from patina.core.light.sun import delta_t, sun_direction, sun_in_scan
 from patina.core.light.sun_time import parse_time, photo_place, photo_time
 
-BAR = 0.05  # degrees
+MAX_ERROR = 0.05  # degrees
 SOLAR_PARALLAX = 8.794 / 3600  # degrees, IAU 1976, at one astronomical unit
 
 # latitude, longitude, altitude, UTC, azimuth and elevation as published, refraction, source
@@ -40,7 +40,7 @@ PUBLISHED = [
     (0.0, 0.0, 0, "2019-03-19 10:30", 91.4094, 65.5221, False, "H2"),
     (47.366694, 8.564389, 0, "2016-02-18 14:00", 217.7459, 23.1758, False, "H3"),
 ]
-# H1 at 00:00 UT: astrometric right ascension and declination (J2000), azimuth at its own place
+# H1 at 00:00 UT: astrometric right ascension and declination (J2000), azimuth at its observer
 HORIZONS = {
     "1900-01-01": (282.55694, -22.95057, 252.9431),
     "1900-09-18": (176.32046, 1.59130, 276.9750),
@@ -60,8 +60,8 @@ HORIZONS = {
     "2028-12-05": (251.53991, -22.35210, 254.8676),
     "2029-01-24": (306.19169, -19.28212, 255.6887),
 }
-# where the same sun is up at 00:00 UT
-ELSEWHERE = [
+# places where the sun is above the horizon at 00:00 UT on that date
+OTHER_PLACES = [
     ("Wellington", -41.2865, 174.7762, "1900-01-01"),
     ("Petropavlovsk-Kamchatsky", 53.0245, 158.6433, "1900-09-18"),
     ("McMurdo, polar day", -77.85, 166.67, "1950-12-25"),
@@ -87,23 +87,23 @@ def utc(text: str) -> datetime:
 
 
 def difference(found, azimuth: float, elevation: float) -> tuple[float, float]:
-    """(azimuth, elevation) differences in degrees."""
-    turn = (math.degrees(found.azimuth) - azimuth + 180) % 360 - 180
-    return abs(turn), abs(math.degrees(found.elevation) - elevation)
+    """Absolute (azimuth, elevation) differences in degrees."""
+    azimuth_error = (math.degrees(found.azimuth) - azimuth + 180) % 360 - 180
+    return abs(azimuth_error), abs(math.degrees(found.elevation) - elevation)
 
 
 @pytest.mark.parametrize(
     ("latitude", "longitude", "altitude", "time", "azimuth", "elevation", "refraction", "source"),
     PUBLISHED,
 )
-def test_the_sun_stands_where_the_almanac_says(
+def test_sun_position_matches_the_almanac(
     latitude, longitude, altitude, time, azimuth, elevation, refraction, source
 ):
     found = sun_direction(latitude, longitude, utc(time), altitude, refraction)
-    assert max(difference(found, azimuth, elevation)) < BAR
+    assert max(difference(found, azimuth, elevation)) < MAX_ERROR
 
 
-def test_the_worked_example_of_the_algorithm():
+def test_sun_position_matches_the_published_example():
     zone = timezone(timedelta(hours=-7))
     time = datetime(2003, 10, 17, 12, 30, 30, tzinfo=zone)
     found = sun_direction(39.742476, -105.1786, time, 1830.14, pressure=820.0, temperature=11.0)
@@ -111,7 +111,7 @@ def test_the_worked_example_of_the_algorithm():
 
 
 def horizontal(hour_angle: float, declination: float, latitude: float) -> tuple[float, float]:
-    """(azimuth from north, elevation), degrees in and out, by the spherical triangle's vectors."""
+    """(azimuth from north, elevation) by spherical trigonometry; all angles in degrees."""
     hour, delta, phi = (math.radians(a) for a in (hour_angle, declination, latitude))
     east = -math.cos(delta) * math.sin(hour)
     pole, equator = math.sin(delta), math.cos(delta) * math.cos(hour)
@@ -120,11 +120,11 @@ def horizontal(hour_angle: float, declination: float, latitude: float) -> tuple[
     return math.degrees(math.atan2(east, north)) % 360, math.degrees(math.asin(up))
 
 
-def of_date(date: str) -> tuple[float, float]:
+def apparent_position(date: str) -> tuple[float, float]:
     """(Greenwich hour angle, declination), degrees, of the apparent sun at 00:00 UT, from the
-    published J2000 position: general precession, aberration and the main term of nutation along
-    the ecliptic, where the sun stays (Meeus, Astronomical Algorithms, 2nd edition, chapters 12, 21,
-    22 and 25; 0.004° is left, most of it the parallax at H1's place)."""
+    published J2000 position, with general precession, aberration and the main term of nutation
+    (Meeus, Astronomical Algorithms, 2nd edition, chapters 12, 21, 22 and 25). The remaining error
+    is 0.004°, mostly the parallax at the observer of H1."""
     ra, dec, _ = HORIZONS[date]
     days = (utc(date) - utc("2000-01-01 12:00")) / timedelta(days=1)
     t = days / 36525
@@ -146,30 +146,30 @@ def of_date(date: str) -> tuple[float, float]:
     return sidereal + nutation * math.cos(tilt) - alpha, delta
 
 
-@pytest.mark.parametrize(("place", "latitude", "longitude", "date"), ELSEWHERE)
-def test_the_same_sun_elsewhere(place, latitude, longitude, date):
-    """Published right ascension and declination, sidereal time, spherical trigonometry and the
-    sun's parallax: no other ephemeris."""
-    hour_angle, declination = of_date(date)
-    azimuth_there, _ = horizontal(hour_angle - 81.0, declination, 29.0)
-    assert abs(azimuth_there - HORIZONS[date][2]) < 0.01  # as published with it
+@pytest.mark.parametrize(("place", "latitude", "longitude", "date"), OTHER_PLACES)
+def test_sun_position_at_other_places(place, latitude, longitude, date):
+    """The same published sun position seen from other places, by sidereal time, spherical
+    trigonometry and the sun's parallax, without another ephemeris."""
+    hour_angle, declination = apparent_position(date)
+    azimuth_at_h1, _ = horizontal(hour_angle - 81.0, declination, 29.0)
+    assert abs(azimuth_at_h1 - HORIZONS[date][2]) < 0.01  # the published azimuth
 
     azimuth, elevation = horizontal(hour_angle + longitude, declination, latitude)
     elevation -= SOLAR_PARALLAX * math.cos(math.radians(elevation))
     found = sun_direction(latitude, longitude, utc(date), refraction=False)
     errors = difference(found, azimuth, elevation)
-    assert max(errors) < BAR, (place, errors)
+    assert max(errors) < MAX_ERROR, (place, errors)
 
 
-def test_the_published_table_covers_what_it_should():
-    rows = [(row[0], row[1], row[3]) for row in PUBLISHED] + [row[1:] for row in ELSEWHERE]
+def test_reference_values_cover_both_hemispheres_and_early_years():
+    rows = [(row[0], row[1], row[3]) for row in PUBLISHED] + [row[1:] for row in OTHER_PLACES]
     assert len(rows) >= 20
     assert any(row[0] < 0 for row in rows) and any(row[0] > 0 for row in rows)
     assert sum(str(row[2]) < "1970" for row in rows) >= 5
 
 
-def test_the_drone_photo_of_brighton(shared):
-    """2016-06-23 16:33 at UTC−5: azimuth 257.9°, elevation 43.5°, as the shadows on the ground."""
+def test_sun_position_of_the_brighton_drone_photo(shared):
+    """2016-06-23 16:33 UTC−5: azimuth 257.9° and elevation 43.5°, consistent with the shadows."""
     import OpenImageIO as oiio
 
     spec = oiio.ImageInput.open(str(shared / "data/real/brighton_sun.jpg")).spec()
@@ -182,18 +182,18 @@ def test_the_drone_photo_of_brighton(shared):
     assert max(difference(found, 257.9, 43.5)) < 0.1
 
 
-def test_refraction_lifts_the_sun_by_half_a_degree_at_the_horizon():
-    """About 34' at the horizon and 1' at 45° (any almanac's table of refraction)."""
+def test_refraction_at_the_horizon_and_at_45_degrees():
+    """Refraction is about 34' at the horizon and 1' at 45° (standard refraction tables)."""
     for time, lift, tolerance in (
         ("2019-03-19 06:11", 0.5, 0.12),
         ("2019-03-19 09:08", 1 / 60, 0.001),
     ):
-        bent = sun_direction(0.0, 0.0, utc(time))
-        straight = sun_direction(0.0, 0.0, utc(time), refraction=False)
-        assert math.degrees(bent.elevation - straight.elevation) == pytest.approx(
+        refracted = sun_direction(0.0, 0.0, utc(time))
+        geometric = sun_direction(0.0, 0.0, utc(time), refraction=False)
+        assert math.degrees(refracted.elevation - geometric.elevation) == pytest.approx(
             lift, abs=tolerance
         )
-        assert bent.azimuth == straight.azimuth
+        assert refracted.azimuth == geometric.azimuth
 
 
 @pytest.mark.parametrize(
@@ -202,26 +202,26 @@ def test_refraction_lifts_the_sun_by_half_a_degree_at_the_horizon():
     [(1900, -2.72, 1.0), (1920, 21.16, 1.0), (1940, 24.33, 1.0), (1950, 29.15, 0.5),
      (1970, 40.18, 0.5), (1990, 56.86, 0.5), (2000, 63.83, 0.2), (2020, 69.36, 4.0)],
 )  # fmt: skip
-def test_delta_t_is_the_measured_one(year, seconds, tolerance):
+def test_delta_t_matches_measured_values(year, seconds, tolerance):
     assert delta_t(year) == pytest.approx(seconds, abs=tolerance)
 
 
-def test_delta_t_has_no_jumps():
+def test_delta_t_is_continuous():
     years = np.arange(1800.0, 2149.9, 0.05)
     values = np.array([delta_t(y) for y in years])
     assert np.abs(np.diff(values)).max() < 1.0
 
 
-def test_the_vector_is_azimuth_and_elevation():
+def test_sun_vector_matches_azimuth_and_elevation():
     found = sun_direction(47.4, 8.5, utc("2016-06-18 15:00"))
     east, north, up = found.enu
     assert math.atan2(east, north) % (2 * math.pi) == pytest.approx(found.azimuth)
     assert math.asin(up) == pytest.approx(found.elevation)
     assert np.linalg.norm(found.enu) == pytest.approx(1.0)
-    assert east < 0 < up  # an afternoon
+    assert east < 0 < up  # the sun is in the west in the afternoon
 
 
-def test_below_the_horizon_is_an_error():
+def test_sun_below_the_horizon_is_rejected():
     with pytest.raises(InputError, match="below the horizon"):
         sun_direction(47.4, 8.5, utc("2016-06-18 01:00"))
 
@@ -238,17 +238,17 @@ def test_below_the_horizon_is_an_error():
         ({"time": utc("2300-06-18")}, "2300"),
     ],
 )
-def test_a_place_or_time_that_is_none(change, word):
-    told = {"latitude": 47.4, "longitude": 8.5, "time": utc("2016-06-18 12:00"), **change}
+def test_invalid_place_or_time_is_rejected(change, word):
+    arguments = {"latitude": 47.4, "longitude": 8.5, "time": utc("2016-06-18 12:00"), **change}
     with pytest.raises(InputError, match=word):
-        sun_direction(**told)
+        sun_direction(**arguments)
 
 
-# ---- the scan's frame
+# ---- the coordinate frame of the scan
 
 
 def test_north_and_up_of_a_scan_with_y_up():
-    """Scan: x = west, y = up, z = north."""
+    """In this scan x = west, y = up and z = north."""
     north, up = np.array([0.0, 0.0, 2.0]), np.array([0.0, 0.1, 0.0])
     assert sun_in_scan(np.array([1.0, 0, 0]), north, up) == pytest.approx([-1, 0, 0])
     assert sun_in_scan(np.array([0, 1.0, 0]), north, up) == pytest.approx([0, 0, 1])
@@ -261,7 +261,7 @@ vectors = st.tuples(unit_floats, unit_floats, unit_floats).map(np.array)
 
 @given(vectors, vectors, st.floats(0.01, 100.0), unit_floats)
 @settings(max_examples=200, deadline=None)
-def test_the_frame_is_right_handed_and_keeps_angles(north, up, length, tilt):
+def test_scan_frame_is_right_handed_and_orthonormal(north, up, length, tilt):
     if np.linalg.norm(np.cross(north, up)) < 0.05:
         return
     axes = np.stack([sun_in_scan(e, length * (north + tilt * up), up) for e in np.eye(3)])
@@ -278,7 +278,7 @@ def test_the_frame_is_right_handed_and_keeps_angles(north, up, length, tilt):
      ([1, 0, float("nan")], [0, 0, 1]), ([1, 0], [0, 0, 1]), ([1, 0, 0], [0, float("inf"), 1]),
      ([0, 0.01, 1], [0, 0, 1]), ([1e308, 1e308, 1e308], [0, 0, 1])],
 )  # fmt: skip
-def test_north_and_up_that_are_no_frame(north, up):
+def test_invalid_north_and_up_are_rejected(north, up):
     with pytest.raises(InputError, match=r"\[(north|up)\]"):
         sun_in_scan(np.array([0, 0, 1.0]), np.array(north, float), np.array(up, float))
 
@@ -286,7 +286,7 @@ def test_north_and_up_that_are_no_frame(north, up):
 # ---- times
 
 
-def test_times_as_they_are_written():
+def test_time_formats_are_parsed():
     expected = datetime(2018, 6, 1, 3, 0, tzinfo=UTC)
     assert parse_time("2018-06-01T12:00:00+09:00") == expected
     assert parse_time("2018-06-01 03:00:00Z") == expected
@@ -294,7 +294,7 @@ def test_times_as_they_are_written():
 
 
 @pytest.mark.parametrize("value", ["2018-06-01T12:00:00", datetime(2018, 6, 1, 12), "2018-06-01"])
-def test_a_time_without_a_zone_is_refused(value):
+def test_time_without_a_time_zone_is_rejected(value):
     with pytest.raises(InputError, match="zone"):
         parse_time(value)
 
@@ -316,13 +316,13 @@ def test_any_text_is_a_time_or_an_input_error(value):
         return
 
 
-def test_exif_with_its_offset():
+def test_exif_time_with_offset():
     exif = {"Exif:DateTimeOriginal": "2016:06:23 16:33:18", "Exif:OffsetTimeOriginal": "-05:00"}
     assert photo_time(exif).time == utc("2016-06-23 21:33:18")
     assert photo_time(exif).notes == ()
 
 
-def test_exif_with_gps_time():
+def test_exif_time_with_gps_time():
     exif = {
         "DateTimeOriginal": "2016:06:23 16:33:18",
         "GPS:DateStamp": "2016:06:23",
@@ -331,19 +331,19 @@ def test_exif_with_gps_time():
     found = photo_time(exif)
     assert found.time == utc("2016-06-23 21:33:17")
     assert found.notes == ()
-    stale = photo_time({**exif, "GPS:TimeStamp": (21.0, 26.0, 0.0)})
-    assert "one of them is wrong" in stale.notes[0]
+    inconsistent = photo_time({**exif, "GPS:TimeStamp": (21.0, 26.0, 0.0)})
+    assert "one of them is wrong" in inconsistent.notes[0]
     both = photo_time({**exif, "OffsetTimeOriginal": "-04:00"})
     assert both.time == utc("2016-06-23 20:33:18")
     assert "GPS" in both.notes[0]
 
 
-def test_the_date_an_editor_wrote_is_not_the_photo_s():
+def test_file_modification_date_is_not_used():
     with pytest.raises(InputError, match="the photo has no time"):
         photo_time({"DateTime": "2016:06:23 16:33:18", "OffsetTime": "-05:00"})
 
 
-def test_gps_position():
+def test_exif_gps_position():
     exif = {"GPS:Latitude": (46.0, 50.0, 32.76), "GPS:LatitudeRef": "S",
             "GPS:Longitude": (91.0, 59.0, 39.6), "GPS:LongitudeRef": "W",
             "GPS:Altitude": 198.6, "GPS:AltitudeRef": 1}  # fmt: skip
@@ -357,16 +357,17 @@ def test_gps_position():
         photo_place({**exif, "GPS:LongitudeRef": ""})
 
 
-anything = st.one_of(
+tag_values = st.one_of(
     st.none(), st.text(max_size=25), st.floats(), st.integers(), st.binary(max_size=8),
     st.tuples(st.floats(), st.floats(), st.floats()), st.lists(st.text(max_size=4), max_size=4),
 )  # fmt: skip
-TAGS = ["DateTimeOriginal", "OffsetTimeOriginal", "GPS:DateStamp", "GPS:TimeStamp", "GPS:Latitude",
-        "GPS:LatitudeRef", "GPS:Longitude", "GPS:LongitudeRef", "GPS:Altitude",
-        "GPS:AltitudeRef"]  # fmt: skip
+EXIF_TAGS = [
+    "DateTimeOriginal", "OffsetTimeOriginal", "GPS:DateStamp", "GPS:TimeStamp", "GPS:Latitude",
+    "GPS:LatitudeRef", "GPS:Longitude", "GPS:LongitudeRef", "GPS:Altitude", "GPS:AltitudeRef",
+]  # fmt: skip
 
 
-@given(st.dictionaries(st.sampled_from(TAGS), anything))
+@given(st.dictionaries(st.sampled_from(EXIF_TAGS), tag_values))
 @settings(max_examples=300, deadline=None)
 @example({"DateTimeOriginal": "0000:00:00 00:00:00", "OffsetTimeOriginal": "+00:00"})
 @example({"DateTimeOriginal": "9998:12:31 23:59:59", "OffsetTimeOriginal": "-14:00"})

@@ -1,4 +1,4 @@
-"""Irradiance from a white target: E = π L / (ρ n·l) of a Lambertian plane, with noise and dirt."""
+"""Irradiance from a white target: E = π L / (R n·l) for a Lambertian plane of reflectance R."""
 
 from __future__ import annotations
 
@@ -18,72 +18,76 @@ CAMERA = Camera(
 NORMAL = np.array([0.2, -0.1, -1.0])  # faces the camera, which looks along +z
 LIGHT = np.array([0.5, -0.6, -0.8])
 CORNERS = np.array([[20.0, 12], [60, 12], [60, 48], [20, 48]])
-TRUE = np.array([3.0, 2.0, 1.0])
+TRUE_IRRADIANCE = np.array([3.0, 2.0, 1.0])
 
 
-def target(rho=0.9, noise=0.0, gradient=0.0, seed=0) -> np.ndarray:
-    """A Lambertian plane of reflectance rho on black, under TRUE."""
+def target_photo(rho=0.9, noise=0.0, gradient=0.0, seed=0) -> np.ndarray:
+    """A photo of a Lambertian plane of reflectance ``rho`` on black, under TRUE_IRRADIANCE."""
     cosine = NORMAL @ LIGHT / np.linalg.norm(NORMAL) / np.linalg.norm(LIGHT)
     pixels = np.zeros((HEIGHT, WIDTH, 3))
     x = np.linspace(-0.5, 0.5, 40)
-    pixels[12:48, 20:60] = TRUE * rho * cosine / np.pi * (1 + gradient * x[None, :, None])
+    pixels[12:48, 20:60] = (
+        TRUE_IRRADIANCE * rho * cosine / np.pi * (1 + gradient * x[None, :, None])
+    )
     pixels *= 1 + noise * np.random.default_rng(seed).standard_normal(pixels.shape)
     return pixels
 
 
-def test_a_lambertian_target_gives_its_irradiance_back():
-    found = irradiance_from_white(target(), CAMERA, CORNERS, 0.9, NORMAL, LIGHT)
-    assert found.irradiance == pytest.approx(TRUE, rel=1e-9)
+def test_irradiance_of_a_lambertian_target_is_recovered():
+    found = irradiance_from_white(target_photo(), CAMERA, CORNERS, 0.9, NORMAL, LIGHT)
+    assert found.irradiance == pytest.approx(TRUE_IRRADIANCE, rel=1e-9)
     assert found.notes == ()
     mask = np.zeros((HEIGHT, WIDTH), bool)
     mask[15:45, 25:55] = True
-    tinted = target(np.array([0.9, 0.8, 0.7]))
+    tinted = target_photo(np.array([0.9, 0.8, 0.7]))
     found = irradiance_from_white(tinted, CAMERA, mask, [0.9, 0.8, 0.7], NORMAL, LIGHT)
-    assert found.irradiance == pytest.approx(TRUE, rel=1e-9)
+    assert found.irradiance == pytest.approx(TRUE_IRRADIANCE, rel=1e-9)
 
 
-def test_the_standard_error_is_the_scatter_of_repeated_photos():
+def test_standard_error_matches_the_spread_of_repeated_photos():
     found = [
-        irradiance_from_white(target(noise=0.1, seed=s), CAMERA, CORNERS, 0.9, NORMAL, LIGHT)
+        irradiance_from_white(target_photo(noise=0.1, seed=s), CAMERA, CORNERS, 0.9, NORMAL, LIGHT)
         for s in range(60)
     ]
     values = np.array([f.irradiance for f in found])
     errors = np.array([f.standard_error for f in found])
-    assert values.mean(axis=0) == pytest.approx(TRUE, rel=0.002)
+    assert values.mean(axis=0) == pytest.approx(TRUE_IRRADIANCE, rel=0.002)
     assert np.median(errors, axis=0) == pytest.approx(values.std(axis=0, ddof=1), rel=0.35)
 
 
-def test_dust_does_not_count():
-    dirty = target(noise=0.02)
-    dirty[20:24, 30:36] = 0.01
-    dirty[40, 50] = 50.0
-    found = irradiance_from_white(dirty, CAMERA, CORNERS, 0.9, NORMAL, LIGHT)
-    assert found.irradiance == pytest.approx(TRUE, rel=0.01)
+def test_dust_does_not_bias_the_irradiance():
+    dusty = target_photo(noise=0.02)
+    dusty[20:24, 30:36] = 0.01
+    dusty[40, 50] = 50.0
+    found = irradiance_from_white(dusty, CAMERA, CORNERS, 0.9, NORMAL, LIGHT)
+    assert found.irradiance == pytest.approx(TRUE_IRRADIANCE, rel=0.01)
 
 
-def test_an_uneven_target_is_reported_and_measured_at_its_middle():
-    found = irradiance_from_white(target(gradient=0.2), CAMERA, CORNERS, 0.9, NORMAL, LIGHT)
+def test_uneven_light_is_reported_and_measured_at_the_centre():
+    found = irradiance_from_white(target_photo(gradient=0.2), CAMERA, CORNERS, 0.9, NORMAL, LIGHT)
     assert found.unevenness == pytest.approx(0.2, rel=0.05)
     assert "near" in found.notes[0]
-    assert found.irradiance == pytest.approx(TRUE, rel=0.005)
-    even = irradiance_from_white(target(gradient=0.01), CAMERA, CORNERS, 0.9, NORMAL, LIGHT)
-    assert even.notes == ()
+    assert found.irradiance == pytest.approx(TRUE_IRRADIANCE, rel=0.005)
+    nearly_even = irradiance_from_white(
+        target_photo(gradient=0.01), CAMERA, CORNERS, 0.9, NORMAL, LIGHT
+    )
+    assert nearly_even.notes == ()
 
 
-def test_without_a_normal_or_direction_it_faces_the_light():
+def test_target_without_normal_or_direction_is_assumed_to_face_the_light():
     cosine = NORMAL @ LIGHT / np.linalg.norm(NORMAL) / np.linalg.norm(LIGHT)
     for normal, light, word in ((None, LIGHT, "normal"), (NORMAL, None, "direction")):
-        found = irradiance_from_white(target(), CAMERA, CORNERS, 0.9, normal, light)
-        assert found.irradiance == pytest.approx(TRUE * cosine)
+        found = irradiance_from_white(target_photo(), CAMERA, CORNERS, 0.9, normal, light)
+        assert found.irradiance == pytest.approx(TRUE_IRRADIANCE * cosine)
         assert word in found.notes[0]
 
 
-def test_a_clipped_target_is_refused():
-    clipped = np.minimum(target(noise=0.05), target().max() * 0.98)
+def test_clipped_target_is_rejected():
+    clipped = np.minimum(target_photo(noise=0.05), target_photo().max() * 0.98)
     with pytest.raises(InputError, match="clipped"):
         irradiance_from_white(clipped, CAMERA, CORNERS, 0.9, NORMAL, LIGHT)
     with pytest.raises(InputError, match="clipped"):
-        irradiance_from_white(target(), CAMERA, CORNERS, 0.9, NORMAL, LIGHT, saturation=0.5)
+        irradiance_from_white(target_photo(), CAMERA, CORNERS, 0.9, NORMAL, LIGHT, saturation=0.5)
 
 
 @pytest.mark.parametrize(
@@ -103,14 +107,16 @@ def test_a_clipped_target_is_refused():
         ({"region": CORNERS + 1000.0}, "0 pixels"),
         ({"pixels": np.zeros((4, 4, 3))}, "4 × 4"),
         ({"pixels": np.full((HEIGHT, WIDTH, 3), np.inf)}, "NaN"),
-        ({"pixels": -target(noise=0.1)}, "black"),
+        ({"pixels": -target_photo(noise=0.1)}, "black"),
     ],
 )
-def test_a_target_that_is_none(change, word):
-    told = {"pixels": target(noise=0.1), "camera": CAMERA, "region": CORNERS, "reflectance": 0.9,
-            "normal": NORMAL, "direction": LIGHT, **change}  # fmt: skip
+def test_invalid_targets_are_rejected(change, word):
+    arguments = {
+        "pixels": target_photo(noise=0.1), "camera": CAMERA, "region": CORNERS, "reflectance": 0.9,
+        "normal": NORMAL, "direction": LIGHT, **change,
+    }  # fmt: skip
     with pytest.raises(InputError, match=word):
-        irradiance_from_white(**told)
+        irradiance_from_white(**arguments)
 
 
 corners = st.lists(st.tuples(st.floats(-20, 100), st.floats(-20, 100)), min_size=1, max_size=6)
@@ -122,7 +128,7 @@ corners = st.lists(st.tuples(st.floats(-20, 100), st.floats(-20, 100)), min_size
 def test_any_polygon_gives_an_irradiance_or_an_input_error(polygon, reflectance, normal):
     try:
         found = irradiance_from_white(
-            target(noise=0.1), CAMERA, np.array(polygon), reflectance, normal, LIGHT
+            target_photo(noise=0.1), CAMERA, np.array(polygon), reflectance, normal, LIGHT
         )
     except InputError:
         return
@@ -131,7 +137,7 @@ def test_any_polygon_gives_an_irradiance_or_an_input_error(polygon, reflectance,
 
 @given(st.floats(5, 30), st.floats(5, 20))
 @settings(max_examples=60, deadline=None)
-def test_a_polygon_holds_as_many_pixels_as_its_area(half_width, half_height):
+def test_polygon_mask_has_the_area_of_the_polygon(half_width, half_height):
     from patina.core.light.white import _polygon
 
     rhombus = np.array(

@@ -83,9 +83,9 @@ def test_radiosity_scales_with_the_photos_for_unknown_irradiance():
     pixels = context.pixels
     dimmed = replace(pixels, irradiance=pixels.irradiance / 2)
     half = replace(context, pixels=dimmed, scale=np.full(1, 2, np.float32)).face_radiosity(0)
-    whole = context.face_radiosity(0)
-    assert whole.max() > 0
-    np.testing.assert_allclose(half, whole / 2, rtol=1e-5)
+    radiosity = context.face_radiosity(0)
+    assert radiosity.max() > 0
+    np.testing.assert_allclose(half, radiosity / 2, rtol=1e-5)
 
 
 def test_convex_body_has_no_interreflection():

@@ -190,8 +190,8 @@ def test_imputed_samples_are_corrected_for_anisotropy():
     """Imputed samples are corrected for anisotropy, as the other samples are."""
     context = lit_ball(5, GLOSSY)
     parameters = np.array([0.5, -0.2, -0.3])
-    whole = Model(context.pixels, context.brdfs).with_effect(Anisotropy.of(context), parameters)
-    simulated = whole.predicted()
+    brushed = Model(context.pixels, context.brdfs).with_effect(Anisotropy.of(context), parameters)
+    simulated = brushed.predicted()
     top = np.percentile(simulated[:, 0], 94)
     seen = simulated.copy()
     seen[:, 0] = np.minimum(seen[:, 0], top)
@@ -226,7 +226,7 @@ def test_unclipped_samples_keep_the_photo_value_below_the_plateau():
 
 
 def test_fitted_parameters_apply_to_other_pixels():
-    """An effect fitted on half of the pixels predicts the others as an effect of all pixels does."""
+    """An effect fitted on half of the pixels predicts the rest as an effect of all pixels does."""
     context = lit_ball(5)
     rng = np.random.default_rng(0)
     order = rng.permutation(len(context.pixels))
@@ -234,13 +234,13 @@ def test_fitted_parameters_apply_to_other_pixels():
     nearest_pixels = nearest(context.pixels, half_context.pixels, context.size)
     assert (half_context.pixels.photo[nearest_pixels.photo] == context.pixels.photo).all()
     for kind, parameters in EXAMPLE_PARAMETERS.items():
-        whole, half_effect = kind.of(context), kind.of(half_context)
+        full_effect, half_effect = kind.of(context), kind.of(half_context)
         fitted = Model(half_context.pixels, half_context.brdfs).with_effect(half_effect, parameters)
         transferred = model_at_pixels(fitted, context, nearest_pixels).predicted()
         if kind is CameraResponse:  # the reference grey level is that of the fitted pixels
-            whole = half_effect
-        x = whole.identified(parameters)
-        expected = Model(context.pixels, context.brdfs).with_effect(whole, x).predicted()
+            full_effect = half_effect
+        x = full_effect.identified(parameters)
+        expected = Model(context.pixels, context.brdfs).with_effect(full_effect, x).predicted()
         np.testing.assert_allclose(transferred, expected, rtol=1e-5, atol=1e-7)
 
 
