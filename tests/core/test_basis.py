@@ -90,9 +90,8 @@ def test_nearest_measured_material_is_a_red_paint(basis: Basis, shared: Path) ->
     ]
     nearest = [names[i] for i in np.argsort(distances)[:3]]
     assert nearest[0] == "dark-red-paint", nearest
-    red_coefficients = ridge.solve(q, basis.mapped(PUBLISHED_RHO, PUBLISHED_ANGLES))[
-        0
-    ]  # reference values computed once with η = 40
+    # reference values computed once with η = 40
+    red_coefficients = ridge.solve(q, basis.mapped(PUBLISHED_RHO, PUBLISHED_ANGLES))[0]
     assert np.allclose(red_coefficients, (-0.0566, -0.0479, -0.0033, 0.0056, -0.0225), atol=5e-4)
 
 
@@ -119,9 +118,8 @@ def test_projection_recovers_the_coefficients(c: np.ndarray) -> None:
     visible = merl_grid.visible(nodes)
     angles = Angles(*(a[visible][::11] for a in nodes))
     rho = basis.evaluate(c, angles)
-    invertible = (rho > 1e-4).all(
-        axis=1
-    )  # values that map below ln ε are black, and black cannot be inverted
+    # values that map below ln ε are black, and black cannot be inverted
+    invertible = (rho > 1e-4).all(axis=1)
     angles = Angles(*(a[invertible] for a in angles))
     if invertible.sum() > 2000:
         assert np.allclose(basis.project(rho[invertible], angles, 5), c, atol=2e-3)

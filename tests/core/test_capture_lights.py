@@ -218,9 +218,8 @@ def test_exif_exposures_are_relative_to_the_first_photo(ball: Path) -> None:
     path, folder = ball, ball.parent
     for i in range(1, 7):
         exposure = 1 / 50 if i == 1 else 1 / 200
-        level = (
-            200 if i == 1 else 108
-        )  # sRGB levels 200 and 108 decode to 0.5776 and 0.1500, about a quarter
+        # sRGB levels 200 and 108 decode to 0.5776 and 0.1500, about a quarter
+        level = 200 if i == 1 else 108
         write_jpeg(folder / f"{i}.jpg", np.full((90, 120, 3), level, np.uint8), exposure)
         path.write_text(path.read_text().replace(f'"lit_{i}.exr"', f'"{i}.jpg"'))
     photos = LitPhotos.open(read_capture(path))

@@ -24,9 +24,8 @@ def lambert(angles: Angles) -> np.ndarray:
 def test_hemisphere_covers_all_directions_once(degrees):
     hemisphere = Hemisphere.of(np.radians(degrees), 96, 24)
     assert hemisphere.half_solid.sum() == pytest.approx(2 * np.pi, rel=1e-9)
-    assert hemisphere.solid.sum() == pytest.approx(
-        2 * np.pi, rel=0.03
-    )  # cells at the horizon are half visible
+    # cells at the horizon are half visible
+    assert hemisphere.solid.sum() == pytest.approx(2 * np.pi, rel=0.03)
     assert np.sum(hemisphere.solid * hemisphere.cos_i) == pytest.approx(np.pi, rel=0.005)
     light, view = light_view(*hemisphere.angles)
     visible = hemisphere.solid > 0

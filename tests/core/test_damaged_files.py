@@ -192,9 +192,8 @@ def test_damaged_masks_are_rejected_and_alpha_masks_are_read(
     rgba[..., 3] = mask
     out.write_image(rgba)
     out.close()
-    assert np.array_equal(
-        read_mask(path), mask > 0
-    )  # a white image whose alpha channel is the mask
+    # a white image whose alpha channel is the mask
+    assert np.array_equal(read_mask(path), mask > 0)
 
 
 @pytest.mark.parametrize("damage", ["black", "negative", "far too bright"])

@@ -23,10 +23,11 @@ from patina.core.samples import SampleTable
 from tests import make_capture as made
 from tests.sampled import sampled, sampled_materials
 
+# largest sample counts, which keep these tests short
 MAX_SCAN_SAMPLES, MAX_BALL_SAMPLES = (
     40_000,
     6_000,
-)  # largest sample counts, which keep these tests short
+)
 
 
 def fitted_estimate(

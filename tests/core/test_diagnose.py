@@ -93,9 +93,8 @@ def test_held_out_photos_are_predicted_with_their_own_gain_and_shadows():
         )
         with_effect = fit(without_effect.model.with_effect(effect, start), deviation)
         before, after = held_out_photo_error(without_effect), held_out_photo_error(with_effect)
-        frozen_patches = replace(
-            with_effect, model=with_effect.model.with_patches_frozen()
-        )  # pixels outside a shadow patch are unchanged
+        # pixels outside a shadow patch are unchanged
+        frozen_patches = replace(with_effect, model=with_effect.model.with_patches_frozen())
         assert after < 1.05 * held_out_photo_error(frozen_patches) < 0.6 * before
         if kind is LightIntensity:
             no_drift = fit(Model(context.pixels, context.brdfs), deviation)

@@ -78,9 +78,8 @@ def test_rank_correlation_of_a_known_order_is_one() -> None:
         }
 
     found = tables.similarity([run([5.0, 4.0, 3.0, 2.0, 1.0])])
-    assert (
-        "-1.00 ± 0.00" in found and "| 0.33 |" in found
-    )  # error of the most similar candidate 1, median 3
+    # error of the most similar candidate 1, median 3
+    assert "-1.00 ± 0.00" in found and "| 0.33 |" in found
     assert "+1.00" in tables.similarity([run([1.0, 2.0, 3.0, 4.0, 5.0])])
 
 

@@ -148,9 +148,8 @@ def test_error_measures_of_a_constant_factor() -> None:
         assert value == pytest.approx(0.2, rel=1e-6)
     assert found.peak == pytest.approx(1.2, rel=1e-3)
     assert found.peaks == pytest.approx((1.2, 1.2, 1.2), rel=1e-3)
-    assert (
-        0.9 * np.log(1.2) < found.log_rms < np.log(1.2)
-    )  # the offset ε reduces the log error slightly
+    # the offset ε reduces the log error slightly
+    assert 0.9 * np.log(1.2) < found.log_rms < np.log(1.2)
 
 
 def test_error_measures_agree_with_core_metrics() -> None:
@@ -192,9 +191,8 @@ def test_white_ball_under_a_uniform_sky() -> None:
     sky = np.maximum(height, 0).repeat(spheres.COLUMNS)  # brightest at the zenith
     lit = np.bincount(q.pixel, q.weight * sky[q.cell], q.pixels)
     top, bottom = lit[: q.pixels // 20].max(), lit[-q.pixels // 20 :].min()
-    assert top == pytest.approx(
-        2 * np.pi / 3, rel=0.05
-    )  # ∫ cos² dω for a normal close to the zenith
+    # ∫ cos² dω for a normal close to the zenith
+    assert top == pytest.approx(2 * np.pi / 3, rel=0.05)
     assert bottom < 0.01 * top
     cos_i, cos_o = cosines(*q.angles)
     assert min(cos_i.min(), cos_o.min()) > 0

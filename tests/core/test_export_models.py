@@ -84,9 +84,8 @@ def test_only_effective_inputs_are_reported_as_dropped() -> None:
     assert dropped_inputs(plain, gltf_model.DROPPED) == ()
     coated = Principled(coat_ior=1.8, coat_weight=0.5)
     assert dropped_inputs(coated, gltf_model.DROPPED) == ("Coat IOR (1.8)",)
-    assert (
-        dropped_inputs(Principled(coat_ior=1.8), gltf_model.DROPPED) == ()
-    )  # without a coat its IOR has no effect
+    # without a coat its IOR has no effect
+    assert dropped_inputs(Principled(coat_ior=1.8), gltf_model.DROPPED) == ()
     dull = Principled(specular_ior_level=0.1)
     assert dropped_inputs(dull, preview_surface.DROPPED) == ("Specular IOR Level (0.1)",)
 

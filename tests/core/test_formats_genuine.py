@@ -97,9 +97,8 @@ def test_opensfm_points_project_into_the_photos(cameras: Path) -> None:
         pixels = camera.project(found.points)
         with np.errstate(invalid="ignore"):
             in_photo.append(((pixels > 0) & (pixels < (camera.width, camera.height))).all(axis=1))
-    assert (
-        np.sum(in_photo, axis=0) >= 2
-    ).mean() > 0.95  # points are triangulated from at least two photos
+    # points are triangulated from at least two photos
+    assert (np.sum(in_photo, axis=0) >= 2).mean() > 0.95
     place = found.georeference
     assert place is not None and abs(place.latitude - 52.519) < 1e-3  # Berlin
     # photos taken by a person on the ground are roughly level

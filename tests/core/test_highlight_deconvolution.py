@@ -95,7 +95,7 @@ def _brdf(context) -> PrincipalBRDF:
     ("errors", "passes", "required"),
     [
         ([0.10, 0.10], 0, False),  # no gain: the samples are not deconvolved
-        ([0.10, 0.10, 0.10], 1, True),  # unless the caller requires exactly one pass
+        ([0.10, 0.10, 0.10], 1, True),  # no gain, but the caller requires the first pass
         ([0.10, 0.07, 0.069], 1, False),  # a second pass only amplifies noise
         ([0.10, 0.07, 0.05, 0.06], 2, False),
         ([0.10, 0.08, 0.06, 0.05, 0.04], highlight_deconvolution_passes.MAX_PASSES, False),
@@ -113,9 +113,8 @@ def test_passes_stop_when_the_held_out_error_stops_decreasing(errors, passes, re
             raise AssertionError("nothing is fitted here")
 
     def fit_again(table, judge, start, share):
-        assert (judge is None) == (
-            not tables
-        )  # the first pass assumes a point light, the others the blur
+        # the first pass assumes a point light, the others the blur
+        assert (judge is None) == (not tables)
         error = errors[len(tables)]
         tables.append(table)
         yield Step("", start + share)

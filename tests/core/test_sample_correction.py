@@ -138,9 +138,8 @@ def test_clipped_channels_are_imputed_and_excluded_from_the_held_out_error():
     for k, part in light.items():
         in_photo = found.photo == k
         seen = np.sum(context.pixels.observed[rows_of(found, context)][in_photo] ** 2, axis=1)
-        read_share = np.sum(seen * found.read[in_photo]) / np.sum(
-            seen
-        )  # clipped samples do not count as residual
+        # clipped samples do not count as residual
+        read_share = np.sum(seen * found.read[in_photo]) / np.sum(seen)
         assert part == pytest.approx(np.sqrt(read_share), rel=1e-3) and part < 1
     above = int(np.sum(truth[:, 0] > 1.02 * top))
     imputed = found.select(~found.read)
