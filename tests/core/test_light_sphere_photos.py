@@ -30,7 +30,7 @@ PUBLISHED = {
 }
 
 
-def published_directions(which) -> np.ndarray:
+def published(which) -> np.ndarray:
     """(12, 3) published unit light directions."""
     return np.array(PUBLISHED[which].split(), float).reshape(3, 12).T
 
@@ -78,10 +78,8 @@ def test_light_directions_match_the_published_ones(shared, probe):
     if not folder.is_dir():
         pytest.skip("the photos of the chrome spheres are not available")
     found = found_directions(folder)
-    errors = [angle(a, b) for a, b in zip(found, published_directions(probe), strict=True)]
-    merged_errors = [
-        angle(a, b) for a, b in zip(found, published_directions("merged"), strict=True)
-    ]
+    errors = [angle(a, b) for a, b in zip(found, published(probe), strict=True)]
+    merged_errors = [angle(a, b) for a, b in zip(found, published("merged"), strict=True)]
     assert np.median(errors) < 0.5 and max(errors) < 2.0
     assert np.median(merged_errors) < 2.0 and max(merged_errors) < 2.0
 
