@@ -67,7 +67,7 @@ def test_held_out_error_is_compared_with_the_true_image_error() -> None:
     )
 
 
-def test_rank_correlation_of_a_known_order_is_one() -> None:
+def test_rank_correlation_of_known_orders() -> None:
     def run(errors: list[float]) -> records.Record:
         return {
             "material": "alum-bronze",
