@@ -23,7 +23,7 @@ from .stepped import Stepped
 
 class PATINA_OT_check(Stepped, bpy.types.Operator):
     """Fit the materials, find what scan, lights and materials do not explain in the photos, name \
-the causes, and fit again with these effects included in the model"""
+the causes, and fit again with these causes included in the model"""
 
     bl_idname = "patina.check"
     bl_label = "Check"
@@ -68,7 +68,7 @@ the causes, and fit again with these effects included in the model"""
                 f"{mesh.name} no longer has the vertices of the scan, so it was not coloured.",
             )
         for trial in found.reported:
-            self.report({"WARNING"}, f"{trial.effect.cause}: {found.sentence(trial)}")
+            self.report({"WARNING"}, f"{_label(trial.effect.cause)}: {found.sentence(trial)}")
         if not found.causes:
             self.report({"INFO"}, "No known cause found.")
 
@@ -110,13 +110,18 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
 def _show(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> Iterator[None]:
     """Assign the materials to the mesh, and report which effects the fit included."""
     yield from show_result(operator, scene, result)
-    used = ", ".join(effect.cause for effect in result.effects)
-    model = f"with {used} included in the model" if used else "without additional effects"
+    used = ", ".join(_label(effect.cause) for effect in result.effects)
+    model = f"with {used} included in the model" if used else "without additional causes"
     operator.report({"INFO"}, f"Materials fitted: {len(result.materials)}, {model}.")
 
 
+def _label(cause: str) -> str:
+    """The name of a cause as the sidebar shows it."""
+    return cause.replace("_", " ")
+
+
 class PATINA_OT_show_evidence(bpy.types.Operator):
-    """Colour the scanned mesh by the change that this effect makes in the photos: blue where they \
+    """Colour the scanned mesh by the change that this cause makes in the photos: blue where they \
 get darker, red where they get brighter"""
 
     bl_idname = "patina.show_evidence"
@@ -135,7 +140,9 @@ get darker, red where they get brighter"""
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if not show_evidence(context.scene.patina.mesh, self.cause):
-            self.report({"WARNING"}, f"The mesh has no colours for {self.cause}. Run Check again.")
+            self.report(
+                {"WARNING"}, f"The mesh has no colours for {_label(self.cause)}. Run Check again."
+            )
             return {"CANCELLED"}
         for area in context.screen.areas if context.screen else ():
             if area.type == "VIEW_3D":

@@ -22,8 +22,8 @@ NOTHING, SOLVE, LIT = "NOTHING", "SOLVE", "LIT"
 
 
 class PATINA_OT_drop_photos(bpy.types.Operator):
-    """Choose the use of dropped photos: solve their cameras, or measure materials with them. The \
-open capture is not changed"""
+    """Choose what to do with dropped photos: solve their cameras, or measure materials with them. \
+The open capture is not changed"""
 
     bl_idname = "patina.drop_photos"
     bl_label = "Photos for Patina"
@@ -34,7 +34,7 @@ open capture is not changed"""
         type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"}
     )
     use: bpy.props.EnumProperty(  # type: ignore[valid-type]
-        name="They Are",
+        name="Use Photos As",
         description="What to do with the photos",
         items=[
             (NOTHING, "Nothing for Now", "Leave the scene as it is"),
@@ -53,7 +53,7 @@ open capture is not changed"""
     def poll(cls, context: bpy.types.Context) -> bool:
         if running(context.scene) is None:
             return True
-        cls.poll_message_set("Another job is running; press ESC to stop it")
+        cls.poll_message_set("Another job is running; press ESC to cancel it")
         return False
 
     def draw(self, context: bpy.types.Context) -> None:

@@ -39,7 +39,7 @@ def fit_job(operator: bpy.types.Operator, scene: bpy.types.Scene) -> FitJob:
     path = Path(bpy.path.abspath(scene.patina.capture))
     if not path.is_file():
         raise InputError(
-            "the file does not exist; import the capture again from its present place", file=path
+            "the file does not exist; import the capture again from its current folder", file=path
         )
     margins = preferences().margins
     capture, dragged = with_dragged_lamps(read_capture(path, margins), scene)

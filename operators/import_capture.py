@@ -59,7 +59,7 @@ def import_into_scene(
         existing = find_earlier_import(context.scene, path)
         if existing is not None:
             raise PatinaError(
-                f"this capture is already in the scene; to import it again, delete the collection "
+                f"This capture is already in the scene; to import it again, delete the collection "
                 f"{existing.name!r} first"
             )
         capture = read_capture(path)

@@ -43,7 +43,7 @@ class _CaptureJob(Stepped):
         path = Path(bpy.path.abspath(context.scene.patina.capture))
         if not path.is_file():
             raise InputError(
-                "the file does not exist; import the capture again from its present place",
+                "the file does not exist; import the capture again from its current folder",
                 file=path,
             )
         apply_strokes(context.scene)
@@ -81,7 +81,7 @@ class PATINA_OT_propose_materials(_CaptureJob, bpy.types.Operator):
     def _job_of(self, scene: bpy.types.Scene, capture: Capture) -> Job:
         mesh = scene.patina.mesh
         if mesh is None or mesh.type != "MESH" or mesh.name not in scene.objects:
-            raise PatinaError("the scanned mesh is not in this scene; import the capture again")
+            raise PatinaError("The scanned mesh is not in this scene; import the capture again")
         return ProposalJob(with_mask_images(capture), self.count or None)
 
     def _take(self, scene: bpy.types.Scene) -> None:
@@ -129,7 +129,7 @@ excluded from the fit"""
 
     def _job_of(self, scene: bpy.types.Scene, capture: Capture) -> Job:
         if shadow_images(self._capture) and not self.replace:
-            raise PatinaError("there are shadow masks already; enable Replace to overwrite them")
+            raise PatinaError("There are shadow masks already; enable Replace to overwrite them")
         self._photos = capture.photos
         return _StagedMasks(capture, check_out(masks_folder(capture.file)))
 

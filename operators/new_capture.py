@@ -72,7 +72,7 @@ the mesh if the folder holds several. Without photos, only cameras and sparse po
         items=[
             ("FLASH", "Flash", "A flash on the camera and no other light"),
             ("DISTANT", "Distant Lamp", "A fixed lamp far away"),
-            ("SUN", "Sun", "The sun, in the direction given by time and place of the photos"),
+            ("SUN", "Sun", "The sun, in the direction given by the time and place of the photos"),
         ],
     )
     offset: bpy.props.FloatVectorProperty(  # type: ignore[valid-type]
@@ -121,7 +121,7 @@ the mesh if the folder holds several. Without photos, only cameras and sparse po
                 return self._cameras_alone(context, cameras)
             if mesh is None:
                 raise InputError(
-                    "found no mesh, or several in the folder of the cameras; select one together "
+                    "found no mesh, or several, in the folder of the cameras; select one together "
                     "with the photos",
                     key="mesh",
                 )
@@ -134,7 +134,7 @@ the mesh if the folder holds several. Without photos, only cameras and sparse po
             return report_and_cancel(self, error)
         done = import_into_scene(self, context, out)
         if done == {"CANCELLED"}:
-            out.unlink(missing_ok=True)  # bring_in has reported the error
+            out.unlink(missing_ok=True)  # import_into_scene has reported the error
             return done
         self.report({"INFO"}, f"Capture file written: {out}")
         return done
@@ -149,7 +149,7 @@ the mesh if the folder holds several. Without photos, only cameras and sparse po
         cameras = (model_of(_path(self.cameras)),) if self.cameras else given.cameras
         if len(cameras) != 1:
             raise InputError(
-                f"found {len(cameras)} files of cameras, expected one; select exactly one",
+                f"found {len(cameras)} camera files, expected one; select exactly one",
                 key="cameras",
             )
         if len(given.meshes) > 1:

@@ -66,7 +66,7 @@ class PATINA_OT_add_material(_ScanOperator, bpy.types.Operator):
 
 
 class PATINA_OT_pick_paint(_ScanOperator, bpy.types.Operator):
-    """Set the colour of Blender's brushes to this material or mask"""
+    """Set Blender's brushes to the colour of this material or mask"""
 
     bl_idname = "patina.pick_paint"
     bl_label = "Pick Paint"
@@ -76,7 +76,7 @@ class PATINA_OT_pick_paint(_ScanOperator, bpy.types.Operator):
 
     def _do(self, context: bpy.types.Context) -> set[str]:
         if not 0 <= self.number < len(paints(context.scene)):
-            raise PatinaError(f"there is no paint with the number {self.number}")
+            raise PatinaError(f"There is no material or mask with the number {self.number}")
         context.scene.patina_paint.active = self.number
         update_brushes(context)
         return {"FINISHED"}
@@ -92,7 +92,7 @@ class PATINA_OT_paint_mesh(_ScanOperator, bpy.types.Operator):
     def _do(self, context: bpy.types.Context) -> set[str]:
         scene, mesh = context.scene, context.scene.patina.mesh
         if not scene.patina.use_slots or len(mesh.material_slots) < 2:
-            raise PatinaError("there is only one material; add another one, then paint its area")
+            raise PatinaError("There is only one material; add another one, then paint its area")
         apply_strokes(scene)
         leave_edit_mode(mesh)
         context.view_layer.objects.active = mesh
@@ -164,7 +164,7 @@ class PATINA_OT_slots_from_face_sets(_ScanOperator, bpy.types.Operator):
                 bpy.ops.object.mode_set(mode="OBJECT")
         found = slots_of_face_sets(mesh)
         if found is None:
-            raise PatinaError("the mesh has only one face set; create more in Sculpt Mode")
+            raise PatinaError("The mesh has only one face set; create more in Sculpt Mode")
         mesh.data.materials.clear()
         scene.patina.use_slots = True
         for _ in range(int(found.max()) + 1):

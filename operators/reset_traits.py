@@ -21,7 +21,7 @@ class PATINA_OT_reset_traits(bpy.types.Operator):
         if material is None:
             cls.poll_message_set("No measured materials yet; fit the materials first")
         elif not state(material):
-            cls.poll_message_set(f"{material.name} is not edited")
+            cls.poll_message_set(f"{material.name} has no changed traits")
         elif measured_brdf(material) is None:
             cls.poll_message_set("The basis of this material is not on this computer")
         else:

@@ -45,7 +45,7 @@ class Stepped:
     def idle(cls, context: bpy.types.Context) -> bool:
         """Whether no other job runs. Sets the poll message if one does."""
         if running(context.scene) is not None:
-            cls.poll_message_set("Another job is running; press ESC to stop it")
+            cls.poll_message_set("Another job is running; press ESC to cancel it")
             return False
         return True
 

@@ -14,7 +14,7 @@ from ..scene.session.lengths import length
 from ..scene.session.scene_properties import stored_result
 
 ICONS = {DISTANT: "LIGHT_SUN", NEAR: "LIGHT_POINT", MOUNTED: "LIGHT_SPOT"}
-KINDS = {DISTANT: "Distant", NEAR: "Lamp", MOUNTED: "Flash"}
+KINDS = {DISTANT: "Distant lamp", NEAR: "Near lamp", MOUNTED: "Flash"}
 
 
 def draw_lamp(layout: bpy.types.UILayout, scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
@@ -24,7 +24,7 @@ def draw_lamp(layout: bpy.types.UILayout, scene: bpy.types.Scene, camera: bpy.ty
     lamp = lamp_of(scene, capture, name)
     column = layout.column(align=True)
     if lamp is None:
-        column.label(text=f"{name}: lamp not in scene", icon="LIGHT")
+        column.label(text=f"{name}: the lamp is not in the scene", icon="LIGHT")
         return
     kind = lamp.get(LAMP_KIND)
     column.label(text=f"{KINDS.get(kind, 'Light')}: {name}", icon=ICONS.get(kind, "LIGHT"))

@@ -34,7 +34,7 @@ def draw_masks(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     row.operator("patina.propose_materials", text="Propose", icon="SHADERFX")
     row.operator("patina.slots_from_face_sets", text="Face Sets", icon="FACE_MAPS")
     box = layout.box()
-    box.label(text="Excluded from a Photo")
+    box.label(text="Excluded from Photos")
     first = sum(paint.kind == "material" for paint in kinds)
     for number, paint in enumerate(kinds[first:], start=first):
         _row(box, scene, paint, number, number == state.active)

@@ -34,7 +34,8 @@ def draw_measured(
             wrapped(box, error, "BLANK1", IN_BOX)
         if "interval_90" in material["uncertainty"]:
             median = either_side(material["uncertainty"]["median"])
-            wrapped(box, f"BRDF: {median} (median over directions)", "BLANK1", IN_BOX)
+            interval = f"90 % interval of the BRDF: {median} (median over directions)"
+            wrapped(box, interval, "BLANK1", IN_BOX)
         box.label(text=f"{material['samples']['used']:,} samples", icon="BLANK1")
         for warning in material["warnings"]:
             wrapped(box, warning, "ERROR", IN_BOX)

@@ -70,7 +70,7 @@ class PatinaPreferences(bpy.types.AddonPreferences):
     cosine: bpy.props.FloatProperty(  # type: ignore[valid-type]
         name="Minimum Cosine",
         description="Pixels are excluded if the cosine of light or view with the normal is smaller "
-        "(0.1 is 84°), because small errors of the mesh have a large effect there. "
+        "(0.1 is an angle of 84°), because small errors of the mesh have a large effect there. "
         f"{OVERRIDE_NOTE} (smallest_cosine)",
         min=0.001,
         max=0.99,
@@ -98,7 +98,7 @@ class PatinaPreferences(bpy.types.AddonPreferences):
         layout.prop(self, "merl_folder")
         if self.merl_folder and not Path(bpy.path.abspath(self.merl_folder)).is_dir():
             layout.label(
-                text="The folder does not exist. Fits will fail until you choose another or none",
+                text="The folder does not exist; fits will fail until you choose another or none",
                 icon="ERROR",
             )
         margins = layout.column()

@@ -40,7 +40,7 @@ class PATINA_PT_traits(bpy.types.Panel):
         layout.template_icon(icon_value=icon_of(material), scale=SPHERE)
         if measured_brdf(material) is None:
             message = (
-                "The basis of this material is not on this computer. Fit again to edit the material"
+                "The basis of this material is not on this computer; fit again to edit the material"
             )
             wrapped(layout, message, "ERROR")
             return
@@ -89,7 +89,7 @@ def notes(material: bpy.types.Material) -> list[tuple[str, str]]:
         albedo, view = found.excess
         where = "along the normal" if view < 0.1 else f"{math.degrees(view):.0f}° from the normal"
         lines.append(
-            (f"Viewed {where}, the albedo is {albedo:.2g}, which is not physical. Renders limit "
+            (f"Viewed {where}, the albedo is {albedo:.2g}, which is not physical; renders limit "
              "it to 1", "ERROR")
         )  # fmt: skip
     if not state(material):

@@ -34,8 +34,8 @@ class PATINA_PT_views(bpy.types.Panel):
         layout, views = self.layout, context.scene.patina_views
         if views.material is None:
             layout.label(text=looked_at(context).name, icon="MATERIAL")
-        layout.prop(views, "material", text="Look At")
-        layout.label(text="Compare with:")
+        layout.prop(views, "material")
+        layout.label(text="Compare With:")
         layout.prop(views, "against", text="")
         if views.against == MATERIAL:
             layout.prop(views, "other", text="")

@@ -44,7 +44,7 @@ class ExportJob(Job):
         capture = capture_path(scene)
         found = stored_result(capture)
         if found is None:
-            raise PatinaError("found no fitted material; fit the materials first")
+            raise PatinaError("Found no fitted material; fit the materials first")
         if not formats:
             raise InputError(
                 "found no format, expected at least one; choose a format", key="formats"
@@ -127,4 +127,4 @@ def _save_copy(path: Path) -> None:
         bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, check_existing=False)
     except RuntimeError as error:
         message = " ".join(str(error).split())
-        raise PatinaError(f"cannot save a copy of the scene ({message})") from error
+        raise PatinaError(f"Cannot save a copy of the scene ({message})") from error

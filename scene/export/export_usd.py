@@ -31,7 +31,7 @@ OPTIONS = {
 def check_usd() -> None:
     """Raise PatinaError if this build of Blender has no USD (some distributions' builds)."""
     if not bpy.app.build_options.usd:
-        raise PatinaError("this build of Blender has no USD; use a build from blender.org")
+        raise PatinaError("This build of Blender has no USD; use a build from blender.org")
 
 
 def write_usd(path: Path, objects: Sequence[bpy.types.Object]) -> bool:

@@ -23,7 +23,7 @@ def mark(material: bpy.types.Material, result: dict[str, Any]) -> bool:
         return False
     origin = provenance(own, result, material.get(MEASURED_DATE, ""))
     if movable(material) and state(material):
-        origin["changed"] = "traits edited after the fit"
+        origin["changed"] = "traits changed after the fit"
     material[PROVENANCE] = origin
     material.asset_mark()
     data = material.asset_data
@@ -51,7 +51,7 @@ def provenance(material: dict[str, Any], result: dict[str, Any], date: str) -> d
     held = material.get("held_out")
     if held:
         sentences["error"] = f"median error of held-out photos {100 * held['typical']:.1f} %"
-    effects = [effect["cause"] for effect in result.get("effects", [])]
+    effects = [effect["cause"].replace("_", " ") for effect in result.get("effects", [])]
     if effects:
         sentences["effects"] = f"with {', '.join(effects)} included in the model"
     return sentences

@@ -82,7 +82,7 @@ def earlier_subject(material: bpy.types.Material) -> Subject:
 
 
 def _without_basis(name: str) -> PatinaError:
-    return PatinaError(f"the basis of {name} is not on this computer; fit the material again")
+    return PatinaError(f"The basis of {name} is not on this computer; fit the material again")
 
 
 def _stored(values: NDArray[np.floating]) -> array[float]:

@@ -56,7 +56,7 @@ class PatinaTraits(bpy.types.PropertyGroup):
 
     channels: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Channels",
-        description="Color channels that the sliders below change",
+        description="Colour channels that the sliders below change",
         items=CHANNEL_ITEMS,
         options=set(),
     )

@@ -155,7 +155,7 @@ def _saved(image: bpy.types.Image, capture: Capture, place: int, kind: str) -> P
     """Write the image's present pixels to a file; returns its path."""
     if 0 in tuple(image.size):
         raise PatinaError(
-            f"the mask {image.name!r} has no pixels; remove the image, or recompute the masks"
+            f"The mask {image.name!r} has no pixels; remove the image, or recompute the masks"
         )
     folder = masks_folder(capture.file) / "painted"
     file = folder / f"{place + 1:03d}_{capture.photos[place].file.stem}_{kind}.png"
@@ -163,7 +163,7 @@ def _saved(image: bpy.types.Image, capture: Capture, place: int, kind: str) -> P
         folder.mkdir(parents=True, exist_ok=True)
         write_png(file, read_pixels(image)[..., 0])
     except OSError as error:
-        raise PatinaError(f"the mask {image.name!r} cannot be written ({error})") from error
+        raise PatinaError(f"The mask {image.name!r} cannot be written ({error})") from error
     return file
 
 

@@ -148,7 +148,7 @@ def _entry(entry: LightEntry, lamp: bpy.types.Object, hand: LampEdits, origin: A
     if hand.strength and entry.strength_given:
         if not (hand.now.strength > 0).all():
             raise PatinaError(
-                f"light {entry.name!r}: its lamp {lamp.name!r} emits no light in at least one of "
+                f"Light {entry.name!r}: its lamp {lamp.name!r} emits no light in at least one of "
                 "red, green and blue; set a strength and a colour above 0, or undo the edit"
             )
         new.update(strength=hand.now.strength, white=None)

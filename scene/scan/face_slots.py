@@ -119,7 +119,7 @@ def with_painted_slots(capture: Capture, scene: bpy.types.Scene) -> tuple[Captur
     target = scene.patina.mesh
     if target is None or target.type != "MESH" or target.name not in scene.objects:
         raise PatinaError(
-            "the scanned mesh is not in this scene, so there are no slots to fit; import the "
+            "The scanned mesh is not in this scene, so there are no slots to fit; import the "
             "capture again"
         )
     if target.mode == "EDIT":
@@ -134,7 +134,7 @@ def with_painted_slots(capture: Capture, scene: bpy.types.Scene) -> tuple[Captur
     for i, name in enumerate(names):
         if name.casefold() in [other.casefold() for other in names[:i]]:
             raise PatinaError(
-                f"two slots of {target.name} have the material {name!r}; assign different materials"
+                f"Two slots of {target.name} have the material {name!r}; assign different materials"
             )
     photos = tuple(
         replace(photo, masks={k: v for k, v in photo.masks.items() if k in EXCLUDED_MASKS})

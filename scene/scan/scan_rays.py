@@ -49,7 +49,7 @@ def scan_rays(path: str) -> ScanRays:
     file = Path(path)
     if not file.is_file():
         raise InputError(
-            "the file does not exist; import the capture again from its present place", file=file
+            "the file does not exist; import the capture again from its current folder", file=file
         )
     changed, last = file.stat().st_mtime, _last.value
     if last is None or last.capture.file != file or last.changed != changed:

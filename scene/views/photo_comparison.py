@@ -47,7 +47,7 @@ def look_job(scene: bpy.types.Scene, fit: FitJob, place: int) -> LookJob:
     fitted = [(name, brdf, scales.get(name, 1.0)) for name, brdf in brdfs if brdf is not None]
     if not fitted:
         raise PatinaError(
-            "the basis of the materials is not on this computer; fit the materials again"
+            "The basis of the materials is not on this computer; fit the materials again"
         )
     name = fit.capture.photo_name(place)
     selected = [

@@ -113,7 +113,7 @@ class PatinaViews(bpy.types.PropertyGroup):
     )
     channels: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Channels",
-        description="Color channels to show",
+        description="Colour channels to show",
         items=CHANNELS,
         options=set(),
         update=_changed,
@@ -171,7 +171,7 @@ def show_chart(context: bpy.types.Context, kind: str) -> bpy.types.Image:
     nothing to compare with."""
     views, material = context.scene.patina_views, looked_at(context)
     if material is None:
-        raise PatinaError("there is no measured material in this file; fit the materials first")
+        raise PatinaError("There is no measured material in this file; fit the materials first")
     subject = subject_of(material)
     if kind == "highlight" and not views.is_property_set("theta_d"):
         _set_default_angle(views, subject)
@@ -212,11 +212,11 @@ def _other(views: PatinaViews, material: bpy.types.Material) -> Subject | None:
         return None if brdf is None else Subject("changed", brdf.evaluate)
     if views.against == MATERIAL:
         if views.other is None:
-            raise PatinaError("no material to compare with; choose one below Compare With")
+            raise PatinaError("No material to compare with; choose one below Compare With")
         return subject_of(views.other)
     if views.against == FILE:
         if not views.file:
-            raise PatinaError("no file to compare with; choose one below Compare With")
+            raise PatinaError("No file to compare with; choose one below Compare With")
         path = Path(bpy.path.abspath(views.file))
         return Subject(path.stem, merl_file.read(path).evaluate)
     return None

@@ -164,10 +164,10 @@ def test_the_panel_says_what_was_done_by_hand() -> None:
         box.draw_lamp(lines, scene, scene.camera)
         return lines.said
 
-    assert drawn() == ["Lamp: lamp"]
+    assert drawn() == ["Near lamp: lamp"]
     lamp("lamp").location.x += 1
     lamp("lamp").data.energy *= 2
-    assert drawn() == ["Lamp: lamp", "Position, strength edited", "patina.save_lights"]
+    assert drawn() == ["Near lamp: lamp", "Position, strength edited", "patina.save_lights"]
     bpy.ops.patina.next_photo(step=-1)
     assert drawn() == ["Flash: flash"]
     lights = [
@@ -180,4 +180,4 @@ def test_the_panel_says_what_was_done_by_hand() -> None:
     )
     assert drawn() == ["Flash: flash", "Refined: right 0.432 scan units"]
     bpy.data.objects.remove(lamp("flash"))
-    assert drawn() == ["flash: lamp not in scene"]
+    assert drawn() == ["flash: the lamp is not in the scene"]

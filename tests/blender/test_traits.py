@@ -292,7 +292,7 @@ def test_the_panel_draws_a_slider_a_component_with_what_it_does() -> None:
     material.patina_traits.green.trait_2 = -0.5
     assert word(material, False) == "Changed"
     bpy.ops.patina.mark_assets()
-    assert "traits edited after the fit" in material.asset_data.description
+    assert "traits changed after the fit" in material.asset_data.description
 
 
 def test_a_material_whose_basis_is_not_here_stays_as_it_is() -> None:
