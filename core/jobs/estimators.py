@@ -90,7 +90,7 @@ def _paper(table: SampleTable, basis: Basis, capture: Capture, name: str, judge:
         fit=fit,
         held_out=summarise([part for part in parts if part is not None]),
         spread=candidate_spread(basis, fit.candidates),
-        notes=(f"Not held out: {', '.join(lost)}. Without it, too few samples are left for a fit.",)
+        notes=(f"Not held out, because too few samples would remain: {', '.join(lost)}.",)
         if lost
         else (),
     )

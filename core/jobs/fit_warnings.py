@@ -35,8 +35,8 @@ def material_warnings(
     near_peak = round(float(table.weight[peak].sum(dtype=np.float64)))
     if near_peak < MIN_PEAK_SAMPLES:
         found.append(
-            f"The number of samples within 5° of the highlight's peak is only {near_peak}. The "
-            "height of the highlight is uncertain. Add a photo that shows the highlight."
+            f"Only {near_peak} samples are within 5° of the highlight's peak, so the height of the "
+            "highlight is uncertain. Add a photo that shows the highlight."
         )
     far = float(np.percentile(table.theta_d, 98)) if len(table) else 0.0
     if far < np.radians(50):
@@ -51,7 +51,7 @@ def material_warnings(
     else:
         found.append(
             "The irradiance of the lights is unknown, so the BRDF is known only up to one scale "
-            "factor. To get absolute values, add a white target or give the irradiance."
+            "factor. To get absolute values, add a white target, or give the irradiance."
         )
     return tuple(found)
 
@@ -63,9 +63,9 @@ def _energy_warnings(brdf: PrincipalBRDF) -> list[str]:
     if albedo[worst] <= MAX_ALBEDO:
         return []
     return [
-        f"Seen from {VIEW_ANGLES[worst]:.0f}° to the normal, the material reflects "
-        f"{100 * albedo[worst]:.0f} % of the incident light. Its material in Cycles is limited to "
-        "100 %. Check the irradiance of the lights."
+        f"Viewed {VIEW_ANGLES[worst]:.0f}° from the normal, the material reflects "
+        f"{100 * albedo[worst]:.0f} % of the incident light. Renders limit it to 100 %. Check the "
+        "irradiance of the lights."
     ]
 
 

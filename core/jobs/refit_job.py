@@ -91,7 +91,7 @@ class RefitJob(Job):
                 for reasons_of in (self.contradicted, self.unused):
                     reasons_of.pop(trial.effect.cause, None)
         reasons = {**self.contradicted, **self.unused}.items()
-        notes = [f"The cause {cause} is not taken into account. {why}" for cause, why in reasons]
+        notes = [f"The cause {cause} is not included in the model. {why}" for cause, why in reasons]
         if self.fitted is None:
             materials = [replace(m, warnings=(*m.warnings, *notes)) for m in before.materials]
             yield from self._finish(before, materials, begin)

@@ -144,6 +144,6 @@ def test_what_unseen_photos_speak_against_is_left_out(monkeypatch, order, guilty
     said = job.result.materials[0].warnings
     assert said[0] == ("again" if sound else "first")
     assert set(said[1:]) == {
-        f"The cause {c} is not taken into account. Errors grow by 8 %." for c in guilty
+        f"The cause {c} is not included in the model. Errors grow by 8 %." for c in guilty
     }
     assert fractions == sorted(fractions) and max(fractions) < 1

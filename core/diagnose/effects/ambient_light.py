@@ -42,6 +42,6 @@ class AmbientLight(AddsRadiance, BuiltFromBRDFs):
 
     def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         return (
-            "Ambient light reached the object from all directions: "
+            "Ambient light reaches the object from all directions: "
             f"{100 * float(np.mean(x)):.1f} % of the light of the lamp on a surface that faces it."
         )

@@ -29,7 +29,7 @@ class CastShadow(PatchEffect, ChangesShading, JudgedByPixel):
 
     photo: NDArray[np.int16]
     cause = "cast_shadow"
-    deciding_photo = "a photo of everything that stands about the object, from the lamp"
+    deciding_photo = "a photo of everything that stands around the object, taken from the lamp"
     systematic_error = 0.01  # pixels at the edge of a spot lose less light
 
     @classmethod
@@ -67,7 +67,7 @@ class CastShadow(PatchEffect, ChangesShading, JudgedByPixel):
         part = np.bincount(self.photo, dark, len(count)) / np.maximum(count, 1)
         worst = int(np.argmax(part))
         return (
-            "Something that is not in the mesh cast a shadow on the object in "
+            "Something that is not in the mesh casts a shadow on the object in "
             f"{int(np.sum(part > 0))} of {int(np.sum(count > 0))} photos. It removes up to "
             f"{100 * -x.min():.0f} % of the light and covers up to {100 * part[worst]:.2g} % of "
             f"the checked pixels of a photo (photo {worst + 1})."

@@ -84,7 +84,7 @@ class EnvironmentReflection(AddsRadiance, BuiltFromBRDFs):
         bright = self.directions[int(np.argmax(radiance))]
         return (
             "The object reflects its surroundings. They are brightest in the direction "
-            f"({bright[0]:.1f}, {bright[1]:.1f}, {bright[2]:.1f}) of the scan's frame: "
+            f"({bright[0]:.1f}, {bright[1]:.1f}, {bright[2]:.1f}) in the scan's frame: "
             f"{100 * float(radiance.max()):.0f} % of the radiance of a white wall lit by the "
             "lamp."
         )

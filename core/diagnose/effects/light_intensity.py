@@ -55,7 +55,8 @@ class LightIntensity(ChangesShading):
         gain = np.exp(x - x.mean())
         low, high = int(np.argmin(gain)), int(np.argmax(gain))
         return (
-            "The brightness of the lamp (or the exposure) differs between photos: relative to the "
-            f"mean, photo {self.photos[high] + 1} has {100 * (gain[high] - 1):+.0f} % and photo "
-            f"{self.photos[low] + 1} has {100 * (gain[low] - 1):+.0f} %."
+            "The brightness of the lamp (or the exposure) differs between photos: from "
+            f"{100 * (gain[low] - 1):+.0f} % in photo {self.photos[low] + 1} to "
+            f"{100 * (gain[high] - 1):+.0f} % in photo {self.photos[high] + 1}, relative to the "
+            "mean."
         )

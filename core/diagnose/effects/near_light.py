@@ -101,7 +101,7 @@ class NearLight(ChangesShading, TracesRays):
         half = min(nearness / 2, 0.9)
         unevenness = 100 * (((1 + half) / (1 - half)) ** 2 - 1)
         return (
-            f"The lamp {self.from_afar.names[nearest]!r} was near: its distance is about "
+            f"The lamp {self.from_afar.names[nearest]!r} is near the object: its distance is about "
             f"{self.size / nearness:.3g} scan units ({1 / nearness:.1f} times the size of the "
             f"object), so the near side gets up to {unevenness:.0f} % more light than the far "
             "side."

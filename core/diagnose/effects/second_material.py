@@ -78,5 +78,5 @@ class SecondMaterial(PatchEffect, ChangesShading, AddsRadiance):
         return (
             f"There is more than one material: {share:.0f} % of the surface differs from the rest "
             f"by {100 * factor:+.0f} % in reflectance and {even:+.3f} in diffuse albedo. "
-            "Paint a mask of it."
+            "Paint a mask of this part."
         )

@@ -32,7 +32,7 @@ class Subsurface(AddsRadiance):
     spread: Array
     size: float
     cause = "subsurface"
-    deciding_photo = "one photo of the edge of a sharp shadow, from near"
+    deciding_photo = "one close photo of the edge of a sharp shadow"
 
     @classmethod
     def of(cls, context: DiagnosisContext) -> Subsurface:

@@ -44,7 +44,7 @@ class ResidualStructure:
         return self.gain > MIN_STANDARD_ERRORS * self.error and (self.change > MIN_CHANGE or large)
 
     def sentence(self) -> str:
-        """For an artist."""
+        """The unexplained structure in words, for an artist."""
         strength = np.bincount(self.photo, np.sum(self.structure**2, axis=1))
         part = strength / max(float(strength.sum()), 1e-30)
         worst = int(np.argmax(part))
