@@ -54,7 +54,7 @@ def _pictures(folder: Path, found: Diagnosis, context: DiagnosisContext) -> str:
             residual = fitted.residual * (fitted.deviation / found.before.deviation)
             write_png(folder / file, residual_picture(pixels, residual, int(photo)))
             pictures += f"<img src='{file}' alt='{kind}'>"
-        rows.append(f"<figure>{pictures}<figcaption>photo {photo + 1}</figcaption></figure>")
+        rows.append(f"<figure>{pictures}<figcaption>Photo {photo + 1}</figcaption></figure>")
     what = "before and after correction" if found.named else "of the first fit"
     return (
         f"<h2>Residuals {what}</h2><p class='sub'><span class='key'></span> Prediction too dark … "
@@ -72,7 +72,7 @@ def section(found: Diagnosis, context: DiagnosisContext) -> str:
         f"<h2>Causes</h2><p><b>{escape(named)}</b></p>{left}"
         "<p class='sub'>Gain: improvement of the prediction of held-out regions of the photos by "
         "the model with this cause, in standard errors.</p>"
-        f"{_errors(found)}<table><tr><th>cause</th><th>gain</th><th></th><th>meaning"
+        f"{_errors(found)}<table><tr><th>Cause</th><th>Gain</th><th></th><th>Meaning"
         f"</th></tr>{rows}</table><div class='charts'>{_charts(found, context)}</div>"
         "<p class='sub'>Residual (photo minus prediction) relative to the prediction. Red: before "
         "correction, blue: after. Bars: two standard errors.</p>"
@@ -95,9 +95,9 @@ def _errors(found: Diagnosis) -> str:
         (before.over_floor, after.over_floor), (before.not_noise, after.not_noise)
     )  # fmt: skip
     return (
-        f"<table><tr><th></th><th>before</th><th>after</th></tr>{cells}<tr><th>fraction of the "
+        f"<table><tr><th></th><th>Before</th><th>After</th></tr>{cells}<tr><th>Fraction of the "
         f"typical squared error that is not photo noise</th><td>{100 * noise[0]:.0f} %</td><td>"
-        f"{100 * noise[1]:.0f} %</td></tr><tr><th>typical error relative to photo noise and "
+        f"{100 * noise[1]:.0f} %</td></tr><tr><th>Typical error relative to photo noise and "
         f"known scan errors</th><td>{floor[0]:.2f}</td><td>{floor[1]:.2f}</td></tr></table>"
     )
 
@@ -124,7 +124,7 @@ def _evidence(folder: Path, found: Diagnosis, context: DiagnosisContext) -> str:
     if not cells:
         return ""
     return (
-        "<h2>Effects of the Causes</h2><p class='sub'><span class='key'></span> The cause makes "
+        "<h2>Effects of the causes</h2><p class='sub'><span class='key'></span> The cause makes "
         "the photo darker … brighter, shown for the photo that it changes most. Full colour: three "
         f"times the standard deviation of the pixel's residual.</p><div class='residuals'>{cells}"
         "</div>"
@@ -155,7 +155,7 @@ def _materials(folder: Path, before: CaptureResult, after: CaptureResult) -> str
         rows += f"<div class='triple'>{cells}</div>"
     causes = ", ".join(effect.cause for effect in after.effects)
     return (
-        f"<h2>Materials Corrected for {escape(causes)}</h2>{rows}<p class='sub'>The samples are "
+        f"<h2>Materials corrected for {escape(causes)}</h2>{rows}<p class='sub'>The samples are "
         "corrected for the named causes before the second fit. The material after correction is "
         "the proposed one. <a href='materials/index.html'>Report of the second fit</a>.</p>"
     )

@@ -76,7 +76,8 @@ def _measured(
         ("Directions without samples", fit.extrapolation),
         (
             "90 % interval",
-            f"{reach(material.spread)}. The true BRDF is within it in nine of ten cases.",
+            f"The interval is {reach(material.spread)}. The true BRDF is within it in nine of ten "
+            "cases.",
         ),
     ]
 
@@ -121,7 +122,7 @@ def _paper(fit: PaperFit, material: MaterialResult) -> list[tuple[str, str]]:
         ),
         (
             "Standard deviation between trials",
-            f"± {100 * spread.median:.0f} % median, "
+            f"± {100 * spread.median:.0f} % (median), "
             f"± {100 * spread.at_highlight:.0f} % at the highlight.",
         ),
     ]

@@ -103,9 +103,9 @@ def _photo_row(folder: Path, view: photo_view.PhotoView) -> str:
     name = escape(view.name)
     labels = (
         f"{name}: photo",
-        "prediction",
-        f"difference, relative RMS error {100 * view.error:.1f} %",
-        "where samples came from",
+        "Prediction",
+        f"Difference, relative RMS error {100 * view.error:.1f} %",
+        "Where samples came from",
     )
     cells = ""
     for (kind, picture), label in zip(pictures.items(), labels, strict=True):

@@ -54,7 +54,7 @@ class MeasuredSettings:
 class MeasuredFit:
     """brdf: the posterior mode, lowered where it is uncertain (shrinkage.py). samples: how many
     were used. normal_deviation: degrees along each tangent, estimated standard deviation of the
-    scan's normals. gains: photo → its gain. extrapolation: a phrase that says what the BRDF rests
+    scan's normals. gains: photo → its gain. extrapolation: a sentence that says what the BRDF rests
     on in directions without samples. without: photo → the BRDF without that photo. covariance: (3,
     k, k) posterior covariance of each channel's coefficients. temperature: the likelihood was
     raised to the power 1/temperature (power_likelihood.py)."""
@@ -162,10 +162,10 @@ def _finite(table: SampleTable) -> SampleTable:
 
 
 def _anchoring_text(trust: float) -> str:
-    """A phrase for the report: what the BRDF rests on where no photo has samples."""
+    """A sentence for the report: what the BRDF rests on where no photo has samples."""
     if not np.isfinite(trust):
-        return "directions without samples follow the measured materials"
+        return "Directions without samples follow the measured materials."
     return (
-        "directions without samples follow the measured materials and microfacet lobes, the lobes "
-        f"within a factor of {np.exp(trust):.1f}"
+        "Directions without samples follow the measured materials and microfacet lobes (the lobes "
+        f"within a factor of {np.exp(trust):.1f})."
     )
