@@ -28,7 +28,8 @@ class LogTable:
 
     @staticmethod
     def of(basis: Basis, coefficients: NDArray[np.floating]) -> LogTable:
-        """The table of c channels with coefficients (c, k)."""
+        """The table of c channels with coefficients (c, k): x = Q c + µ, equation (3) of Ono et al.
+        2019, at the nodes."""
         c = np.asarray(coefficients, np.float32)
         nodes = basis.nodes
         return LogTable(basis.grid, nodes[:, :1] + nodes[:, 1 : 1 + c.shape[1]] @ c.T)
