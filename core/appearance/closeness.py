@@ -19,7 +19,7 @@ from .random_light import Pictures
 Array = NDArray[np.floating]
 
 CUBE_ROOT_WEIGHT = (
-    0.05  # of the relative cube-root error, against the RMS error of encoded pictures
+    0.05  # of the relative cube-root error; the RMS error of encoded pictures has weight 1
 )
 
 
@@ -59,7 +59,8 @@ class FitObjective:
         return residual, np.concatenate(parts, axis=1).T
 
     def cost(self, f: Array) -> float:
-        """The objective; its square root is comparable with an RMS error of encoded pictures."""
+        """Sum of the squared residuals, which the fit minimises. Its square root is comparable with
+        an RMS error of the pictures after encoding for display."""
         return float(np.sum(self.residual(f) ** 2))
 
     def error(self, f: Array) -> float:

@@ -55,7 +55,8 @@ class Noise:
 
 @dataclass(frozen=True)
 class _Line:
-    """Variance of one channel, read2 + shot · light, and the number of blocks of the fit."""
+    """Noise variance of one channel as a straight line over brightness: read2 + shot · light, where
+    read2 is the squared read noise. blocks: number of blocks that the fit used."""
 
     shot: float
     read2: float
@@ -136,14 +137,16 @@ def _blocks(photo: Photo, step: int, size: int) -> tuple[NDArray, NDArray]:
 
 
 def _blocked(strip: NDArray, size: int, how: Callable[..., NDArray]) -> NDArray:
-    """One value for each block of a strip of blocks, by the reduction ``how``."""
+    """One value for each block of a strip: ``how`` reduces the pixels of a block to one value, such
+    as their mean."""
     parts = strip[:size].reshape(size, -1, size, *strip.shape[2:])
     return np.asarray(how(parts, axis=(0, 2)))
 
 
 def _fit(light: NDArray, spread: NDArray, freedom: float) -> _Line:
-    """The line through the blocks without texture. It starts from low quantiles of brightness bins;
-    then the selection of blocks and the line are updated in turn until convergence."""
+    """The line of variance over brightness, fitted to the blocks without texture. It starts from
+    low quantiles of brightness bins; then the selection of blocks and the line are updated in turn
+    until convergence."""
     usable = (spread > 0) & (light > 0)
     light, spread = light[usable], spread[usable]
     if len(light) < MIN_BLOCKS:
@@ -165,7 +168,7 @@ def _fit(light: NDArray, spread: NDArray, freedom: float) -> _Line:
 
 
 def _start(light: NDArray, spread: NDArray, freedom: float) -> _Line:
-    """The line that the low quantiles of most brightness bins agree on.
+    """The line of variance over brightness on which the low quantiles of most brightness bins lie.
 
     Bins with texture everywhere lie above it; none can lie below. Each brightness bin has one vote,
     so that a large dark background does not outvote the object.
@@ -207,8 +210,8 @@ def _weighted(light: NDArray, spread: NDArray, expected: NDArray) -> _Line:
 
 
 def _quantisation(photo: Photo) -> _Line:
-    """Variance of rounding to the codes of the encoding, step²/12, as a line through a dark and a
-    bright value."""
+    """Variance of rounding to the discrete pixel values of the file, step²/12. The straight line
+    over brightness goes through its values for dark pixels and for pixels at half of the scale."""
     levels = photo.info.levels
     if levels is None or not photo.info.transfer.curves:
         return _Line(0.0, 0.0, 0)

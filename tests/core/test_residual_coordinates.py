@@ -12,7 +12,7 @@ from tests.make_lit_ball import lit_ball
 
 BETRAY = (
     "half angle", "difference angle", "incidence", "view", "photo's centre", "photo", "brightness",
-    "curvature", "shadow's edge", "surroundings", "lamp", "place on the object",
+    "curvature", "shadow's edge", "surroundings", "lamp", "position on the object",
     "tangent direction",
 )  # fmt: skip
 

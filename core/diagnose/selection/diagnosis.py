@@ -17,8 +17,8 @@ from .trial import Trial
 Array = NDArray[np.floating]
 
 MIN_GAIN_FRACTION = 0.05
-"""Fraction of the gain of the accepted effects; a smaller gain is more likely a flaw of their
-models."""
+"""Fraction of the gain of the accepted effects. A smaller gain is more likely to compensate a flaw
+in their models than to show a further cause."""
 
 
 @dataclass(frozen=True)
@@ -59,15 +59,15 @@ class Diagnosis:
 
     @property
     def reported(self) -> tuple[Trial, ...]:
-        """The effects that the report describes in words."""
+        """The effects that get a sentence in the report: the accepted ones, and those with evidence
+        against them."""
         return tuple(
             t for t in self.ranked if t in self.accepted or t.effect.cause in self.contradicted
         )
 
     @property
     def causes(self) -> tuple[str, ...]:
-        """The named effects, by the words of the vocabulary; ``unknown`` where structure
-        remains."""
+        """Names of the named causes, and ``unknown`` if unexplained structure remains."""
         causes = tuple(trial.effect.cause for trial in self.named)
         return (*causes, "unknown") if self.unexplained else causes
 
@@ -83,7 +83,7 @@ class Diagnosis:
 
     @property
     def unexplained(self) -> bool:
-        """Whether structure remains that no cause explains, and that is more than a flaw of an
-        accepted effect's model."""
+        """Whether significant residual structure remains that no cause explains, and that is too
+        large to be a flaw in the model of an accepted effect."""
         gained = sum(trial.gain for trial in self.named)
         return self.residual.is_significant and self.residual.gain > MIN_GAIN_FRACTION * gained

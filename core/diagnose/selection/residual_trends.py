@@ -21,7 +21,8 @@ UPRIGHT = np.radians(2.0)  # θh below which the half vector has no direction on
 
 @dataclass(frozen=True)
 class Coordinate:
-    """name, unit; values: (n,) of every pixel, NaN unknown."""
+    """One coordinate of all pixels, for example the half angle. values: (n,) in ``unit``, NaN where
+    unknown."""
 
     name: str
     unit: str
@@ -41,7 +42,7 @@ class Trend:
 
 
 def coordinates(context: DiagnosisContext) -> list[Coordinate]:
-    """All coordinates of the pixels of a diagnosis."""
+    """Every coordinate of the diagnosis's pixels along which the residual is charted."""
     pixels = context.pixels
     now = ShadingState.of(pixels)
     angles = now.angles
@@ -67,7 +68,8 @@ def coordinates(context: DiagnosisContext) -> list[Coordinate]:
         Coordinate("towards the lamp", "scan units", np.einsum("ij,ij->i", place, pixels.light)),
     ]
     found += [
-        Coordinate(f"place on the object, {'xyz'[k]}", "scan units", place[:, k]) for k in range(3)
+        Coordinate(f"position on the object, {'xyz'[k]}", "scan units", place[:, k])
+        for k in range(3)
     ]
     turns = half_vector_turns(pixels)
     found += [Coordinate(f"tangent direction, off {'xyz'[k]}", "°", turns[:, k]) for k in range(3)]
@@ -93,8 +95,9 @@ def trend(
     deviation: Array,
     block: NDArray[np.int32],
 ) -> Trend:
-    """The trend of a residual. residual: (n, 3) photo − prediction; shown: (n, 3) prediction;
-    deviation: (n, 3) standard deviation; block: (n,) region of each pixel."""
+    """The trend of the residual along a coordinate. residual: (n, 3) photo minus prediction; shown:
+    (n, 3) prediction; deviation: (n, 3) standard deviation of the residual; block: (n,) region of
+    each pixel."""
     known = np.isfinite(coordinate.values) & np.isfinite(deviation).all(axis=1)
     known &= shown.mean(axis=1) > 0
     values = coordinate.values[known]

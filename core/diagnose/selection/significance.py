@@ -95,7 +95,8 @@ def _tail(draws: Vector, values: Vector) -> Vector:
 
 
 def _scores(now: ModelFit, effect: Effect, of: NDArray[np.intp]) -> tuple[Array, Array]:
-    """((b, p) score of the effect's parameters in each region, after projecting out the rest of the
-    model, (p, p) inverse of their information), at the model without the effect."""
+    """((b, p) scores of the effect's parameters, one row for each region; (p, p) inverse of their
+    Fisher information). Both are computed without the effect, and the part that the rest of the
+    model can explain is projected out."""
     wider = replace(now, model=now.model.with_patches_frozen().with_effect(effect))
     return scores(wider, jacobian_of(wider), of, len(effect.parameters))

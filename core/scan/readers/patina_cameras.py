@@ -51,7 +51,7 @@ def read_patina_cameras(
         )
     listed = data.get("cameras")
     if not isinstance(listed, list):
-        raise InputError("expected a list", file=path, key="cameras")
+        raise InputError("expected a list of cameras", file=path, key="cameras")
     return reconstruction_of([_camera(entry, i, path) for i, entry in enumerate(listed)], path)
 
 
@@ -83,12 +83,12 @@ def write_patina_cameras(
 def _camera(entry: Any, place: int, path: Path) -> Camera:
     where = f"cameras {place + 1}"
     if not isinstance(entry, dict):
-        raise InputError("expected a table", file=path, key=where)
+        raise InputError("expected an object with one camera", file=path, key=where)
     label, model, photo = (entry.get(name) for name in ("label", "model", "photo"))
     if not isinstance(label, str) or not label:
-        raise InputError("expected text", file=path, key=f"{where}.label")
+        raise InputError("expected the camera's label, as text", file=path, key=f"{where}.label")
     if not (photo is None or isinstance(photo, str)):
-        raise InputError("expected text", file=path, key=f"{where}.photo")
+        raise InputError("expected a file name, as text", file=path, key=f"{where}.photo")
     width, height = (_side(entry.get(name), name, where, path) for name in ("width", "height"))
     parameters = _numbers(entry, "parameters", None, where, path)
     rotation = _numbers(entry, "rotation", (3, 3), where, path)
