@@ -93,7 +93,8 @@ The materials are those of the last fit; glTF and USD include the scanned mesh a
         for loss in self._job.losses:
             head, *more = (line.strip() for line in loss.lines())
             kind = "WARNING" if loss.dropped else "INFO"
-            self.report({kind}, f"{head}: {'; '.join(more)}")
+            text = f"{head}: {'; '.join(more)}" if more else head
+            self.report({kind}, f"{text}.")
         count = len(self._job.files)
         self.report({"INFO"}, f"Files written: {count}, in {self._job.out}")
 

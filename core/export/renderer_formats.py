@@ -11,8 +11,8 @@ from .losses import Loss
 from .subject import Subject
 
 SPECTRAL = (
-    "The spectra reproduce the RGB colours under daylight (D65). Under other light the colours are "
-    "a guess."
+    "the spectra reproduce the RGB colours under daylight (D65); under other light the colours are "
+    "a guess"
 )
 
 

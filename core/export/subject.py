@@ -54,6 +54,6 @@ class Subject:
         if self.material.scale_known:
             return ()
         return (
-            "The strength of the light is unknown. The absolute level of the BRDF is therefore "
-            f"arbitrary (it was multiplied by {self.material.scale:.4g}).",
+            "the irradiance of the lights is unknown, so the absolute level of the BRDF is "
+            f"arbitrary (it was multiplied by {self.material.scale:.4g})",
         )
