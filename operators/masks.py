@@ -118,7 +118,7 @@ class PATINA_OT_shadow_masks(_CaptureJob, bpy.types.Operator):
 excluded from the fit"""
 
     bl_idname = "patina.shadow_masks"
-    bl_label = "Shadow Masks"
+    bl_label = "Compute Shadow Masks"
     bl_options = {"REGISTER", "UNDO"}
 
     replace: bpy.props.BoolProperty(  # type: ignore[valid-type]

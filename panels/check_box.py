@@ -24,7 +24,7 @@ def draw_check(
     switch off.
     """
     base, extended = diagnosis["baseline"], diagnosis["extended"]
-    errors = [("Held-out regions, RMS", base["held_out"], extended["held_out"])]
+    errors = [("Held-out regions, RMS error", base["held_out"], extended["held_out"])]
     for material in diagnosis["materials"]:  # diagnoses by earlier versions have no typical errors
         errors.append(
             (material["name"], material.get("typical_before"), material.get("typical_after"))
@@ -43,7 +43,7 @@ def draw_check(
     for cause in ranked[:MAX_CAUSES]:
         box = layout.box()
         row = box.row()
-        label = cause["cause"].replace("_", " ")
+        label = cause["cause"].replace("_", " ").title()
         switch = causes.get(cause["cause"])
         if switch is not None and cause["accepted"]:
             row.prop(switch, "use", text="")

@@ -14,7 +14,7 @@ from ..scene.session.lengths import length
 from ..scene.session.scene_properties import stored_result
 
 ICONS = {DISTANT: "LIGHT_SUN", NEAR: "LIGHT_POINT", MOUNTED: "LIGHT_SPOT"}
-KINDS = {DISTANT: "Distant lamp", NEAR: "Near lamp", MOUNTED: "Flash"}
+KINDS = {DISTANT: "Distant Lamp", NEAR: "Near Lamp", MOUNTED: "Flash"}
 
 
 def draw_lamp(layout: bpy.types.UILayout, scene: bpy.types.Scene, camera: bpy.types.Object) -> None:

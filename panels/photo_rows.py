@@ -65,4 +65,4 @@ def draw_photos(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     column.prop(state, "mesh_over", slider=True)
     column.prop(state, "view_exposure", slider=True)
     if photo.exposure:
-        column.label(text=f"Exposure {photo.exposure:.4g}")
+        column.label(text=f"Exposure: {photo.exposure:.4g}")

@@ -47,7 +47,7 @@ class PatinaPreferences(bpy.types.AddonPreferences):
         default=DEFAULTS.cache_size,
     )
     silhouette: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Margin at Silhouettes",
+        name="Margin at Outlines",
         description="Width in pixels that is excluded along outlines of the mesh. "
         f"{OVERRIDE_NOTE} (silhouette_margin)",
         default=DEFAULTS.silhouette,

@@ -164,10 +164,10 @@ def test_the_panel_says_what_was_done_by_hand() -> None:
         box.draw_lamp(lines, scene, scene.camera)
         return lines.said
 
-    assert drawn() == ["Near lamp: lamp"]
+    assert drawn() == ["Near Lamp: lamp"]
     lamp("lamp").location.x += 1
     lamp("lamp").data.energy *= 2
-    assert drawn() == ["Near lamp: lamp", "Position, strength edited", "patina.save_lights"]
+    assert drawn() == ["Near Lamp: lamp", "Position, strength edited", "patina.save_lights"]
     bpy.ops.patina.next_photo(step=-1)
     assert drawn() == ["Flash: flash"]
     lights = [
