@@ -54,17 +54,20 @@ class Target:
         return cls(where, scale, scale * np.cbrt(np.maximum(rho, 0) * where.cos_i[:, None]))
 
     def residual(self, f: Array) -> Array:
-        """(n, 3) residual of a model with reflectance f (n, 3) in 1/sr at ``where``."""
+        """(n, 3) weighted difference of cube roots, ∛(f cosθi) − ∛(ρ cosθi), of a model with
+        reflectance f (n, 3) in 1/sr at ``where``."""
         return self.weight * np.cbrt(f * self.where.cos_i[:, None]) - self.root
 
     def residual_and_slopes(self, f: Array, slopes: Array) -> tuple[Array, Array]:
-        """The residual and its derivatives (k, n, 3), from df (k, n, 3)."""
+        """The residual (n, 3) and its derivatives (k, n, 3) by the k parameters of the model.
+        slopes: (k, n, 3) derivatives of f."""
         cosine = np.cbrt(self.where.cos_i)[:, None]
         by_f = self.weight * cosine / (3 * np.maximum(f, DARK) ** (2 / 3))
         return self.residual(f), slopes * by_f
 
     def error(self, f: Array) -> float:
-        """‖∛(f cosθi) − ∛(ρ cosθi)‖ / ‖∛(ρ cosθi)‖."""
+        """Relative cube-root error ‖∛(f cosθi) − ∛(ρ cosθi)‖ / ‖∛(ρ cosθi)‖ of a model with
+        reflectance f (n, 3)."""
         length = max(float(np.linalg.norm(self.root)), 1e-12)
         return float(np.linalg.norm(self.residual(f)) / length)
 

@@ -29,7 +29,8 @@ class MaterialBRDFs:
 
     @classmethod
     def of(cls, brdfs: Sequence[PrincipalBRDF]) -> MaterialBRDFs:
-        """Fitted BRDFs of one basis, with a little slack."""
+        """The given BRDFs, all in one basis, with additional components for a small deviation from
+        the basis (slack)."""
         basis = brdfs[0].basis
         variance = basis_slack.variances(basis, basis_slack.DEFAULT_SCALE)
         coefficients = np.zeros((len(brdfs), 3, len(variance)))
@@ -39,12 +40,13 @@ class MaterialBRDFs:
 
     @classmethod
     def without_slack(cls, brdf: PrincipalBRDF) -> MaterialBRDFs:
-        """One BRDF for prediction only; it cannot be fitted."""
+        """A single BRDF without slack, for predictions. Its prior variances are 0, so it cannot be
+        fitted."""
         variance = np.zeros(brdf.coefficients.shape[1])
         return cls(brdf.basis, brdf.coefficients[None], variance)
 
     def tight(self) -> MaterialBRDFs:
-        """The same BRDFs with nearly no slack, whose coefficients are set to 0."""
+        """The same BRDFs with almost no slack; the coefficients of the slack are set to 0."""
         variance = self.variance.copy()
         variance[-basis_slack.COUNT :] = basis_slack.TIGHT_SCALE**2
         coefficients = self.coefficients.copy()
@@ -53,7 +55,7 @@ class MaterialBRDFs:
 
     @cached_property
     def tables(self) -> tuple[LogTable, ...]:
-        """One for each material."""
+        """A table of logarithms for each material."""
         return tuple(LogTable.of(self.basis, c) for c in self.coefficients)
 
     def evaluate(self, angles: Angles, material: NDArray[np.integer]) -> Array:
@@ -70,7 +72,7 @@ class MaterialBRDFs:
         return self.evaluate(state.angles, state.pixels.material) * state.received
 
     def log_derivative(self, state: ShadingState) -> Array:
-        """(n, 3) ∂ radiance/∂ ln(ρ·cosMap + ε)."""
+        """(n, 3) derivative of the reflected radiance by ln(ρ·cosMap + ε)."""
         return self.reflected(state) + _offset(state)
 
     def reflected_with_derivative(self, state: ShadingState) -> Array:
@@ -79,7 +81,8 @@ class MaterialBRDFs:
         return np.concatenate([reflected, reflected + _offset(state)], axis=1)
 
     def rows(self, angles: Angles) -> Array:
-        """Q̂ (n, k): ∂ρ/∂c = (ρ + ε / cosMap) Q̂."""
+        """(n, k) rows Q̂ of the basis. The derivative of ρ by the coefficients is
+        (ρ + ε / cosMap) Q̂."""
         return self.basis.rows(angles, self.coefficients.shape[2])[1]
 
 

@@ -35,16 +35,16 @@ class OrthographicLens:
 
     @property
     def principal_point_x(self) -> float:
-        """Pixels."""
+        """Column of the pixel that the z axis meets, pixels."""
         return self.cx
 
     @property
     def principal_point_y(self) -> float:
-        """Pixels."""
+        """Row of the pixel that the z axis meets, pixels."""
         return self.cy
 
     def is_undistorted(self) -> bool:
-        """Always."""
+        """True: an orthographic lens has no distortion."""
         return True
 
     def img_from_cam(self, cam_points: Array) -> Array:
@@ -53,13 +53,13 @@ class OrthographicLens:
         return np.stack([self.scale_x * x + self.cx, self.scale_y * y + self.cy], axis=1)
 
     def cam_ray_from_img(self, image_points: Array) -> Array:
-        """Directions (n, 3): z for all pixels."""
+        """Ray directions (n, 3) of pixels (n, 2): the z axis for all of them."""
         return np.tile((0.0, 0.0, 1.0), (len(image_points), 1))
 
     def cam_from_img(self, image_points: Array) -> Array:
-        """(n, 2): X and Y of pixels (n, 2), scan units."""
+        """(n, 2) coordinates X and Y of the points that pixels (n, 2) show, scan units."""
         return (image_points - (self.cx, self.cy)) / (self.scale_x, self.scale_y)
 
     def starts(self, image_points: Array) -> Array:
-        """(n, 3) points on the plane z = 0 of the pixels (n, 2)."""
+        """(n, 3) start points of the rays of pixels (n, 2), on the plane z = 0."""
         return np.c_[self.cam_from_img(image_points), np.zeros(len(image_points))]
