@@ -70,7 +70,7 @@ class Trial:
         return significant and (self.change > MIN_RELATIVE_CHANGE or large) and relevant
 
     def sentence(self) -> str:
-        """The description of the effect, and the photos that would decide between its ties."""
+        """The effect in words, and the photos that would decide between it and its ties."""
         meaning = self.effect.sentence(self.identified, self.standard_errors)
         if not self.ties:
             return meaning
