@@ -244,7 +244,7 @@ def test_a_result_of_another_capture_is_refused(painted):
     text = (painted / "painted.capture.toml").read_text()
     other = painted / "other.capture.toml"
     other.write_text(text + '\n[[material]]\nname = "gold"\n')
-    with pytest.raises(InputError, match=r"no material 'gold'.*surface"):
+    with pytest.raises(InputError, match=r"materials surface; expected 'gold'"):
         made(painted, "other.capture.toml")
 
 
