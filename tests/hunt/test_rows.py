@@ -12,11 +12,17 @@ import pytest
 pytest.importorskip("bpy")
 pytestmark = pytest.mark.blender
 
+from patina.core.diagnose.effects import EFFECTS  # noqa: E402
 from tests.make_lit_ball import lit_ball  # noqa: E402
 from tools.hunt import judged, table  # noqa: E402
 from tools.hunt.judged import Row  # noqa: E402
+from tools.hunt.make import MAKERS  # noqa: E402
 
 ROW = Row("area_light", 0.01, 1, 0.01, ("area_light",), (), 5.0, 1.1, 0.3, (0.2,), (1.0, 1.0))
+
+
+def test_every_cause_can_be_hidden_in_photos():
+    assert set(MAKERS) == {kind.cause for kind in EFFECTS}
 
 
 def test_nearness_of_a_light_is_defined_as_in_the_diagnosis():
