@@ -1,4 +1,4 @@
-"""What the tests in Blender share: the extension as it is installed, and how to skip."""
+"""Shared helpers of the tests in Blender: the installed extension, and how to skip a test."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 class Skip(Exception):
-    """Raised by a test that cannot say anything on this Blender; the message says why."""
+    """Raised by a test that cannot run on this Blender; the message says why."""
 
 
 def installed() -> bool:
@@ -42,7 +42,7 @@ def extension(inside: str = "") -> ModuleType:
 
 
 def without_window(operator: type, **properties: object):
-    """An operator's own code, begun, without a window that called it. told: what it reported."""
+    """An operator's own generator, started without a window that called it. told: its reports."""
     import bpy
 
     plain = tuple(kind for kind in operator.__bases__ if not issubclass(kind, bpy.types.Operator))

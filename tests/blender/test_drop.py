@@ -1,4 +1,4 @@
-"""Files dropped onto a viewport: which operator takes them, and what it makes of them."""
+"""Files dropped onto a viewport: which operator accepts them, and what it creates."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def handlers() -> dict[str, type]:
 
 
 def drop(*names: str) -> str:
-    """The operator that Blender would call for files of these names, over a viewport."""
+    """The operator that Blender would call for files of these names, dropped over a viewport."""
     suffixes = {"." + name.rpartition(".")[2].lower() for name in names}
     fits = [cls for cls in handlers().values() if suffixes & set(cls.bl_file_extensions.split(";"))]
     assert len(fits) == 1, (names, fits)
@@ -38,7 +38,7 @@ def files(*names: str) -> list[dict[str, str]]:
     return [{"name": name} for name in names]
 
 
-def refused(operator, **told) -> str:
+def error_message(operator, **told) -> str:
     try:
         operator(**told)
     except RuntimeError as error:
@@ -47,14 +47,14 @@ def refused(operator, **told) -> str:
     raise AssertionError("it was taken")
 
 
-def test_each_kind_of_file_has_one_operator() -> None:
+def test_each_file_type_has_one_operator() -> None:
     assert drop("ball.capture.toml") == "patina.import_capture"
     for name in ("cameras.xml", "cameras.bin", "images.txt", "a.psx", "transforms.json"):
         assert drop(name) == "patina.new_capture"
     assert drop("a.jpg", "b.CR2", "c.exr", "d.png") == "patina.drop_photos"
 
 
-def test_only_a_viewport_takes_them() -> None:
+def test_only_viewports_accept_drops() -> None:
     class Area:
         def __init__(self, kind: str) -> None:
             self.type = kind
@@ -68,7 +68,7 @@ def test_only_a_viewport_takes_them() -> None:
         assert not cls.poll_drop(Context(Area("TEXT_EDITOR"))) and not cls.poll_drop(Context(None))
 
 
-def test_handlers_come_and_go() -> None:
+def test_handlers_are_registered_and_removed() -> None:
     module = extension()
     assert len(handlers()) == 3
     names = set(handlers())
@@ -80,8 +80,8 @@ def test_handlers_come_and_go() -> None:
         module.register()
 
 
-def test_cameras_and_photos_become_a_capture() -> None:
-    """A COLMAP file, the photos of a folder: the capture says what was measured by hand."""
+def test_cameras_and_photos_become_capture() -> None:
+    """A COLMAP file and a folder of photos: the capture contains the values measured by hand."""
     scan = a_scan()
     told = {
         "cameras": str(scan / "sparse" / "cameras.bin"),
@@ -122,7 +122,7 @@ def test_every_light_is_read_back() -> None:
     ]  # fmt: skip
 
 
-def test_cameras_alone_come_in_as_cameras() -> None:
+def test_cameras_alone_are_imported_as_cameras() -> None:
     scan = a_scan()
     cameras = str(scan / "sparse" / "images.bin")
     assert bpy.ops.patina.new_capture(filepath=cameras) == {"FINISHED"}
@@ -130,22 +130,22 @@ def test_cameras_alone_come_in_as_cameras() -> None:
     assert not list(scan.glob("*.toml")) and not bpy.context.scene.patina.capture
 
 
-def test_what_cannot_become_a_capture_says_why_and_leaves_nothing() -> None:
+def test_invalid_drop_reports_reason_and_leaves_nothing() -> None:
     scan = a_scan()
     (scan / "lit" / "other.exr").write_bytes((scan / "lit" / "view_01.exr").read_bytes())
     operator, before = bpy.ops.patina.new_capture, counts()
     told = {"cameras": str(scan / "sparse"), "directory": str(scan / "lit")}
-    assert "other.exr" in refused(operator, **told, files=files("view_01.exr", "other.exr"))
-    assert "expected one" in refused(operator, directory=told["directory"])
+    assert "other.exr" in error_message(operator, **told, files=files("view_01.exr", "other.exr"))
+    assert "expected one" in error_message(operator, directory=told["directory"])
     (scan / "second.ply").write_bytes((scan / "mesh.ply").read_bytes())
-    assert "mesh" in refused(operator, **told, files=files("view_01.exr"))
+    assert "mesh" in error_message(operator, **told, files=files("view_01.exr"))
     (scan / "lit" / "view_02.exr").write_bytes(b"damaged")
     mesh = str(scan / "mesh.ply")
-    assert "view_02.exr" in refused(operator, **told, mesh=mesh, files=files("view_02.exr"))
+    assert "view_02.exr" in error_message(operator, **told, mesh=mesh, files=files("view_02.exr"))
     assert not list(scan.glob("*.toml*")) and counts() == before
 
 
-def test_photos_change_nothing_until_somebody_says_what_they_are() -> None:
+def test_dropped_photos_change_nothing_until_confirmed() -> None:
     scan = a_scan()
     told = {"directory": str(scan / "lit"), "files": files("view_01.exr", "view_02.exr")}
     path = made().make_capture(folder() / "open", photos=2)
@@ -156,7 +156,7 @@ def test_photos_change_nothing_until_somebody_says_what_they_are() -> None:
     assert len(bpy.context.scene.patina_photos.photos) == 2
 
 
-def test_photos_of_an_open_capture_become_another_one() -> None:
+def test_photos_dropped_on_open_capture_become_new_capture() -> None:
     path = made().make_capture(folder() / "ball", photos=3)
     lit = path.parent / "more"
     lit.mkdir()
@@ -172,7 +172,7 @@ def test_photos_of_an_open_capture_become_another_one() -> None:
 
     (lit / "other.exr").write_bytes((lit / "view_02.exr").read_bytes())
     told["files"] = files("other.exr")
-    assert "other.exr" in refused(bpy.ops.patina.drop_photos, **told)
+    assert "other.exr" in error_message(bpy.ops.patina.drop_photos, **told)
     state = extension("scene.session.running_job")
     state.set_running(state.Running(bpy.context.scene.name, "fit", "sampling", 0.5))
     try:

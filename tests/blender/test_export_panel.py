@@ -1,4 +1,4 @@
-"""The measured materials of the open .blend as files, with the operator of the sidebar."""
+"""The measured materials of the open .blend exported with the sidebar's operator."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from test_workflow import folder, made
 
 
 def measured():
-    """A capture in the scene, and what a fit would have left there: seconds instead of a minute."""
+    """A capture in the scene with the state that a fit would leave: seconds instead of a minute."""
     path = made().make_capture(folder() / "ball", photos=2)
     assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
     basis = extension("core.basis").default_basis()
@@ -45,7 +45,7 @@ def fitted():
     return path
 
 
-def refused(**told) -> str:
+def error_message(**told) -> str:
     try:
         bpy.ops.patina.export(**told)
     except RuntimeError as error:
@@ -54,16 +54,16 @@ def refused(**told) -> str:
     raise AssertionError("it was written")
 
 
-def test_nothing_measured_is_nothing_to_export() -> None:
+def test_nothing_to_export_without_measured_material() -> None:
     assert not bpy.ops.patina.export.poll()
     path = made().make_capture(folder() / "ball", photos=2)
     bpy.ops.patina.import_capture(filepath=str(path))
     assert not bpy.ops.patina.export.poll()
-    assert "fit the materials first" in refused(directory=str(folder()), formats={"binary"})
+    assert "fit the materials first" in error_message(directory=str(folder()), formats={"binary"})
 
 
-def test_tables_are_those_of_the_command() -> None:
-    """Written from the .blend, and by `fit` and `material`: the same bytes."""
+def test_tables_match_those_of_command_line() -> None:
+    """Written from the .blend and by `fit` and `material`: the same bytes."""
     measured()
     out = folder()
     told = {"directory": str(out), "folder": "mine", "formats": {"binary", "npz", "mtlx"}}
@@ -84,19 +84,19 @@ def test_tables_are_those_of_the_command() -> None:
         pass
     for name in names:
         ours, theirs = (out / which / name for which in ("mine", "command"))
-        if name.endswith(".npz"):  # archives hold the time
+        if name.endswith(".npz"):  # archives contain the time
             one, other = np.load(ours), np.load(theirs)
             assert all(np.array_equal(one[key], other[key]) for key in one.files)
         else:
             assert ours.read_bytes() == theirs.read_bytes(), name
 
 
-def test_the_mesh_goes_out_and_the_open_file_stays() -> None:
-    """glTF and assets are written by another Blender: nothing here is opened, saved or lost."""
+def test_mesh_export_leaves_open_file_unchanged() -> None:
+    """A second Blender writes glTF and assets: the open file is neither saved nor replaced."""
     measured()
     scene, mesh = bpy.context.scene, bpy.context.scene.patina.mesh
     mesh["unsaved"] = 7
-    mesh.hide_set(True)  # exporters take only what is seen
+    mesh.hide_set(True)  # exporters take only visible objects
     before = bpy.data.filepath, sorted(o.name for o in scene.objects)
     out = folder()
     told = {"directory": str(out), "folder": "a", "formats": {"gltf", "blend", "binary"}}
@@ -117,7 +117,7 @@ def test_the_mesh_goes_out_and_the_open_file_stays() -> None:
     assert bpy.data.materials["surface"].asset_data is not None
 
 
-def test_without_its_mesh_the_material_goes_out_on_a_sphere() -> None:
+def test_material_without_mesh_is_exported_on_sphere() -> None:
     measured()
     bpy.data.objects.remove(bpy.context.scene.patina.mesh)
     out = folder()
@@ -125,7 +125,7 @@ def test_without_its_mesh_the_material_goes_out_on_a_sphere() -> None:
     assert (out / "a" / "materials.glb").is_file() and not (out / "a" / "scan.glb").exists()
 
 
-def test_the_report_lives_as_long_as_the_fit() -> None:
+def test_report_is_available_as_long_as_fit() -> None:
     path, out = fitted(), folder()
     choice, scene = extension("scene.export.export_choice"), bpy.context.scene
     assert choice.missing(scene, "report") is None
@@ -140,7 +140,7 @@ def test_the_report_lives_as_long_as_the_fit() -> None:
     said, kept = json.loads(text.as_string()), text.as_string()
     said["materials"][0]["coefficients"][0][0] += 0.01
     text.clear()
-    text.write(json.dumps(said))  # as after an undo: the .blend tells of another fit
+    text.write(json.dumps(said))  # as after an undo: the .blend belongs to another fit
     assert choice.missing(scene, "report") is not None
     text.clear()
     text.write(kept)
@@ -151,24 +151,24 @@ def test_the_report_lives_as_long_as_the_fit() -> None:
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     assert "fit again" in choice.missing(bpy.context.scene, "report")
     told["folder"] = "b"
-    assert "fit again" in refused(**told) and not (out / "b").exists()
+    assert "fit again" in error_message(**told) and not (out / "b").exists()
     told["formats"] = {"record"}
     assert bpy.ops.patina.export(**told) == {"FINISHED"}
 
 
-def test_a_folder_with_other_files_is_left_alone() -> None:
+def test_folder_with_other_files_is_not_overwritten() -> None:
     path = measured()
     mine = path.parent / "surface.binary"
     mine.write_bytes(b"mine")
     told = {"directory": str(path.parent.parent), "folder": "ball", "formats": {"binary"}}
-    assert "not from an earlier export" in refused(**told) and mine.read_bytes() == b"mine"
+    assert "not from an earlier export" in error_message(**told) and mine.read_bytes() == b"mine"
     told["folder"] = ""
     for _ in range(2):  # again: replaced
         assert bpy.ops.patina.export(**told) == {"FINISHED"}
     assert (path.parent.parent / "ball export" / "surface.binary").stat().st_size > 1e6
 
 
-def test_the_choice_of_the_panel_is_taken_where_none_is_told() -> None:
+def test_formats_of_panel_are_default() -> None:
     measured()
     state, out = bpy.context.scene.patina_export, folder()
     assert state.formats == {"gltf"}
@@ -176,10 +176,10 @@ def test_the_choice_of_the_panel_is_taken_where_none_is_told() -> None:
     bpy.ops.patina.export(directory=str(out), folder="a")
     assert (out / "a" / "surface_table.exr").is_file()
     state.formats = set()
-    assert "at least one format" in refused(directory=str(out), folder="b")
+    assert "at least one format" in error_message(directory=str(out), folder="b")
 
 
-def test_a_second_blender_that_fails_is_one_line() -> None:
+def test_failure_of_second_blender_is_one_line() -> None:
     background = extension("scene.session.background_blender")
     errors = extension("core.errors")
     for words, said in (
@@ -195,7 +195,7 @@ def test_a_second_blender_that_fails_is_one_line() -> None:
             raise AssertionError("it went well")
 
 
-def test_a_dropped_export_leaves_nothing() -> None:
+def test_abandoned_export_leaves_no_files() -> None:
     measured()
     out = folder()
     export = extension("scene.export.export_job")
@@ -207,16 +207,16 @@ def test_a_dropped_export_leaves_nothing() -> None:
     assert list(out.iterdir()) == []
 
 
-def test_a_choice_of_formats_is_a_preset() -> None:
-    chosen, name = bpy.context.scene.patina_export, "patina test of presets"
-    chosen.formats = {"usd", "binary"}
+def test_selected_formats_can_be_saved_as_preset() -> None:
+    preset_formats, name = bpy.context.scene.patina_export, "patina test of presets"
+    preset_formats.formats = {"usd", "binary"}
     assert bpy.ops.patina.add_export_preset(name=name) == {"FINISHED"}
     folders = bpy.utils.preset_paths("patina/export")
     file = next(f for f in Path(folders[-1]).glob("*.py") if "test_of_presets" in f.name)
     try:
-        chosen.formats = {"gltf"}
+        preset_formats.formats = {"gltf"}
         bpy.ops.script.execute_preset(filepath=str(file), menu_idname="PATINA_PT_export_presets")
-        assert chosen.formats == {"usd", "binary"}
+        assert preset_formats.formats == {"usd", "binary"}
     finally:
         file.unlink()
     for operator in ("new_capture", "solve_photos"):

@@ -1,5 +1,6 @@
-"""A .blend that names files of its choice: opened without scripts and saved, it writes none of
-them."""
+"""A hostile .blend that names files of its choice: when it is opened without scripts and saved,
+none of them is written.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +33,7 @@ def exr(place: Path) -> bytes:
 
 
 def material(name: str, **names: object) -> bpy.types.Material:
-    """A material with these file names, and a shader whose files are nowhere."""
+    """A material with these file names, and a shader whose files do not exist."""
     made = bpy.data.materials.new(name)
     made.use_fake_user = True
     for key, value in names.items():
@@ -56,7 +57,7 @@ def files(place: Path) -> dict[str, bytes]:
 
 
 def hostile() -> tuple[Path, Path, bytes]:
-    """(folder of everything, the .blend, the valid EXR); its neighbours are what it aims at."""
+    """(folder of everything, the .blend, the valid EXR); the files around it are its targets."""
     place = folder()
     inner = place / "a" / "b"
     inner.mkdir(parents=True)
@@ -77,7 +78,7 @@ def hostile() -> tuple[Path, Path, bytes]:
         packed(name, data)
         material(label, components=name)
         material(f"{label}, the other properties", remainder=name, measured_sampling=name)
-    material("zero", components=7)  # the last: what handles it may fail
+    material("zero", components=7)  # the last one: its handler may fail
     packed(NOT_EXR, b"import os\n")
     material("not an EXR", remainder=NOT_EXR)
     for name in (LINKED, LINKED_PART):
@@ -88,18 +89,18 @@ def hostile() -> tuple[Path, Path, bytes]:
     broken = material("broken json")
     broken["patina_as_measured"] = '{"solid": 5'
     blend = inner / "hostile.blend"
-    with Unwatched():
+    with WithoutHandlers():
         bpy.ops.wm.save_as_mainfile(filepath=str(blend))
     for link in (LINKED, LINKED_PART + ".part"):
         try:
             os.symlink(place / "victim.txt", inner / link)
-        except OSError as error:  # Windows without the right to make links
+        except OSError as error:  # Windows without the permission to make links
             raise Skip(f"no symbolic links here: {error}") from error
     return place, blend, data
 
 
-class Unwatched:
-    """Without the extension's handlers, as on the machine of whoever made the .blend."""
+class WithoutHandlers:
+    """Without the extension's handlers, as on the machine of the .blend's author."""
 
     def __enter__(self) -> None:
         extension("scene.material.osl_files").unregister()
@@ -112,7 +113,7 @@ def opened(blend: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(blend), use_scripts=False)
 
 
-def test_a_hostile_blend_writes_nothing_outside() -> None:
+def test_hostile_blend_writes_no_file_outside() -> None:
     place, blend, data = hostile()
     own = extension("scene.session.folders").own_folder()
     before, own_before = files(place), set(own.rglob("*"))
@@ -127,7 +128,7 @@ def test_a_hostile_blend_writes_nothing_outside() -> None:
     assert (place / "victim.txt").read_bytes() == b"before"
 
 
-def test_the_valid_file_is_restored_on_load() -> None:
+def test_valid_file_is_restored_on_load() -> None:
     _, blend, data = hostile()
     opened(blend)
     material = bpy.data.materials["good"]
@@ -139,7 +140,7 @@ def test_the_valid_file_is_restored_on_load() -> None:
     assert "up" in osl_files.restore() and sockets["sampling"].default_value.startswith("/nowhere")
 
 
-def test_refusals_say_what_was_found_and_what_to_do() -> None:
+def test_rejections_say_what_was_found_and_what_to_do() -> None:
     _, blend, _ = hostile()
     told: list[str] = []
     handler = logging.Handler()
@@ -156,7 +157,7 @@ def test_refusals_say_what_was_found_and_what_to_do() -> None:
         assert found in text, (found, text)
 
 
-def test_a_damaged_property_does_not_stop_the_handlers() -> None:
+def test_damaged_property_does_not_stop_handlers() -> None:
     _, blend, _ = hostile()
     opened(blend)
     parts = extension("scene.material.measured_nodes")
@@ -169,7 +170,7 @@ def test_a_damaged_property_does_not_stop_the_handlers() -> None:
         assert material.get("patina_sampling") != "../../evil.pth"
 
 
-def test_values_put_back_lead_to_no_other_file() -> None:
+def test_restored_values_refer_to_no_other_file() -> None:
     _, blend, _ = hostile()
     opened(blend)
     parts, files = extension("scene.material.measured_nodes"), extension("scene.material.osl_files")
@@ -184,7 +185,7 @@ def test_values_put_back_lead_to_no_other_file() -> None:
     assert sockets["sampling"].default_value == "/nowhere/at/all.exr"
 
 
-def test_a_mask_of_no_known_kind_becomes_no_file_name() -> None:
+def test_mask_of_unknown_kind_gives_no_file_name() -> None:
     masks = extension("scene.paint.mask_images")
     for kind in ("shadow", "x/../../../evil", "..\\evil", 5):
         image = bpy.data.images.new(f"mask {kind}", 2, 2)
@@ -192,7 +193,7 @@ def test_a_mask_of_no_known_kind_becomes_no_file_name() -> None:
     assert set(masks.mask_images("a.toml")) == {(0, "shadow")}
 
 
-def test_a_network_path_is_not_looked_at() -> None:
+def test_network_path_is_not_accessed() -> None:
     trusted = extension("scene.material.osl_files").is_trusted_path
     place = folder()
     (place / VALID).write_bytes(exr(place))

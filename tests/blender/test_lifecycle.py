@@ -1,4 +1,4 @@
-"""The extension comes and goes without a trace, and brings its libraries with it."""
+"""The extension registers and unregisters without leftovers, and brings its own libraries."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def operators() -> set[str]:
 
 
 def handlers() -> set[str]:
-    """Every function that Blender calls on its own, as "list: module.name"."""
+    """Every function that Blender calls by itself, as "list: module.name"."""
     return {
         f"{name}: {function.__module__}.{function.__qualname__}"
         for name in dir(bpy.app.handlers)
@@ -49,7 +49,7 @@ def drawn() -> set[str]:
 
 
 def timers() -> set[str]:
-    """Every function of ours that a timer would still call."""
+    """Every function of the extension that a timer would still call."""
     package = extension().__name__
     return {
         f"{name}.{key}"
@@ -68,7 +68,7 @@ def keys() -> set[str]:
 
 
 def translated() -> set[str]:
-    """The extension's own name, if it has translations registered: Blender takes a name once."""
+    """The extension's own name, if it has registered translations: Blender accepts a name once."""
     package = extension().__name__
     try:
         bpy.app.translations.register(package, {})
@@ -91,18 +91,18 @@ PLACES = {
 
 
 def traces() -> dict[str, set[str]]:
-    """Everything an add-on can leave behind in Blender."""
+    """Everything that an add-on can leave in Blender."""
     return {place: look() for place, look in PLACES.items()}
 
 
-def test_registered() -> None:
+def test_extension_is_registered() -> None:
     if not installed():
         raise Skip("no zip is installed here")
     assert addon_utils.check(INSTALLED)[1]
     assert ROOT not in Path(extension().__file__).parents, "this is the checkout, not the zip"
 
 
-def test_zip_holds_only_what_ships() -> None:
+def test_zip_contains_only_shipped_files() -> None:
     if not installed():
         raise Skip("no zip is installed here")
     inside = {path.name for path in Path(extension().__file__).parent.iterdir()}
@@ -111,7 +111,7 @@ def test_zip_holds_only_what_ships() -> None:
     assert {"core", "LICENSE", "blender_manifest.toml"} <= inside
 
 
-def test_libraries_are_those_of_the_zip() -> None:
+def test_libraries_are_loaded_from_zip() -> None:
     if not installed():
         raise Skip("no zip is installed here")
     for name in LIBRARIES:
@@ -119,7 +119,7 @@ def test_libraries_are_those_of_the_zip() -> None:
         assert f"{Path('extensions') / '.local'}" in path, f"{name} is {path}"
 
 
-def test_numpy_is_blenders() -> None:
+def test_numpy_is_that_of_blender() -> None:
     numpy = importlib.import_module("numpy")
     assert ".local" not in Path(numpy.__file__).parts, numpy.__file__
 
@@ -144,7 +144,7 @@ def test_libraries_work() -> None:
     assert image.get_pixels().shape == (2, 2, 3)
 
 
-def test_exr_files_pass_between_us_and_blender() -> None:
+def test_exr_exchange_with_blender() -> None:
     """Two copies of the OpenEXR code, Blender's and that in our OpenImageIO, in one process."""
     import numpy as np
     import OpenImageIO
@@ -164,7 +164,7 @@ def test_exr_files_pass_between_us_and_blender() -> None:
         assert np.array_equal(OpenImageIO.ImageBuf(path).get_pixels(), wanted)
 
 
-def test_comes_and_goes_without_a_trace() -> None:
+def test_register_and_unregister_leave_no_traces() -> None:
     module = extension()
     module.unregister()
     try:
@@ -182,8 +182,8 @@ def test_comes_and_goes_without_a_trace() -> None:
         module.register()
 
 
-def test_twenty_files_leave_nothing() -> None:
-    """A file with a capture in it and one without, by turns: nothing piles up, nothing stays."""
+def test_loading_twenty_files_leaves_no_leftovers() -> None:
+    """Alternately a file with a capture and one without: nothing accumulates, nothing remains."""
     from test_workflow import folder, made
 
     kinds = ("objects", "cameras", "lights", "images", "collections", "texts", "materials")
@@ -212,7 +212,7 @@ def test_twenty_files_leave_nothing() -> None:
 
 
 def test_disabled_and_enabled_in_preferences() -> None:
-    """As the user does it; Blender removes and unpacks the libraries again meanwhile."""
+    """As the user does it; meanwhile Blender removes and unpacks the libraries again."""
     if not installed():
         raise Skip("no zip is installed here")
 

@@ -1,4 +1,4 @@
-"""Lamps as an artist uses them: stepped through, dragged, undone, fitted with, saved."""
+"""Lamps as a user handles them: stepped through, dragged, undone, fitted with, saved."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ import numpy as np
 from support import extension
 from test_workflow import folder, made
 
-PLACE = np.array([1.9, 0.4, 2.6])  # where the lamp really was
+PLACE = np.array([1.9, 0.4, 2.6])  # true position of the lamp
 INTENSITY = 20.0
 
 
 def lit_by_a_lamp(offset: tuple[float, float, float] = (0.0, 0.0, 0.0), photos: int = 3) -> Path:
-    """A capture whose photos were lit by a near lamp (a flash in the last one); its file says the
-    lamp stood ``offset`` away from where it was."""
+    """A capture whose photos were lit by a near lamp (a flash in the last one); its file states a
+    lamp position that is wrong by ``offset``.
+    """
     path = made().make_capture(
         folder() / "ball", photos=photos, extra="[fit]\nheld_out = false\ntrials = 1"
     )
@@ -49,11 +50,11 @@ intensity = [20.0, 20.0, 20.0]
 
 
 def lamp(name: str) -> bpy.types.Object:
-    things = bpy.context.scene.objects
-    return next(o for o in things if o.type == "LIGHT" and o.get("patina_light") == name)
+    objects = bpy.context.scene.objects
+    return next(o for o in objects if o.type == "LIGHT" and o.get("patina_light") == name)
 
 
-def test_the_flash_goes_with_the_camera() -> None:
+def test_flash_moves_with_camera() -> None:
     path = lit_by_a_lamp()
     assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
     scene = bpy.context.scene
@@ -70,8 +71,8 @@ def test_the_flash_goes_with_the_camera() -> None:
             assert np.allclose(shining[0].matrix_world.translation, PLACE, atol=1e-5)
 
 
-def test_a_dragged_lamp_is_what_the_fit_uses() -> None:
-    """And what is undone is not."""
+def test_fit_uses_dragged_lamp() -> None:
+    """An undone drag is not used."""
     path = lit_by_a_lamp((0.9, -0.8, 0.5))
     bpy.ops.patina.import_capture(filepath=str(path))
     bpy.ops.ed.undo_push(message="before the drag")
@@ -91,7 +92,7 @@ def test_a_dragged_lamp_is_what_the_fit_uses() -> None:
     assert names == [] and now.lights[0] is capture.lights[0]
 
 
-def test_lights_are_saved_and_come_back() -> None:
+def test_lights_are_saved_and_restored() -> None:
     path = lit_by_a_lamp((0.9, -0.8, 0.5))
     bpy.ops.patina.import_capture(filepath=str(path))
     lamp("lamp").location = PLACE.tolist()
@@ -123,7 +124,7 @@ def test_lights_are_saved_and_come_back() -> None:
     assert np.allclose(lamp("lamp").location, PLACE, atol=1e-6)
 
 
-def test_a_dark_lamp_is_one_message() -> None:
+def test_lamp_without_power_is_one_message() -> None:
     bpy.ops.patina.import_capture(filepath=str(lit_by_a_lamp()))
     lamp("lamp").data.energy = 0.0
     try:
@@ -134,13 +135,13 @@ def test_a_dark_lamp_is_one_message() -> None:
         raise AssertionError("a lamp without light was fitted with")
 
 
-class Lines:
-    """What a panel writes."""
+class LayoutRecorder:
+    """Records what a panel draws."""
 
     def __init__(self) -> None:
         self.said: list[str] = []
 
-    def column(self, align: bool = False) -> Lines:
+    def column(self, align: bool = False) -> LayoutRecorder:
         return self
 
     def label(self, text: str = "", icon: str = "NONE") -> None:
@@ -154,13 +155,13 @@ class Lines:
         self.said.append(name)
 
 
-def test_the_panel_says_what_was_done_by_hand() -> None:
+def test_panel_lists_manual_changes() -> None:
     path = lit_by_a_lamp()
     bpy.ops.patina.import_capture(filepath=str(path))
     scene, box = bpy.context.scene, extension("panels.lamp_box")
 
     def drawn() -> list[str]:
-        lines = Lines()
+        lines = LayoutRecorder()
         box.draw_lamp(lines, scene, scene.camera)
         return lines.said
 

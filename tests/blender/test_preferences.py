@@ -1,4 +1,4 @@
-"""What the artist prefers, and that each preference changes something."""
+"""Preferences of the extension: each of them changes its behaviour."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from test_workflow import folder, made
 
 @contextmanager
 def preferred(**told: object) -> Iterator[object]:
-    """The extension's preferences with these changed; a checkout is given an entry for the time."""
+    """The extension's preferences with these changes; a checkout gets a temporary entry."""
     addons, package = bpy.context.preferences.addons, extension().__name__
     before = addons.get(package)
     entry = before
@@ -34,8 +34,8 @@ def preferred(**told: object) -> Iterator[object]:
             addons.remove(entry)
 
 
-class Silent:
-    """An operator that keeps what it reports."""
+class ReportRecorder:
+    """An operator stand-in that records its reports."""
 
     def __init__(self) -> None:
         self.said: list[str] = []
@@ -50,7 +50,7 @@ def imported(extra: str = ""):
     return path
 
 
-def test_without_an_entry_all_is_as_usual() -> None:
+def test_defaults_without_preferences_entry() -> None:
     read = extension("scene.session.preferences")
     with preferred():
         assert read.preferences() == read.Preferences()
@@ -58,25 +58,25 @@ def test_without_an_entry_all_is_as_usual() -> None:
     assert read.preferences() == read.Preferences()
 
 
-def test_margins_are_for_captures_that_do_not_say() -> None:
+def test_margins_apply_to_captures_without_own_margins() -> None:
     fit, margins = extension("operators.fit"), extension("core.samples").Margins
     scene = bpy.context.scene
     imported("[fit]\nshadow_margin = 9")
-    told, operator = {"silhouette": 5, "shadow": 6, "mask": 7, "cosine": 0.25}, Silent()
+    told, operator = {"silhouette": 5, "shadow": 6, "mask": 7, "cosine": 0.25}, ReportRecorder()
     with preferred(**told):
         job = fit.fit_job(operator, scene)
     assert job.capture.fit.margins == margins(silhouette=5, shadow=9, mask=7, cosine=0.25)
     assert any("silhouette 5" in said for said in operator.said)
-    assert fit.fit_job(Silent(), scene).capture.fit.margins == margins(shadow=9)
+    assert fit.fit_job(ReportRecorder(), scene).capture.fit.margins == margins(shadow=9)
 
 
-def test_wider_margins_leave_fewer_samples() -> None:
+def test_wider_margins_give_fewer_samples() -> None:
     fit = extension("operators.fit")
     imported("[fit]\nmethod = 'paper'\nheld_out = false\ntrials = 20")
     found = []
     for silhouette in (2, 8):
         with preferred(silhouette=silhouette):
-            job = fit.fit_job(Silent(), bpy.context.scene)
+            job = fit.fit_job(ReportRecorder(), bpy.context.scene)
         job.portable = False
         job.drain()
         found.append(job.result.materials[0].samples)
@@ -85,7 +85,7 @@ def test_wider_margins_leave_fewer_samples() -> None:
     assert found[1] < 0.9 * found[0], found
 
 
-def test_lengths_are_told_in_the_preferred_unit() -> None:
+def test_lengths_are_shown_in_preferred_unit() -> None:
     lengths, stages = extension("scene.session.lengths"), extension("scene.views.workflow_stages")
     imported()
     said = "2 % of it spreads over 0.02 scan units, so that 1.5e+02 scan units away"
@@ -101,7 +101,7 @@ def test_lengths_are_told_in_the_preferred_unit() -> None:
             assert near in lengths.with_lengths(said), lengths.with_lengths(said)
 
 
-def test_the_cache_folder_takes_what_has_no_place() -> None:
+def test_cache_folder_is_used_for_unsaved_files() -> None:
     folders, place = extension("scene.session.folders"), folder()
     usual = folders.own_folder(), folders.cache_folder()
     with preferred(cache_folder=str(place)):
@@ -117,7 +117,7 @@ def test_the_cache_folder_takes_what_has_no_place() -> None:
 
 
 def fill(place: Path) -> list[Path]:
-    """Files of every kind, oldest first, 1 MB each; the last two are none of the cache's."""
+    """Files of every kind, oldest first, 1 MB each; the last two do not belong to the cache."""
     names = (
         "files/patina_components_0123456789ab.exr",
         "files/rectified/ball-1/photo.exr",
@@ -134,7 +134,7 @@ def fill(place: Path) -> list[Path]:
     return [place / name for name in names]
 
 
-def test_the_cache_is_emptied_but_for_what_is_shown() -> None:
+def test_cache_is_cleared_except_files_in_use() -> None:
     place, cache = folder(), extension("scene.material.file_cache")
     with preferred(cache_folder=str(place)):
         assert not bpy.ops.patina.empty_cache.poll()
@@ -149,7 +149,7 @@ def test_the_cache_is_emptied_but_for_what_is_shown() -> None:
         assert not files[1].exists() and not bpy.ops.patina.empty_cache.poll()
 
 
-def test_beyond_its_size_the_oldest_goes_when_a_file_is_opened() -> None:
+def test_oldest_cache_files_are_removed_on_load() -> None:
     place = folder()
     blend = place / "x.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
@@ -162,8 +162,8 @@ def test_beyond_its_size_the_oldest_goes_when_a_file_is_opened() -> None:
         assert [p.exists() for p in files] == [False, False, True, True, True, True]
 
 
-def test_materials_are_fitted_in_a_basis_of_ones_own_files() -> None:
-    """Three made-up 'genuine' files stand for the hundred; the export finds the basis again."""
+def test_materials_are_fitted_with_user_basis() -> None:
+    """Three synthetic files stand in for the hundred genuine ones; the export finds the basis."""
     basis, brdf = extension("core.basis"), extension("core.brdf")
     merl, place, cache = extension("core.basis.merl_folder"), folder(), folder()
     default = basis.default_basis()

@@ -1,4 +1,6 @@
-"""The sidebar's stages say what is there and what to press; the list of photos shows each."""
+"""The sidebar's stages show what is present and what to do next; the list of photos shows each
+photo.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ from test_workflow import folder, made
 
 
 def two_from_one_place():
-    """Four photos of four cameras, and one more from the first camera under the second light."""
+    """Four photos of four cameras, and a fifth from the first camera under the second light."""
     path = made().make_capture(folder() / "ball", photos=4)
     text = path.read_text()
     camera, light = "lit_1.exr", text.split("[[photo]]")[2]
@@ -21,7 +23,7 @@ def two_from_one_place():
     return path
 
 
-def test_stages_follow_the_work() -> None:
+def test_stages_follow_progress() -> None:
     stages, scene = extension("scene.views.workflow_stages"), bpy.context.scene
     found = stages.stages(scene)
     assert list(found) == ["scan", "photos", "masks", "fit", "check", "material"]
@@ -44,8 +46,8 @@ def test_stages_follow_the_work() -> None:
             assert hasattr(getattr(bpy.ops, group), operator)
 
 
-def test_each_photo_is_looked_at_by_its_line() -> None:
-    """Two photos from one place: one camera, which shows the photo that is asked for."""
+def test_each_list_entry_shows_its_photo() -> None:
+    """Two photos from one viewpoint: one camera, which shows the selected photo."""
     path = two_from_one_place()
     assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
     scene = bpy.context.scene
@@ -76,7 +78,7 @@ def test_each_photo_is_looked_at_by_its_line() -> None:
     assert (behind.display_depth, behind.alpha) == ("BACK", 1.0)
 
 
-def test_a_photo_is_shown_brighter_for_looking_only() -> None:
+def test_display_exposure_does_not_change_photo() -> None:
     bpy.ops.patina.import_capture(filepath=str(two_from_one_place()))
     state = bpy.context.scene.patina_photos
     first, last = state.photos[0], state.photos[4]
@@ -103,7 +105,7 @@ def test_a_photo_is_shown_brighter_for_looking_only() -> None:
     assert len([i for i in bpy.data.images if "patina_exposed" in i]) == 1
 
 
-def test_the_list_survives_and_old_files_get_one() -> None:
+def test_photo_list_is_saved_and_old_files_get_one() -> None:
     path, blend = made().make_capture(folder() / "ball", photos=3), folder() / "list.blend"
     bpy.ops.patina.import_capture(filepath=str(path))
     bpy.context.scene.patina_photos.active = 1
@@ -112,7 +114,7 @@ def test_the_list_survives_and_old_files_get_one() -> None:
     state = bpy.context.scene.patina_photos
     names = [(p.name, p.camera.name, p.image.name, p.light) for p in state.photos]
     assert len(names) == 3 and state.active == 1
-    state.photos.clear()  # as a version without the list saved it
+    state.photos.clear()  # as saved by a version without the list
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     state = bpy.context.scene.patina_photos
@@ -120,7 +122,7 @@ def test_the_list_survives_and_old_files_get_one() -> None:
     assert state.active == 1
 
 
-def test_a_deleted_camera_is_passed_over() -> None:
+def test_deleted_camera_is_skipped() -> None:
     path = made().make_capture(folder() / "ball", photos=3)
     bpy.ops.patina.import_capture(filepath=str(path))
     scene, listed = bpy.context.scene, extension("scene.photos.photo_list")
@@ -128,11 +130,11 @@ def test_a_deleted_camera_is_passed_over() -> None:
     assert [p.name for p in listed.lit_photos(scene)] == ["lit_1.exr", "lit_3.exr"]
     bpy.ops.patina.next_photo()
     assert listed.looked_at(scene).name == "lit_3.exr"
-    scene.patina_photos.active = 1  # nothing to look at
+    scene.patina_photos.active = 1  # nothing to show
     assert listed.looked_at(scene) is None
 
 
-def test_time_left_is_told_in_round_numbers() -> None:
+def test_remaining_time_is_shown_rounded() -> None:
     state = extension("scene.session.running_job")
     for seconds, text in (
         (None, "x"),
@@ -143,7 +145,7 @@ def test_time_left_is_told_in_round_numbers() -> None:
         assert state.Running("s", "fit", "x", 0.5, seconds).text == text
 
 
-def test_a_measured_material_is_an_asset_that_knows_where_it_is_from() -> None:
+def test_measured_material_is_asset_with_provenance() -> None:
     path = made().make_capture(folder() / "ball", photos=3)
     bpy.ops.patina.import_capture(filepath=str(path))
     assert not bpy.ops.patina.mark_assets.poll()

@@ -1,4 +1,4 @@
-"""Operators on a window's timer, stepped by hand: what a tick costs, what ESC leaves behind."""
+"""Operators on a window's timer, stepped by hand: duration of a tick, and state after ESC."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ TIMER, ESC = SimpleNamespace(type="TIMER"), SimpleNamespace(type="ESC")
 MOUSE = SimpleNamespace(type="MOUSEMOVE")
 
 
-def of(module: str, name: str):
-    """Begun, and to be ticked."""
+def begun(module: str, name: str):
+    """Start the operator, to be ticked."""
     operator = getattr(extension(f"operators.{module}"), name)
     return without_window(operator, replace=False, count=0)
 
@@ -32,20 +32,20 @@ def ticked(operator) -> list[float]:
             return ticks
 
 
-def test_a_fit_by_the_timer_is_the_fit_of_a_script() -> None:
+def test_fit_by_timer_equals_fit_by_script() -> None:
     assert bpy.ops.patina.import_demo() == {"FINISHED"}
     running = extension("scene.session.running_job").running
-    ticks = ticked(of("fit", "PATINA_OT_fit"))
+    ticks = ticked(begun("fit", "PATINA_OT_fit"))
     measured = extension("scene.scan.apply_result").measured_materials
     stepped = {m.name: list(m["patina_coefficients"]) for m in measured()}
     assert running(bpy.context.scene) is None and stepped
-    # one step in a hundred may meet a busy machine
+    # one step in a hundred may be slow on a busy machine
     assert sorted(ticks)[int(0.99 * len(ticks)) - 1] < 0.1
     assert bpy.ops.patina.fit() == {"FINISHED"}
     assert {m.name: list(m["patina_coefficients"]) for m in measured()} == stepped
 
 
-def test_esc_leaves_the_file_as_it_was() -> None:
+def test_esc_leaves_file_unchanged() -> None:
     assert bpy.ops.patina.import_demo() == {"FINISHED"}
     before, running = counts(), extension("scene.session.running_job").running
     for module, name in (
@@ -53,7 +53,7 @@ def test_esc_leaves_the_file_as_it_was() -> None:
         ("masks", "PATINA_OT_propose_materials"),
         ("masks", "PATINA_OT_shadow_masks"),
     ):
-        operator = of(module, name)
+        operator = begun(module, name)
         for _ in range(10):
             time.sleep(operator.TICK)
             assert operator.modal(bpy.context, TIMER) == {"RUNNING_MODAL"}
@@ -65,9 +65,9 @@ def test_esc_leaves_the_file_as_it_was() -> None:
         assert running(bpy.context.scene) is None and counts() == before
 
 
-def test_no_event_passes_while_a_result_is_taken_over() -> None:
+def test_events_are_blocked_while_result_is_applied() -> None:
     assert bpy.ops.patina.import_demo() == {"FINISHED"}
-    operator = of("masks", "PATINA_OT_propose_materials")
+    operator = begun("masks", "PATINA_OT_propose_materials")
     while operator._applying is None:
         time.sleep(operator.TICK)
         assert operator.modal(bpy.context, TIMER) == {"RUNNING_MODAL"}

@@ -1,4 +1,4 @@
-"""Sliders of a measured material: all that shows it follows, and 0 is what was measured."""
+"""Sliders of a measured material: every view of it is updated, and 0 is the measured state."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from test_workflow import folder, made
 FIT = "[fit]\nheld_out = false"
 
 
-_fitted: list[str] = []  # the .blend of the one fit that all tests here look at
+_fitted: list[str] = []  # the .blend of the one fit that all tests here use
 
 
 def measured() -> bpy.types.Material:
-    """A fitted material, in a file of the test's own."""
+    """A fitted material, in a file for this test."""
     if not _fitted:
         path = made().make_capture(folder() / "ball", photos=3, extra=FIT)
         assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
@@ -31,8 +31,8 @@ def measured() -> bpy.types.Material:
     return material
 
 
-class Plainer:
-    """Fits of portable models that take no time: what follows when, not how well, is tested."""
+class QuickFits:
+    """Immediate fits of portable models: the order of updates is tested, not their quality."""
 
     def __enter__(self):
         self.module = extension("scene.material.trait_update")
@@ -51,7 +51,7 @@ def preview(material: bpy.types.Material) -> np.ndarray:
     return np.array(found.image_pixels_float[:]).reshape(*reversed(found.image_size), 4)
 
 
-def look(material: bpy.types.Material) -> dict:
+def material_state(material: bpy.types.Material) -> dict:
     """All that a slider may change, as exact values."""
     parts = extension("scene.material.measured_nodes")
     told = {
@@ -81,7 +81,7 @@ def coefficients(material: bpy.types.Material) -> np.ndarray | None:
     return np.array([sockets[f"coefficient_{i + 1}"].default_value[:] for i in range(8)]).T
 
 
-def test_the_sphere_and_the_shader_follow_at_once() -> None:
+def test_preview_and_shader_update_immediately() -> None:
     material = measured()
     stored, first = list(material["patina_coefficients"]), preview(material)
     as_fitted = coefficients(material)
@@ -102,14 +102,14 @@ def test_the_sphere_and_the_shader_follow_at_once() -> None:
     assert small.shape[0] == moved.QUICK_SIZE
     blocks = first.reshape(moved.QUICK_SIZE, 2, moved.QUICK_SIZE, 2, 4).mean(axis=(1, 3))
     assert np.abs(small - blocks).max() > 0.2
-    with Plainer() as follow:
+    with QuickFits() as follow:
         follow.finish_updates()
         assert not follow.outdated_pieces(material)
     large = preview(material).reshape(moved.QUICK_SIZE, 2, moved.QUICK_SIZE, 2, 4).mean(axis=(1, 3))
     assert np.abs(small - large).mean() < 0.01, "the sphere in full is the same sphere"
 
 
-def test_a_change_is_shown_within_a_tenth_of_a_second() -> None:
+def test_change_is_shown_within_tenth_of_second() -> None:
     material = measured()
     material.patina_traits.every.trait_1 = 0.1  # looks up what it needs
     taken = []
@@ -121,17 +121,17 @@ def test_a_change_is_shown_within_a_tenth_of_a_second() -> None:
     assert np.median(taken) < 0.1
 
 
-def test_reset_brings_back_what_was_measured_to_the_bit() -> None:
+def test_reset_restores_measured_state_bit_for_bit() -> None:
     material = measured()
-    before, sphere = look(material), preview(material)
+    before, sphere = material_state(material), preview(material)
     assert not bpy.ops.patina.reset_traits.poll()
-    with Plainer() as follow:
+    with QuickFits() as follow:
         for name, value in (("trait_1", 1.5), ("trait_4", -2.0)):
             setattr(material.patina_traits.every, name, value)
         material.patina_traits.blue.trait_3 = 0.7
         follow.finish_updates()
         assert not follow.outdated_pieces(material)
-        after = look(material)
+        after = material_state(material)
         assert after["coefficients"] == before["coefficients"]
         for name in ("principled", "lobes", "solid"):
             assert after[name] != before[name], name
@@ -141,7 +141,7 @@ def test_reset_brings_back_what_was_measured_to_the_bit() -> None:
         assert len({image.name for image in bpy.data.images} - images) <= 1
     assert bpy.ops.patina.reset_traits() == {"FINISHED"}
     assert not extension("scene.material.trait_offsets").shifts(material).any()
-    assert look(material) == before
+    assert material_state(material) == before
     np.testing.assert_array_equal(preview(material), sphere)
     assert not {"patina_traits_shown", "patina_as_measured", "patina_measured_sampling"} & {
         *material.keys()
@@ -149,73 +149,73 @@ def test_reset_brings_back_what_was_measured_to_the_bit() -> None:
     assert not extension("scene.material.trait_update").outdated_pieces(material)
 
 
-def test_a_slider_back_at_0_is_as_measured_too() -> None:
+def test_slider_back_at_zero_restores_measured_state() -> None:
     material = measured()
-    before, sphere = look(material), preview(material)
-    with Plainer() as follow:
+    before, sphere = material_state(material), preview(material)
+    with QuickFits() as follow:
         material.patina_traits.every.trait_1 = 1.0
         follow.finish_updates()
         material.patina_traits.every.trait_1 = 0.0
-        assert look(material) == before
+        assert material_state(material) == before
         follow.finish_updates()
         np.testing.assert_array_equal(preview(material), sphere)
 
 
-def test_undo_and_redo_agree_with_the_sliders() -> None:
+def test_undo_and_redo_match_sliders() -> None:
     material = measured()
     if not bpy.ops.ed.undo_push.poll():
         raise Skip("no undo here")
     name = material.name
-    before, sphere = look(material), preview(material)
+    before, sphere = material_state(material), preview(material)
     bpy.ops.ed.undo_push(message="fit")
-    with Plainer() as follow:
+    with QuickFits() as follow:
         material.patina_traits.every.trait_1 = 1.0
-        bpy.ops.ed.undo_push(message="slider")  # before the rest has followed, as Blender does
+        bpy.ops.ed.undo_push(message="slider")  # before the background update, as Blender does
         follow.finish_updates()
-        moved, shown = look(material), preview(material)
+        moved, shown = material_state(material), preview(material)
         bpy.ops.ed.undo()
         material = bpy.data.materials[name]
         assert material.patina_traits.every.trait_1 == 0.0
-        assert look(material) == before
+        assert material_state(material) == before
         follow.finish_updates()
         np.testing.assert_array_equal(preview(material), sphere)
         bpy.ops.ed.redo()
         material = bpy.data.materials[name]
         assert material.patina_traits.every.trait_1 == 1.0
         follow.finish_updates()
-        assert look(material) == moved
+        assert material_state(material) == moved
         np.testing.assert_array_equal(preview(material), shown)
         bpy.ops.patina.reset_traits()
-        assert look(material) == before
+        assert material_state(material) == before
 
 
-def test_sliders_and_look_are_saved_and_a_new_fit_has_none() -> None:
+def test_sliders_are_saved_and_new_fit_resets_them() -> None:
     material, blend = measured(), folder() / "moved.blend"
-    before = look(material)
-    with Plainer() as follow:
+    before = material_state(material)
+    with QuickFits() as follow:
         material.patina_traits.every.trait_1 = 0.75
         bpy.ops.wm.save_as_mainfile(filepath=str(blend))  # in the background: settles
         assert not follow.outdated_pieces(material)
-        moved, sphere = look(material), preview(material)
+        moved, sphere = material_state(material), preview(material)
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     material = bpy.data.materials["surface"]
     assert material.patina_traits.every.trait_1 == 0.75
-    assert look(material) == moved and not follow.outdated_pieces(material)
+    assert material_state(material) == moved and not follow.outdated_pieces(material)
     np.testing.assert_allclose(preview(material), sphere, atol=1 / 255)
     bpy.ops.patina.reset_traits()
-    again = look(material)
+    again = material_state(material)
     assert again == before
     material.patina_traits.every.trait_1 = 0.75
     assert bpy.ops.patina.fit() == {"FINISHED"}
     material = bpy.data.materials["surface"]
     assert not extension("scene.material.trait_offsets").state(material)
-    assert look(material)["coefficients"] == before["coefficients"]
+    assert material_state(material)["coefficients"] == before["coefficients"]
 
 
-def test_the_timer_follows_and_goes() -> None:
+def test_timer_updates_and_stops() -> None:
     material = measured()
-    before, sphere = look(material), preview(material)
-    with Plainer() as follow:
+    before, sphere = material_state(material), preview(material)
+    with QuickFits() as follow:
         material.patina_traits.every.trait_3 = 1.0
         assert bpy.app.timers.is_registered(follow._tick)
         assert follow._tick() > 0, "not while the slider moves"
@@ -226,10 +226,10 @@ def test_the_timer_follows_and_goes() -> None:
         material.patina_traits.every.trait_3 = 2.0
         while follow._work is None:
             time.sleep(follow._tick())
-        bpy.ops.patina.reset_traits()  # while a piece is under way: it comes too late
+        bpy.ops.patina.reset_traits()  # while a step is running: it comes too late
         while (wait := follow._tick()) is not None and time.monotonic() < end:
             time.sleep(wait)
-        assert look(material) == before
+        assert material_state(material) == before
         np.testing.assert_array_equal(preview(material), sphere)
         extension().unregister()
         try:
@@ -238,7 +238,7 @@ def test_the_timer_follows_and_goes() -> None:
             extension().register()
 
 
-def test_the_panel_says_what_cannot_be() -> None:
+def test_panel_warns_of_impossible_shift() -> None:
     material = measured()
     box, moved = extension("panels.traits_box"), extension("scene.material.trait_offsets")
     words = moved.slider_labels(material["patina_basis"])
@@ -252,8 +252,8 @@ def test_the_panel_says_what_cannot_be() -> None:
     assert extension("scene.material.trait_properties").shown_material(bpy.context) is None
 
 
-class Layout:
-    """Takes down what a panel draws; only properties that there are can be drawn."""
+class LayoutRecorder:
+    """Records what a panel draws; only existing properties can be drawn."""
 
     def __init__(self) -> None:
         self.drawn: list[str] = []
@@ -279,9 +279,9 @@ class Layout:
     column = row
 
 
-def test_the_panel_draws_a_slider_a_component_with_what_it_does() -> None:
+def test_panel_draws_slider_and_effect_of_each_component() -> None:
     material = measured()
-    panel, layout = extension("panels.traits_box").PATINA_PT_traits, Layout()
+    panel, layout = extension("panels.traits_box").PATINA_PT_traits, LayoutRecorder()
     assert panel.poll(bpy.context)
     panel.draw(type("Panel", (), {"layout": layout})(), bpy.context)
     assert "1 Stronger, sharper highlight" in layout.drawn and "surface" in layout.drawn
@@ -295,11 +295,11 @@ def test_the_panel_draws_a_slider_a_component_with_what_it_does() -> None:
     assert "traits changed after the fit" in material.asset_data.description
 
 
-def test_a_material_whose_basis_is_not_here_stays_as_it_is() -> None:
+def test_material_with_missing_basis_stays_unchanged() -> None:
     material = measured()
-    before = look(material)
+    before = material_state(material)
     material["patina_basis"] = "0123456789ab"
     material.patina_traits.every.trait_1 = 1.0
-    assert look(material) == before and not bpy.ops.patina.reset_traits.poll()
+    assert material_state(material) == before and not bpy.ops.patina.reset_traits.poll()
     extension("scene.material.trait_update").finish_updates()
-    assert look(material) == before
+    assert material_state(material) == before

@@ -1,4 +1,6 @@
-"""Charts of a measured material: they are in the .blend, show what was measured, and follow."""
+"""Charts of a measured material: they are stored in the .blend, show the measurement, and are
+updated.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from test_workflow import folder, made
 FIT = "[fit]\nheld_out = false"
 
 
-_fitted: list[str] = []  # the .blend of the one fit that all tests here look at
+_fitted: list[str] = []  # the .blend of the one fit that all tests here use
 
 
 def fitted() -> bpy.types.Material:
@@ -28,7 +30,7 @@ def fitted() -> bpy.types.Material:
 
 
 def in_memory() -> bool:
-    """Whether the fit itself is still there."""
+    """Whether the fit itself is still in memory."""
     return extension("scene.session.last_fit")._last.value is not None
 
 
@@ -43,13 +45,13 @@ def view(kind: str) -> bpy.types.Image:
     return extension("scene.views.view_image").view_image(kind)
 
 
-def test_the_material_keeps_what_it_was_measured_by() -> None:
+def test_material_stores_samples_and_interval() -> None:
     """Its samples and its interval are those of the fit."""
     assert not bpy.ops.patina.show_chart.poll(), "there is nothing to show yet"
     material = fitted()
     subject = extension("scene.material.material_evidence").subject_of(material)
     assert 100 < len(subject.points) <= 6000 and subject.interval is not None
-    if not in_memory():  # another test was first
+    if not in_memory():  # another test ran first
         bpy.ops.patina.fit()
         subject = extension("scene.material.material_evidence").subject_of(
             bpy.data.materials["surface"]
@@ -64,7 +66,7 @@ def test_the_material_keeps_what_it_was_measured_by() -> None:
     assert inside > 0.5, f"{inside:.2f} of the samples are near the interval of the fit to them"
 
 
-def test_every_chart_is_shown_and_survives_a_reload() -> None:
+def test_all_charts_are_shown_and_survive_reload() -> None:
     fitted()
     pictures = {}
     for kind in ("sphere", "polar", "highlight", "slice", "interval"):
@@ -84,7 +86,7 @@ def test_every_chart_is_shown_and_survives_a_reload() -> None:
     assert np.array_equal(pixels(view("highlight")), pictures["highlight"])
 
 
-def test_a_chart_follows_its_settings() -> None:
+def test_chart_follows_its_settings() -> None:
     fitted()
     views = bpy.context.scene.patina_views
     image = view("polar")
@@ -133,7 +135,7 @@ def test_fits_are_compared() -> None:
     assert np.allclose(same, same[0], atol=0.05), "its own table differs"
 
 
-def test_a_photo_is_looked_at_after_the_fit_and_after_a_reload() -> None:
+def test_photo_view_after_fit_and_after_reload() -> None:
     fitted()
     scene, listed = bpy.context.scene, extension("scene.photos.photo_list")
     scene.camera = None

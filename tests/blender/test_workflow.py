@@ -1,4 +1,4 @@
-"""From files to a material on the mesh, with the operators an artist presses."""
+"""From files to a material on the mesh, with the operators that a user presses."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from mathutils import Vector
 from support import ROOT, extension
 
 
-def made():
-    """tests/make_capture.py, which knows nothing of the extension."""
+def make_capture_module():
+    """tests/make_capture.py, which does not depend on the extension."""
     name = "make_capture"
     if name not in sys.modules:
         spec = importlib.util.spec_from_file_location(name, ROOT / "tests" / "make_capture.py")
@@ -44,7 +44,7 @@ def counts() -> dict[str, int]:
 
 
 def lenses():
-    """(model, parameters, width, height): off-centre, portrait, distorted, oblong pixels."""
+    """(model, parameters, width, height): off-centre, portrait, distorted, non-square pixels."""
     yield "SIMPLE_PINHOLE", (900.0, 500.0, 350.0), 1000, 700
     yield "SIMPLE_PINHOLE", (900.0, 431.7, 388.2), 1000, 700
     yield "PINHOLE", (1500.0, 1500.0, 300.3, 610.9), 700, 1000
@@ -55,14 +55,14 @@ def lenses():
     yield "OPENCV_FISHEYE", (700.0, 702.0, 505.0, 345.0, 0.01, -0.003, 0.0, 0.0), 1000, 700
 
 
-def test_cameras_stand_at_their_pixel() -> None:
+def test_camera_projection_matches_pycolmap() -> None:
     """Blender's projection against pycolmap's, over the whole frame: < 0.01 px."""
     core, scene_cameras = extension("core.scan"), extension("scene.photos.cameras")
     rng = np.random.default_rng(0)
     scene = bpy.context.scene
     worst = 0.0
     for (model, parameters, width, height), (rotation, translation) in zip(
-        lenses(), made().poses(8), strict=True
+        lenses(), make_capture_module().poses(8), strict=True
     ):
         camera = core.Camera(
             f"{model}-{width}", width, height, model, parameters,
@@ -85,10 +85,12 @@ def test_cameras_stand_at_their_pixel() -> None:
     assert worst < 0.01
 
 
-def test_rectified_photos_show_what_the_pinhole_sees() -> None:
-    """A photo of a distorted lens, resampled: a dot lands where the pinhole projects its point."""
+def test_rectified_photos_match_pinhole_projection() -> None:
+    """A resampled photo of a distorted lens: a dot lands where the pinhole camera projects its
+    point.
+    """
     core, rectified = extension("core.scan"), extension("core.geometry.rectify")
-    rotation, translation = next(iter(made().poses(1)))
+    rotation, translation = next(iter(make_capture_module().poses(1)))
     camera = core.Camera(
         "x",
         400,
@@ -107,8 +109,8 @@ def test_rectified_photos_show_what_the_pinhole_sees() -> None:
         assert np.abs(found - target.project(point)[0]).max() < 0.05
 
 
-def test_import_builds_the_scene() -> None:
-    path = made().make_capture(folder() / "ball", photos=4)
+def test_import_builds_scene() -> None:
+    path = make_capture_module().make_capture(folder() / "ball", photos=4)
     assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
     scene = bpy.context.scene
     mesh = scene.patina.mesh
@@ -119,21 +121,24 @@ def test_import_builds_the_scene() -> None:
     for camera in stood:
         background = camera.data.background_images[0]
         assert background.frame_method == "CROP"
-        assert tuple(background.image.size) == (made().WIDTH, made().HEIGHT)
+        assert tuple(background.image.size) == (
+            make_capture_module().WIDTH,
+            make_capture_module().HEIGHT,
+        )
     for sun, direction in zip(
-        sorted(suns, key=lambda o: o.name), made().light_directions(4), strict=True
+        sorted(suns, key=lambda o: o.name), make_capture_module().light_directions(4), strict=True
     ):
         bpy.context.view_layer.update()
         assert np.allclose(sun.matrix_world.to_3x3().col[2], direction, atol=1e-5)
-        assert np.isclose(sun.data.energy, made().IRRADIANCE)
+        assert np.isclose(sun.data.energy, make_capture_module().IRRADIANCE)
     assert scene.camera in stood
     first = scene.camera
     bpy.ops.patina.next_photo()
     assert scene.camera in stood and scene.camera != first
 
 
-def test_a_wrong_capture_is_one_message_and_makes_nothing() -> None:
-    path = made().make_capture(folder() / "ball", photos=2)
+def test_invalid_capture_gives_one_message_and_no_scene() -> None:
+    path = make_capture_module().make_capture(folder() / "ball", photos=2)
     path.write_text(path.read_text().replace("lit_2.exr", "gone.exr"))
     before = counts()
     try:
@@ -146,8 +151,8 @@ def test_a_wrong_capture_is_one_message_and_makes_nothing() -> None:
     assert counts() == before
 
 
-def test_the_fit_operator_gives_the_numbers_of_the_api() -> None:
-    path = made().make_capture(folder() / "ball", photos=4)
+def test_fit_operator_matches_api() -> None:
+    path = make_capture_module().make_capture(folder() / "ball", photos=4)
     bpy.ops.patina.import_capture(filepath=str(path))
     assert bpy.ops.patina.fit() == {"FINISHED"}
     said = json.loads(bpy.data.texts["Patina result"].as_string())
@@ -173,12 +178,12 @@ def test_the_fit_operator_gives_the_numbers_of_the_api() -> None:
         assert not measured and "patina_without_osl" in mesh.data.materials[0]
 
     before = counts()
-    bpy.ops.patina.fit()  # again: replaces, does not pile up
+    bpy.ops.patina.fit()  # again: replaces, does not accumulate
     assert counts()["materials"] == before["materials"]
 
 
-def test_the_demo_by_operator_is_the_demo_by_api() -> None:
-    """The embedded capture: coefficients, samples and unseen photos to the last digit."""
+def test_demo_by_operator_equals_demo_by_api() -> None:
+    """The embedded capture: coefficients, samples and held-out photos to the last digit."""
     assert bpy.ops.patina.import_demo() == {"FINISHED"}
     assert bpy.ops.patina.fit() == {"FINISHED"}
     said = json.loads(bpy.data.texts["Patina result"].as_string())
@@ -194,14 +199,17 @@ def test_the_demo_by_operator_is_the_demo_by_api() -> None:
         assert told["held_out"]["typical"] == fitted.held_out.typical
 
 
-def test_a_check_names_a_drift_fits_with_it_and_can_do_without() -> None:
-    path = made().make_capture(folder() / "ball", photos=4)
+def test_check_names_light_drift_and_fit_can_include_or_skip_it() -> None:
+    path = make_capture_module().make_capture(folder() / "ball", photos=4)
     told = path.read_text()
     path.write_text(told.replace('file = "lit_2.exr"', 'file = "lit_2.exr"\nexposure = 1.5'))
     bpy.ops.patina.import_capture(filepath=str(path))
-    assert not bpy.ops.patina.refit.poll()  # nothing was checked yet
+    assert not bpy.ops.patina.refit.poll()  # not checked yet
     choose = extension("core.diagnose.pixels.pixel_selection").choose_pixels
-    usual, choose.__defaults__ = choose.__defaults__, (3000,)  # some Blenders' numpy is slow
+    usual, choose.__defaults__ = (
+        choose.__defaults__,
+        (3000,),
+    )  # numpy of some Blender versions is slow
     try:
         assert bpy.ops.patina.check() == {"FINISHED"}
     finally:
@@ -214,7 +222,7 @@ def test_a_check_names_a_drift_fits_with_it_and_can_do_without() -> None:
     gains = [v["value"] for v in said["causes"][0]["parameters"].values()]
     truth = -np.log([1, 1.5, 1, 1])
     off = np.abs(gains - (truth - truth.mean())).max()
-    assert off < 0.08, (off, gains)  # four photos, each of its own light: gain or BRDF?
+    assert off < 0.08, (off, gains)  # four photos, each with its own light: gain or BRDF?
     assert said["extended"]["held_out"] < said["baseline"]["held_out"]
 
     scene, mesh = bpy.context.scene, bpy.context.scene.patina.mesh
@@ -239,7 +247,7 @@ def test_a_check_names_a_drift_fits_with_it_and_can_do_without() -> None:
 
 
 def test_results_survive_saving_and_loading() -> None:
-    path = made().make_capture(folder() / "ball", photos=3)
+    path = make_capture_module().make_capture(folder() / "ball", photos=3)
     bpy.ops.patina.import_capture(filepath=str(path))
     bpy.ops.patina.fit()
     blend = folder() / "saved.blend"
@@ -256,7 +264,7 @@ def test_results_survive_saving_and_loading() -> None:
 def test_georeferenced_scans_keep_their_precision() -> None:
     """The same ball 500 km from the origin: Blender's float32 would be off by centimetres."""
     core, frame = extension("core.scan"), extension("scene.scan.origin")
-    vertices, faces = made().sphere_mesh(4)
+    vertices, faces = make_capture_module().sphere_mesh(4)
     far = np.array([500_000.0, 4_000_000.0, 120.0])
     mesh = core.Mesh(vertices + far, faces.astype(np.int32))
     origin = frame.frame_origin(mesh.vertices)
@@ -272,12 +280,16 @@ def test_georeferenced_scans_keep_their_precision() -> None:
 
 def test_two_captures_keep_their_materials_apart() -> None:
     """The same material name in two captures: fitting one must not change the other."""
-    red = made().make_capture(folder() / "red", photos=2, extra="[fit]\nheld_out = false")
-    green = made().make_capture(
+    red = make_capture_module().make_capture(
+        folder() / "red", photos=2, extra="[fit]\nheld_out = false"
+    )
+    green = make_capture_module().make_capture(
         folder() / "green",
         photos=2,
         extra="[fit]\nheld_out = false",
-        brdf=lambda normal, light, view: made().blinn(normal, light, view)[:, [1, 0, 2]],
+        brdf=lambda normal, light, view: make_capture_module().blinn(normal, light, view)[
+            :, [1, 0, 2]
+        ],
     )
     objects = []
     for path in (red, green):
@@ -296,8 +308,8 @@ def test_two_captures_keep_their_materials_apart() -> None:
     assert stored(str(red.resolve())) and stored(str(green.resolve()))
 
 
-def test_a_capture_comes_in_once_and_again_when_deleted() -> None:
-    path = made().make_capture(folder() / "ball", photos=2)
+def test_capture_is_imported_once_and_again_after_deletion() -> None:
+    path = make_capture_module().make_capture(folder() / "ball", photos=2)
     bpy.ops.patina.import_capture(filepath=str(path))
     before = counts()
     try:
@@ -311,8 +323,8 @@ def test_a_capture_comes_in_once_and_again_when_deleted() -> None:
     assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
 
 
-def test_the_lamp_follows_the_photo() -> None:
-    path = made().make_capture(folder() / "ball", photos=3)
+def test_lamp_follows_photo() -> None:
+    path = make_capture_module().make_capture(folder() / "ball", photos=3)
     bpy.ops.patina.import_capture(filepath=str(path))
     scene = bpy.context.scene
     for _ in range(4):
@@ -324,15 +336,15 @@ def test_the_lamp_follows_the_photo() -> None:
         bpy.ops.patina.next_photo()
 
 
-def test_faces_get_their_material_in_edit_mode_too() -> None:
-    path = made().make_capture(
+def test_faces_get_their_material_in_edit_mode() -> None:
+    path = make_capture_module().make_capture(
         folder() / "ball", photos=3,
         extra='[[material]]\nname = "low"\nfaces = "part"\n[[material]]\nname = "high"\n'
         'faces = "part"\n[fit]\nheld_out = false',
     )  # fmt: skip
-    vertices, faces = made().sphere_mesh()
-    high = vertices[faces].mean(axis=1)[:, 2] > made().CENTRE[2]
-    made().write_ply(path.parent / "mesh.ply", vertices, faces, high.astype(int))
+    vertices, faces = make_capture_module().sphere_mesh()
+    high = vertices[faces].mean(axis=1)[:, 2] > make_capture_module().CENTRE[2]
+    make_capture_module().write_ply(path.parent / "mesh.ply", vertices, faces, high.astype(int))
     bpy.ops.patina.import_capture(filepath=str(path))
     mesh = bpy.context.scene.patina.mesh
     bpy.ops.object.mode_set(mode="EDIT")
@@ -343,8 +355,10 @@ def test_faces_get_their_material_in_edit_mode_too() -> None:
     assert np.array_equal(index, high)
 
 
-def test_fit_without_its_mesh_says_so() -> None:
-    path = made().make_capture(folder() / "ball", photos=2, extra="[fit]\nheld_out = false")
+def test_fit_without_mesh_reports_it() -> None:
+    path = make_capture_module().make_capture(
+        folder() / "ball", photos=2, extra="[fit]\nheld_out = false"
+    )
     bpy.ops.patina.import_capture(filepath=str(path))
     bpy.data.objects.remove(bpy.context.scene.patina.mesh)
     job = extension("core.jobs").FitJob(extension("core.capture").read_capture(path))
@@ -355,7 +369,7 @@ def test_fit_without_its_mesh_says_so() -> None:
     assert any("not in this scene" in note for note in notes)
 
 
-def test_a_running_fit_is_not_saved() -> None:
+def test_running_fit_is_not_saved() -> None:
     state, path = extension("scene.session.running_job"), folder() / "running.blend"
     state.set_running(state.Running(bpy.context.scene.name, "fit", "sampling the photos", 0.5))
     assert state.running(bpy.context.scene) is not None

@@ -1,4 +1,4 @@
-"""Maps of a whole capture, without Blender: a sphere whose colour is a function of its normal."""
+"""Texture maps of a capture without Blender: a sphere whose colour depends on the normal."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from patina.core.result import read_result
 from patina.core.scan import Mesh
 from tests import make_capture as made
 
-PLAIN = np.array([0.16, 0.05, 0.04])  # 1/sr, of make_capture's own material
+PLAIN = np.array([0.16, 0.05, 0.04])  # 1/sr, of the material that make_capture uses
 
 
 def paint(normal):
-    """(n, 3) what the body of a painted sphere is multiplied by: bands around three axes."""
+    """Factor (n, 3) on the diffuse albedo of a painted sphere: bands around three axes."""
     return 1 + 0.45 * np.sin(5 * normal)
 
 
@@ -33,7 +33,7 @@ def painted(normal, light, view):
 
 
 def sphere_uv(mesh):
-    """(f, 3, 2) longitude and latitude of a sphere's faces, unbroken across the seam."""
+    """(f, 3, 2) longitude and latitude of a sphere's faces, continuous across the seam."""
     n = (mesh.vertices - made.CENTRE)[mesh.faces]
     n = n / np.linalg.norm(n, axis=2, keepdims=True)
     u = np.arctan2(n[..., 1], n[..., 0]) / (2 * np.pi) + 0.5
@@ -42,7 +42,9 @@ def sphere_uv(mesh):
 
 
 def fitted(folder, brdf, waves=0.0):
-    """(capture, its result); waves: height of waves that the mesh has and the photos do not."""
+    """Return (capture, its result); waves: amplitude of waves that the mesh has and the photos
+    lack.
+    """
     file = made.make_capture(folder, photos=9, brdf=brdf)
     if waves:
         vertices, faces = made.sphere_mesh()
@@ -76,7 +78,7 @@ def true_albedo(found):
 
 
 @pytest.mark.slow
-def test_the_albedo_is_the_paint(banded):
+def test_albedo_map_matches_painted_albedo(banded):
     _, _, found = banded
     expected, known = true_albedo(found), albedo(found, 0)
     well = (found.maps.photos >= 2) & (found.maps.error < 0.1)
@@ -88,7 +90,7 @@ def test_the_albedo_is_the_paint(banded):
 
 
 @pytest.mark.slow
-def test_a_plain_surface_is_left_plain_and_not_fitted_again(tmp_path):
+def test_uniform_surface_stays_uniform_and_is_not_refitted(tmp_path):
     capture, result = fitted(tmp_path, made.blinn)
     found = maps_of(capture, result)
     assert found.refit is None
@@ -99,13 +101,13 @@ def test_a_plain_surface_is_left_plain_and_not_fitted_again(tmp_path):
 
 
 @pytest.mark.slow
-def test_what_is_written_says_what_it_is(banded, tmp_path):
+def test_written_maps_describe_themselves(banded, tmp_path):
     _, _, found = banded
     files = write_maps(tmp_path, found, "png")
     assert all((tmp_path / f.file).is_file() for f in files)
-    told = describe(found, files)
-    assert told["texels"] == len(found.texels) and told["unwrapped"]
-    assert 0 < told["seen"] <= 1 and told["standard_error"]["median"] < 0.2
+    reported = describe(found, files)
+    assert reported["texels"] == len(found.texels) and reported["unwrapped"]
+    assert 0 < reported["seen"] <= 1 and reported["standard_error"]["median"] < 0.2
     assert np.all(base_color(found, 0) <= 1) and np.all(base_color(found, 0) >= 0)
     import OpenImageIO as oiio
 
@@ -116,14 +118,14 @@ def test_what_is_written_says_what_it_is(banded, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_mesh_without_coordinates_and_without_blender(banded):
+def test_mesh_without_texture_coordinates_outside_blender(banded):
     capture, result, _ = banded
     with pytest.raises(InputError, match=r"no texture coordinates.*unwrap"):
         maps_of(capture, result, unwrap=None)
 
 
 @pytest.mark.slow
-def test_photos_that_show_nothing_lit_are_an_error_of_the_capture(banded):
+def test_photos_without_lit_pixels_raise_capture_error(banded):
     capture, result, _ = banded
     away = [rotation.T @ np.array([0.0, 0.0, 1.0]) for rotation, _ in made.poses(9)]
     lights = tuple(replace(a, direction=d) for a, d in zip(capture.lights, away, strict=True))
@@ -132,7 +134,7 @@ def test_photos_that_show_nothing_lit_are_an_error_of_the_capture(banded):
 
 
 @pytest.mark.slow
-def test_the_normal_map_turns_the_mesh_towards_the_surface(tmp_path):
+def test_normal_map_corrects_mesh_normals_towards_true_surface(tmp_path):
     capture, result = fitted(tmp_path, made.blinn, waves=0.004)
     settings = MapsSettings(128, 0, normal=True)
     job = MapsJob(capture, result, settings, sphere_uv)
@@ -141,7 +143,7 @@ def test_the_normal_map_turns_the_mesh_towards_the_surface(tmp_path):
     mesh, texels = found.scan.mesh, found.texels
     corner, tangents, sign = corner_tangents(mesh)
     normal = texels.normals(mesh, slice(None))
-    # back from the tangent frame as a renderer does it
+    # back from the tangent frame, as a renderer does it
     tangent = tangents[corner[texels.face, 0]]
     tangent = tangent - np.einsum("nc,nc->n", tangent, normal)[:, None] * normal
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
@@ -154,16 +156,18 @@ def test_the_normal_map_turns_the_mesh_towards_the_surface(tmp_path):
     def off(values):
         return np.degrees(np.arccos(np.clip(np.einsum("nc,nc->n", values, exact), -1, 1)))
 
-    calm = np.abs(exact[:, 2]) < 0.9  # corners' tangents turn fast near the poles
-    seen = calm & (found.maps.photos >= 2)
+    well_conditioned = (
+        np.abs(exact[:, 2]) < 0.9
+    )  # tangents at face corners turn fast near the poles
+    seen = well_conditioned & (found.maps.photos >= 2)
     before, after = np.median(off(normal)[seen]), np.median(off(turned)[seen])
     print(f"normals {before:.2f}° before, {after:.2f}° after")
     assert before > 1.0 and after < 0.75 * before
-    unseen = calm & (found.maps.photos == 0)
+    unseen = well_conditioned & (found.maps.photos == 0)
     assert np.median(off(turned)[unseen]) < 1.15 * np.median(off(normal)[unseen])
 
 
-def test_tangents_follow_u_and_know_mirrored_faces():
+def test_tangents_follow_u_on_plain_and_mirrored_faces():
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
     faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
     uv = np.array([[[0, 0], [0, 1], [1, 1]], [[0, 0], [1, 1], [1, 0]]], np.float32)  # u along y
@@ -182,17 +186,17 @@ def ggx(alpha):
     return evaluate
 
 
-class Known:
-    """Stands for a fitted BRDF."""
+class KnownBRDF:
+    """Stands in for a fitted BRDF."""
 
     def __init__(self, evaluate):
         self.evaluate = evaluate
 
 
-def test_the_slope_of_gloss_is_what_another_roughness_does():
+def test_gloss_derivative_matches_change_of_roughness():
     theta_h = np.radians(np.array([0.5, 3.0, 6.0, 10.0, 16.0]))
     angles = Angles(theta_h, np.full(5, 0.4), np.full(5, 1.0))
-    level = MaterialLevel.of("x", Known(ggx(0.12)))
+    level = MaterialLevel.of("x", KnownBRDF(ggx(0.12)))
     part = level.at(angles)
     small = 0.02
     expected = (ggx(0.12 * np.exp(small))(angles) - ggx(0.12)(angles))[:, 0] / small

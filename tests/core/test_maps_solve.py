@@ -1,4 +1,4 @@
-"""Scales of texels from their samples: robust, weighted, and calm where nothing is known."""
+"""Scales of texels from their samples: robust, weighted, and smooth where there are no samples."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def solved(slots, n):
     return solve_texels(slots, np.zeros(n, np.uint8), slice(0, n))
 
 
-def test_the_weighted_mean_and_its_error():
+def test_scale_is_weighted_mean_with_its_standard_error():
     rng = np.random.default_rng(0)
     n, truth = 4000, np.array([0.5, 1.0, 1.6])
     errors = (0.03, 0.06, 0.06, 0.12)
@@ -37,12 +37,12 @@ def test_the_weighted_mean_and_its_error():
     found = solved(slots, n)
     assert np.abs(found.scale.mean(axis=0) - truth).max() < 0.003
     best = 1 / np.sqrt(sum(e**-2 for e in errors))
-    assert found.scale.std(axis=0).max() < 1.25 * best  # what robustness costs
-    told = 1 / np.sqrt(np.median(found.weight))
-    assert 0.7 * best < told < 1.5 * best
+    assert found.scale.std(axis=0).max() < 1.25 * best  # loss of efficiency of the robust estimator
+    reported = 1 / np.sqrt(np.median(found.weight))
+    assert 0.7 * best < reported < 1.5 * best
 
 
-def test_a_photo_that_disagrees_is_not_believed():
+def test_outlier_photo_is_downweighted():
     rng = np.random.default_rng(1)
     n = 2000
     good = [(1 + 0.04 * rng.normal(size=(n, 3)), np.full(n, 0.05), np.zeros(n)) for _ in range(4)]
@@ -50,17 +50,17 @@ def test_a_photo_that_disagrees_is_not_believed():
     plain = np.mean([s[0] for s in (*good, shadow)])
     found = solved(filled([*good, shadow]), n)
     assert abs(found.scale.mean() - 1) < 0.02 < abs(plain - 1)
-    agreeing = solved(filled(good), n)  # that they disagree is told
+    agreeing = solved(filled(good), n)  # the disagreement shows in the standard error
     assert np.median(found.spread) > 2 * np.median(agreeing.spread)
 
 
-def test_nothing_known_is_nothing_said():
+def test_texel_without_samples_has_no_estimate():
     found = solved(TexelSlots.empty(5), 5)
     assert np.isnan(found.scale).all() and (found.weight == 0).all()
     assert (found.gloss == 0).all() and np.isinf(found.gloss_error).all()
 
 
-def test_samples_of_another_material_do_not_speak():
+def test_samples_of_other_material_are_ignored():
     slots = TexelSlots.empty(2)
     for number, value in ((0, 1.0), (1, 3.0)):
         slots.add(TexelSamples(
@@ -71,7 +71,7 @@ def test_samples_of_another_material_do_not_speak():
     assert np.allclose(found.scale, [[1.0] * 3, [3.0] * 3], atol=1e-3)
 
 
-def test_the_best_samples_are_kept_when_there_are_too_many():
+def test_most_precise_samples_are_kept_when_slots_are_full():
     n, count = 50, 3 * SLOTS
     errors = np.random.default_rng(2).permutation(np.linspace(0.05, 1.0, count))
     slots = filled([(np.full((n, 3), e), np.full(n, e), np.zeros(n)) for e in errors])
@@ -80,7 +80,7 @@ def test_the_best_samples_are_kept_when_there_are_too_many():
     assert (slots.count == count).all()
 
 
-def test_gloss_is_found_from_highlights_and_not_confused_with_colour():
+def test_gloss_is_estimated_from_highlights_independently_of_colour():
     rng = np.random.default_rng(3)
     n = 3000
     body = rng.uniform(0.4, 1.6, n)
@@ -98,14 +98,14 @@ def test_gloss_is_found_from_highlights_and_not_confused_with_colour():
     assert np.sqrt(np.mean((found.scale.mean(axis=1) - body) ** 2)) < 0.06
 
 
-def test_gloss_is_left_alone_without_a_highlight():
+def test_gloss_is_unchanged_without_highlight():
     n = 100
     samples = [(np.full((n, 3), v), np.full(n, 0.05), np.zeros(n)) for v in (0.9, 1.0, 1.1)]
     found = solved(filled(samples), n)
     assert (found.gloss == 0).all()
 
 
-def test_weighted_median_counts_weights():
+def test_weighted_median_uses_weights():
     values = np.array([[1.0], [2.0], [10.0]])
     assert weighted_median(values, np.array([[1.0], [1.0], [5.0]]))[0] == 10.0
     assert weighted_median(values, np.array([[1.0], [1.0], [1.0]]))[0] == 2.0
@@ -113,7 +113,7 @@ def test_weighted_median_counts_weights():
 
 
 def strip(columns):
-    """A flat strip of squares along x, one unit each."""
+    """A flat strip of unit squares along x."""
     x = np.arange(columns + 1.0)
     points = np.concatenate([
         np.stack([x, 0 * x, 0 * x], 1), np.stack([x, 0 * x + 1, 0 * x], 1)
@@ -125,7 +125,7 @@ def strip(columns):
     return Mesh(points, faces.astype(np.int32), uv=uv[faces].astype(np.float32))
 
 
-def test_what_no_photo_saw_follows_its_surroundings_and_then_the_fit():
+def test_unobserved_region_falls_back_from_neighbours_to_fit():
     mesh = strip(200)
     texels = rasterise(mesh, 400)
     x = texels.points(mesh, slice(None))[:, 0]
@@ -134,18 +134,18 @@ def test_what_no_photo_saw_follows_its_surroundings_and_then_the_fit():
     sums.add(mesh, texels, seen, np.full((len(seen), 3), 2.0), np.full(len(seen), 400.0))
     interpolated = sums.interpolated(mesh, 1.0)[:201, 0]
     assert np.allclose(interpolated[:19], 2.0, atol=0.02)
-    assert (np.diff(interpolated[20:]) <= 1e-3).all()  # falls back smoothly
+    assert (np.diff(interpolated[20:]) <= 1e-3).all()  # smooth fallback
     assert interpolated[25] > 1.8 and abs(interpolated[200] - 1.0) < 0.15
 
 
-def test_nothing_seen_at_all_is_the_fit():
+def test_without_observations_scales_are_those_of_fit():
     mesh = strip(3)
     sums = VertexScales.empty(len(mesh.vertices), 2)
     assert (sums.interpolated(mesh, 1.0) == 1.0).all()
 
 
 def coated(diffuse, strength, alpha):
-    """Lambert and a GGX-like lobe, reciprocal."""
+    """Lambertian part and a GGX-like lobe, reciprocal."""
 
     def evaluate(angles: Angles):
         c2 = np.cos(angles.theta_h) ** 2
@@ -156,7 +156,7 @@ def coated(diffuse, strength, alpha):
 
 
 @pytest.mark.parametrize("alpha", [0.05, 0.15, 0.3])
-def test_the_body_of_a_coated_surface_is_its_diffuse_part(alpha):
+def test_body_of_coated_surface_is_its_diffuse_part(alpha):
     diffuse = np.array([0.5, 0.2, 0.08])
     found = split_body(coated(diffuse, 0.012, alpha))
     assert not found.whole
@@ -166,7 +166,7 @@ def test_the_body_of_a_coated_surface_is_its_diffuse_part(alpha):
     assert (body >= 0).all() and (specular >= 0).all() and np.allclose(body + specular, rho)
 
 
-def test_a_metal_scales_as_a_whole():
+def test_metal_is_scaled_as_a_whole():
     found = split_body(coated([0.0, 0.0, 0.0], 0.25, 0.2))
     assert found.whole and found.body[0] == EVERYTHING
     body, specular = found.parts(np.array([[5.0, 4.0, 1.0]]))

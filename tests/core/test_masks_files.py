@@ -1,4 +1,4 @@
-"""Masks as files: the capture that names them is the same capture, and a fit heeds them."""
+"""Mask files: a capture that names them describes the same scene, and a fit uses them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def pixels(path: Path) -> np.ndarray:
 
 
 def two_balls(folder: Path) -> Path:
-    """The ball and a smaller one in the scan that shades it, under lamps of some size."""
+    """The ball and a smaller one in the scan that shadows it, under lamps of finite size."""
     path = made.make_capture(folder, photos=3, extra='[[material]]\nname = "red"')
     vertices, faces = made.sphere_mesh(3)
     light = next(made.light_directions(3))
@@ -50,7 +50,7 @@ def write(path: Path, out: Path, wanted: MasksSettings):
     return job.result
 
 
-def test_shadow_masks_are_the_visibilities_and_leave_partial_shadow_out(tmp_path: Path) -> None:
+def test_shadow_masks_match_visibility_and_exclude_penumbra(tmp_path: Path) -> None:
     path = two_balls(tmp_path / "in")
     done = write(path, tmp_path / "out", MasksSettings(uncertainty=0.0))
     capture = read_capture(done.capture)
@@ -68,8 +68,8 @@ def test_shadow_masks_are_the_visibilities_and_leave_partial_shadow_out(tmp_path
         grey = pixels(capture.photos[place].masks["shadow"])
         assert grey.shape == (made.HEIGHT, made.WIDTH)
         assert (grey[~view.seen] == 0).all()
-        told = from_grey(grey.ravel()[view.pixel])
-        assert np.abs(told - exact).mean() < 0.01
+        reported = from_grey(grey.ravel()[view.pixel])
+        assert np.abs(reported - exact).mean() < 0.01
         _, out = material_pixels(capture, scan, view, capture_data.photo_masks(capture, place))
         assert out[exact < 0.88].all()
         assert not out[exact > 0.999].any()
@@ -77,7 +77,7 @@ def test_shadow_masks_are_the_visibilities_and_leave_partial_shadow_out(tmp_path
     assert partial > 100
 
 
-def test_the_new_capture_is_the_old_one_elsewhere(tmp_path: Path) -> None:
+def test_new_capture_equals_old_one_except_masks(tmp_path: Path) -> None:
     path = two_balls(tmp_path / "in")
     before = path.read_bytes()
     old = read_capture(path)
@@ -96,7 +96,7 @@ def test_the_new_capture_is_the_old_one_elsewhere(tmp_path: Path) -> None:
         assert np.array_equal(mine.direction, its.direction) and mine.angle == its.angle
 
 
-def test_what_the_artist_marked_stays_marked(tmp_path: Path) -> None:
+def test_existing_artist_masks_are_kept(tmp_path: Path) -> None:
     path = two_balls(tmp_path / "in")
     mask = np.zeros((made.HEIGHT, made.WIDTH))
     mask[5:20, 30:90] = 255
@@ -110,7 +110,7 @@ def test_what_the_artist_marked_stays_marked(tmp_path: Path) -> None:
     assert (pixels(path.parent / "mine.png") == mask).all()
 
 
-def test_proposed_materials_cover_the_object_once(tmp_path: Path) -> None:
+def test_proposed_material_masks_partition_the_object(tmp_path: Path) -> None:
     from tests.core.test_material_proposal import halves, painted
 
     paints = [((0.2, 0.04, 0.03), 0.3, 40), ((0.04, 0.06, 0.2), 0.3, 40)]
@@ -130,7 +130,7 @@ def test_proposed_materials_cover_the_object_once(tmp_path: Path) -> None:
     assert max(np.trace(tally), np.trace(tally[::-1])) > 0.96 * tally.sum()
 
 
-def test_one_material_needs_no_masks(tmp_path: Path) -> None:
+def test_single_material_needs_no_masks(tmp_path: Path) -> None:
     path = made.make_capture(tmp_path / "in", photos=4)
     capture = read_capture(
         write(path, tmp_path / "out", MasksSettings(shadows=False, materials=True)).capture
@@ -139,7 +139,7 @@ def test_one_material_needs_no_masks(tmp_path: Path) -> None:
     assert not any(photo.masks for photo in capture.photos)
 
 
-def test_nothing_of_the_capture_is_overwritten(tmp_path: Path) -> None:
+def test_capture_files_are_not_overwritten(tmp_path: Path) -> None:
     path = two_balls(tmp_path)
     with pytest.raises(InputError, match="overwritten"):
         check_final(read_capture(path), tmp_path)
@@ -150,7 +150,7 @@ def test_nothing_of_the_capture_is_overwritten(tmp_path: Path) -> None:
         check_final(read_capture(again), again.parent)
 
 
-def test_every_path_of_a_capture_is_redirected(tmp_path: Path) -> None:
+def test_all_capture_paths_are_rewritten_for_new_folder(tmp_path: Path) -> None:
     path = two_balls(tmp_path / "in")
     for name in ("a.png", "b.png"):
         made.write_png(path.parent / name, np.full((made.HEIGHT, made.WIDTH), 255))
@@ -186,8 +186,8 @@ def commented(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @given(st.dictionaries(st.text(min_size=1), st.text(), max_size=4), st.lists(st.text(), max_size=3))
 @settings(max_examples=100, deadline=None)
-def test_names_of_any_kind_are_written_as_they_are(commented: Path, masks, materials) -> None:
-    """What the standard parser reads is what was written; comments stay."""
+def test_unusual_names_are_written_unchanged(commented: Path, masks, materials) -> None:
+    """The standard TOML parser reads what was written; comments are kept."""
     old = read_capture(commented)
     text = capture_with_masks(old, commented.parent, ["a.png", "b.png"], materials, [masks])
     data = tomllib.loads(text)

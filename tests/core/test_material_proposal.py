@@ -1,5 +1,6 @@
-"""Proposed materials against spheres whose materials are known, and against real stereo meshes of
-one material."""
+"""Proposed material segmentation on spheres of known materials and on real stereo meshes of one
+material.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +20,10 @@ from tests import make_capture as made
 
 
 def painted(paints, part):
-    """A reflectance whose matte colour and Blinn lobe depend on the place on the unit sphere.
-    paints: (matte (3,), lobe, exponent) of each part; part: normals (n, 3) → (n,) its number."""
+    """A reflectance whose diffuse colour and Blinn lobe depend on the place on the unit sphere.
+    paints: (albedo (3,), lobe strength, exponent) of each part; part: normals (n, 3) → part index
+    (n,).
+    """
 
     def brdf(normal, light, view):
         half = light + view
@@ -37,7 +40,7 @@ def painted(paints, part):
 
 
 def caps(normal):
-    """Three parts: a cap, another one, the rest."""
+    """Three parts: two caps and the rest."""
     first = normal @ np.array([0.6, 0.0, 0.8]) > 0.45
     second = normal @ np.array([-0.48, 0.6, -0.64]) > 0.5
     return np.where(first, 1, np.where(second, 2, 0))
@@ -62,7 +65,7 @@ def truth(result, part) -> np.ndarray:
 
 
 def accuracy(labels, true, where) -> float:
-    """Share of faces called right, each label standing for what most of it is."""
+    """Share of correctly labelled faces; a label stands for the material of most of its faces."""
     right = 0
     names = []
     for label in np.unique(labels[where]):
@@ -74,7 +77,7 @@ def accuracy(labels, true, where) -> float:
 
 
 @pytest.mark.parametrize("count", [None, 3])
-def test_three_colours(tmp_path: Path, count) -> None:
+def test_three_colours_are_separated(tmp_path: Path, count) -> None:
     paints = [
         ((0.16, 0.05, 0.04), 0.5, 60),
         ((0.05, 0.12, 0.05), 0.5, 60),
@@ -89,17 +92,17 @@ def test_three_colours(tmp_path: Path, count) -> None:
     true = truth(result, caps)
     assert accuracy(found.labels, true, seen) > 0.97
     areas = np.bincount(found.labels)
-    assert (np.diff(areas) <= 0).all()  # the largest first (the triangles are of one size)
+    assert (np.diff(areas) <= 0).all()  # the largest part first (the triangles have equal size)
 
 
-def test_one_colour_with_two_glosses(tmp_path: Path) -> None:
+def test_two_glosses_of_one_colour_are_separated(tmp_path: Path) -> None:
     paints = [((0.12, 0.09, 0.05), 0.0, 1), ((0.12, 0.09, 0.05), 0.35, 25)]
     path = made.make_capture(tmp_path, photos=9, brdf=painted(paints, halves))
     result = proposed(path)
     labels, true = result.proposal.labels, truth(result, halves)
     assert result.proposal.count == 2
-    # where some photo has half vector and normal within 25° the lobe shows; elsewhere the two
-    # materials are the same, and a face can only follow those around it
+    # where some photo has half vector and normal within 25° the lobe is visible; elsewhere the two
+    # materials look the same, and a face can only follow its neighbours
     corners = result.scan.mesh.vertices[result.scan.mesh.faces].mean(axis=1) - made.CENTRE
     normal = corners / np.linalg.norm(corners, axis=1, keepdims=True)
     shows = np.zeros(len(true), bool)
@@ -114,7 +117,7 @@ def test_one_colour_with_two_glosses(tmp_path: Path) -> None:
     assert accuracy(labels, true, np.ones(len(true), bool)) > 0.95
 
 
-def test_light_and_dark_of_one_colour(tmp_path: Path) -> None:
+def test_light_and_dark_shades_of_one_colour_are_separated(tmp_path: Path) -> None:
     paints = [((0.20, 0.16, 0.12), 0.1, 20), ((0.10, 0.08, 0.06), 0.1, 20)]
     path = made.make_capture(tmp_path, photos=9, brdf=painted(paints, halves))
     result = proposed(path)
@@ -124,8 +127,8 @@ def test_light_and_dark_of_one_colour(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("exponent", [4, 60, 400])
-def test_one_material_stays_one(tmp_path: Path, exponent: int) -> None:
-    """On a mesh whose normals are off, as stereo's are."""
+def test_single_material_is_not_split(tmp_path: Path, exponent: int) -> None:
+    """On a mesh with normal errors such as those of a stereo mesh."""
     paint = [((0.16, 0.05, 0.04), 0.02 * exponent**0.8, exponent)]
     path = made.make_capture(tmp_path, brdf=painted(paint, lambda n: np.zeros(len(n), int)))
     vertices, faces = made.sphere_mesh(4)
@@ -137,8 +140,8 @@ def test_one_material_stays_one(tmp_path: Path, exponent: int) -> None:
     assert (found.labels == 0).all()
 
 
-def test_a_shadow_nobody_explains_is_no_material(tmp_path: Path) -> None:
-    """Something beside the object, not in the scan, darkens one place under one of the lamps."""
+def test_unexplained_shadow_is_not_a_material(tmp_path: Path) -> None:
+    """An occluder that is not in the scan darkens one region under one of the lamps."""
     import OpenImageIO as oiio
 
     path = made.make_capture(tmp_path, photos=6)
@@ -147,19 +150,19 @@ def test_a_shadow_nobody_explains_is_no_material(tmp_path: Path) -> None:
     bright = pixels.sum(axis=2) > 0.3 * pixels.sum(axis=2).max()
     _, columns = np.nonzero(bright)
     dark = (np.indices(bright.shape)[1] < np.median(columns)) & bright
-    pixels[dark] *= 0.15  # some stray light is left
+    pixels[dark] *= 0.15  # some stray light remains
     made.write_exr(tmp_path / "lit_1.exr", pixels)
     assert proposed(path).proposal.count == 1
 
 
-def test_the_number_asked_for(tmp_path: Path) -> None:
+def test_requested_number_of_materials(tmp_path: Path) -> None:
     path = made.make_capture(tmp_path, photos=6)
     one = proposed(path, 1).proposal
     assert one.count == 1 and not one.splits
     assert proposed(path, 2).proposal.count <= 2
 
 
-def test_nothing_lit_is_said(tmp_path: Path) -> None:
+def test_capture_without_lit_surface_is_reported(tmp_path: Path) -> None:
     path = made.make_capture(tmp_path, photos=2)
     for i in (1, 2):
         made.write_exr(tmp_path / f"lit_{i}.exr", np.zeros((made.HEIGHT, made.WIDTH, 3)))
@@ -167,7 +170,7 @@ def test_nothing_lit_is_said(tmp_path: Path) -> None:
         proposed(path)
 
 
-def test_no_cells_is_said() -> None:
+def test_too_few_cells_are_reported() -> None:
     vertices, faces = made.sphere_mesh(2)
     k = 2
     none = Cells(
@@ -183,13 +186,13 @@ def ball() -> Surface:
     return Surface.of(Mesh(vertices, faces.astype(np.int32)))
 
 
-def test_neighbours_share_an_edge() -> None:
+def test_neighbouring_faces_share_an_edge() -> None:
     surface = ball()
     assert (surface.neighbours.sum(axis=1) == 3).all()
     assert np.isclose(surface.area.sum(), 1.0)
 
 
-def test_patches_are_compact_and_about_as_many_as_asked() -> None:
+def test_patches_are_compact_and_near_requested_count() -> None:
     surface = ball()
     patch = surface.patches(200)
     count = patch.max() + 1
@@ -201,7 +204,7 @@ def test_patches_are_compact_and_about_as_many_as_asked() -> None:
     assert (surface.joined(patch).sum(axis=1) > 0).all()
 
 
-def test_noise_is_smoothed_and_islands_vanish() -> None:
+def test_label_noise_is_smoothed_and_islands_are_removed() -> None:
     surface = ball()
     true = (surface.centre[:, 0] > made.CENTRE[0]).astype(int)
     rng = np.random.default_rng(0)
@@ -214,8 +217,8 @@ def test_noise_is_smoothed_and_islands_vanish() -> None:
     assert np.array_equal(without_islands(island, surface, 0.01), true)
 
 
-def test_demo_capture(root: Path) -> None:
-    """Glaze and clay of the embedded capture, against the masks that were painted for it."""
+def test_demo_capture_matches_painted_masks(root: Path) -> None:
+    """Glaze and clay of the embedded capture, compared with the masks painted for it."""
     from patina.core.geometry import view_surface
     from patina.core.inputs import capture_data
     from patina.core.inputs.material_pixels import material_pixels
@@ -238,6 +241,6 @@ def test_demo_capture(root: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["bunny_red", "bunny_bronze", "bunny_fabric"])
-def test_scans_of_one_material(shared: Path, name: str) -> None:
+def test_real_scans_of_one_material_are_not_split(shared: Path, name: str) -> None:
     found = proposed(shared / "data" / "scans" / name / "scan.capture.toml").proposal
     assert found.count == 1, found.splits

@@ -1,4 +1,4 @@
-"""Captures at the edge of what the measured fit is for: few, odd, broken, very many samples."""
+"""Limits of the measured fit: few, unusual, invalid and very many samples."""
 
 from __future__ import annotations
 
@@ -53,9 +53,10 @@ def samples(
     grazing: bool = False,
     rho: tuple[float, float, float] | None = None,
 ) -> SampleTable:
-    """``count`` lit samples of all photos together, of a glossy material of the basis, or of a
-    Lambertian one; flash: the light at the camera; grazing: light and view within 15° of the
-    surface."""
+    """``count`` lit samples of all photos together, of a glossy material of the basis or of a
+    Lambertian one; flash: the light is at the camera; grazing: light and view within 15° of the
+    surface.
+    """
     rng = np.random.default_rng(7)
     n = 40 * count
     photo = rng.integers(0, photos, n)
@@ -107,8 +108,8 @@ def truth() -> LogTable:
     return LogTable.of(default_basis(), c)
 
 
-def is_whole(fit: MeasuredFit) -> None:
-    """Every number that is kept or told is one, and the report can write it."""
+def is_finite(fit: MeasuredFit) -> None:
+    """Every stored or reported number is finite, and the report can be written."""
     basis = fit.brdf.basis
     nodes = Angles(*(a.ravel()[::97] for a in basis.grid.nodes()))
     rho = fit.brdf.evaluate(nodes)
@@ -142,35 +143,35 @@ def is_whole(fit: MeasuredFit) -> None:
     ],
     ids=lambda case: " ".join(str(v) for v in case.values()),
 )
-def test_odd_captures_give_whole_numbers(case: dict) -> None:
+def test_unusual_captures_give_finite_results(case: dict) -> None:
     table = samples(**case)
     fit = fit_measured(table, default_basis(), QUICK)
-    is_whole(fit)
+    is_finite(fit)
     photos = np.unique(table.photo).tolist()
     assert sorted(fit.without) == (photos if len(photos) > 1 else [])
 
 
-def test_a_grey_material_stays_grey() -> None:
+def test_grey_material_stays_grey() -> None:
     fit = fit_measured(samples(400, rho=(0.3, 0.3, 0.3)), default_basis(), QUICK)
     c = fit.brdf.coefficients
     assert np.allclose(c[0], c[1], atol=1e-5) and np.allclose(c[0], c[2], atol=1e-5)
 
 
-def test_a_black_material_is_black() -> None:
+def test_black_material_stays_black() -> None:
     table = samples(1000, rho=(0.0, 0.0, 0.0))
     fit = fit_measured(table, default_basis(), QUICK)
     assert np.median(fit.brdf.evaluate(table.angles)) < 2e-3
 
 
-def test_all_samples_in_one_place() -> None:
+def test_all_samples_at_one_direction() -> None:
     table = samples(200)
     patches = Patches.of_points(np.ones((200, 3)))
     assert patches.count == 1 and patches.neighbours.shape == (1, 1)
-    is_whole(fit_measured(replace(table, point=np.ones((200, 3))), default_basis(), QUICK))
+    is_finite(fit_measured(replace(table, point=np.ones((200, 3))), default_basis(), QUICK))
 
 
-def test_broken_samples_are_left_out() -> None:
-    """NaN, infinity, no light: as if they had not been there."""
+def test_invalid_samples_are_ignored() -> None:
+    """NaN, infinity and zero light: the result is that of the samples without them."""
     table = samples(600)
     radiance, irradiance, point = (
         np.array(a) for a in (table.radiance, table.irradiance, table.point)
@@ -186,7 +187,7 @@ def test_broken_samples_are_left_out() -> None:
     assert fit.brdf.coefficients.tobytes() == expected.brdf.coefficients.tobytes()
 
 
-def test_too_few_whole_samples_are_refused() -> None:
+def test_too_few_valid_samples_are_rejected() -> None:
     table = samples(60)
     radiance = np.array(table.radiance)
     radiance[:20] = np.nan
@@ -194,8 +195,8 @@ def test_too_few_whole_samples_are_refused() -> None:
         fit_measured(replace(table, radiance=radiance), default_basis(), QUICK)
 
 
-def test_large_curved_patches_leave_a_normal_deviation() -> None:
-    """Patches that see all three axes: what is left of the prior's is no negative variance."""
+def test_large_curved_patches_keep_positive_normal_variance() -> None:
+    """Patches that see all three axes: the prior's remaining variance does not become negative."""
     table = samples(3000, photos=8)
     octant = (table.normal > 0) @ np.array([1, 2, 4])
     _, of = np.unique(octant, return_inverse=True)
@@ -208,7 +209,7 @@ def test_large_curved_patches_leave_a_normal_deviation() -> None:
 
 
 def model_of(photos: int, cells: int, basis: Basis) -> CellModel:
-    """Cells without a surface: random angles, radiance that disagrees by 30 %."""
+    """Cells without a surface: random angles, and radiance with an error of 30 %."""
     rng = np.random.default_rng(5)
     angles = Angles(*(rng.uniform(0, high, cells) for high in (0.6, 0.7, 6.2)))
     return CellModel.of(
@@ -223,10 +224,12 @@ def model_of(photos: int, cells: int, basis: Basis) -> CellModel:
     )
 
 
-def whole_matrices(
+def dense_step(
     model: CellModel, prior: ChannelPrior, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, dict[int, np.ndarray]]:
-    """One step by whole matrices (3k + p)² of every photo: (precision, covariance, without)."""
+    """One Gauss-Newton step with dense (3k + p)² matrices of every photo: (precision, covariance,
+    held_out).
+    """
     k, (photos, place) = len(prior.own), np.unique(model.cells.photo, return_inverse=True)
     p, n = len(photos), 3 * k
     prediction = model.predict(start)
@@ -265,25 +268,27 @@ def whole_matrices(
 
 
 @pytest.mark.parametrize("coupled", [False, True])
-def test_leaving_out_agrees_with_whole_matrices(coupled: bool) -> None:
+def test_leave_one_photo_out_agrees_with_dense_matrices(coupled: bool) -> None:
     basis = default_basis()
     model = model_of(5, 600, basis)
     prior = ChannelPrior.of(basis, 12, coupled)
     prior = prior.with_grazing_prior(extrapolated(model, np.zeros((3, 12))), 1.0)
     start = solve(model, prior, 0.15, None, False, 30, 10.0).coefficients
     found = solve(model, prior, 0.15, start, True, 1, 10.0)
-    precision, covariance, without = whole_matrices(model, prior, start)
+    precision, covariance, without = dense_step(model, prior, start)
     assert np.allclose(found.precision.dense(), precision, rtol=1e-8, atol=1e-8)
     assert np.allclose(found.covariance(), covariance, rtol=1e-8, atol=1e-8 * covariance.max())
     size = np.sqrt(basis.coefficient_variance)
     for photo, c in found.without.items():
-        assert np.abs(c - found.coefficients).max() > 0.05 * size  # or nothing is tested
+        assert (
+            np.abs(c - found.coefficients).max() > 0.05 * size
+        )  # otherwise the test checks nothing
         assert np.abs(c - without[photo]).max() < 1e-8 * size
 
 
 @pytest.mark.parametrize("photos", [2, 4])
-def test_leaving_out_is_near_a_fit_without(photos: int) -> None:
-    """Photos that disagree by a tenth: one step goes to what the others alone say."""
+def test_leave_one_photo_out_approximates_refit_without_photo(photos: int) -> None:
+    """Photos that disagree by a tenth: one step moves towards the fit to the other photos alone."""
     basis = default_basis()
     table = samples(4000, photos)
     colour = np.exp(np.random.default_rng(0).normal(0, 0.1, (photos, 3))).astype(np.float32)
@@ -294,11 +299,11 @@ def test_leaving_out_is_near_a_fit_without(photos: int) -> None:
     for photo, c in whole.without.items():
         rest = model.select(model.cells.photo != photo)
         alone = solve(rest, prior, 0.15, whole.coefficients, False, 60, 10.0).coefficients
-        missed, moved = np.linalg.norm(c - alone), np.linalg.norm(whole.coefficients - alone)
-        assert missed < 0.35 * moved  # regions have their votes anew without the photo
+        residual_norm, moved = np.linalg.norm(c - alone), np.linalg.norm(whole.coefficients - alone)
+        assert residual_norm < 0.35 * moved  # cell weights are computed anew without the photo
 
 
-def test_an_arrow_is_its_matrix() -> None:
+def test_arrow_solve_and_marginal_match_dense_matrix() -> None:
     rng = np.random.default_rng(6)
     n, p = 7, 5
     root = rng.normal(size=(n, n))
@@ -309,14 +314,14 @@ def test_an_arrow_is_its_matrix() -> None:
     assert np.allclose(np.linalg.inv(arrow.marginal()), inverse)
 
 
-def test_memory_does_not_grow_with_the_photos() -> None:
-    """Whole matrices of 400 photos would take 400 × 490² numbers, 770 MB; blocks 10 MB."""
+def test_memory_does_not_grow_with_photo_count() -> None:
+    """Dense matrices of 400 photos would take 400 × 490² numbers, 770 MB; the blocks take 10 MB."""
     basis = default_basis()
     prior = ChannelPrior.of(basis, 30, coupled=False)
     peaks = []
     for photos in (2, 400):
         model = model_of(photos, 1200, basis)
-        assert len(basis.nodes)  # kept, and no part of what is measured
+        assert len(basis.nodes)  # allocated before, and not part of the measured memory
         tracemalloc.start()
         found = solve(model, prior, 0.15, iterations=1, temperature=10.0)
         peaks.append(tracemalloc.get_traced_memory()[1])
@@ -325,15 +330,17 @@ def test_memory_does_not_grow_with_the_photos() -> None:
     assert peaks[1] < peaks[0] + 20e6
 
 
-def test_cells_of_very_many_photos_stay_few() -> None:
+def test_cell_count_stays_bounded_for_many_photos() -> None:
     table = samples(20_000, photos=2000)
     cells = gather(table, 0.01)
     assert len(cells) <= 60_000 and cells.count.sum() == 20_000
     assert np.array_equal(np.unique(cells.photo), np.unique(table.photo))
 
 
-def test_a_black_photo_has_no_relative_error() -> None:
-    """A lens cap: its error is no fraction of its light, and drowns no other."""
+def test_black_photo_has_no_relative_error() -> None:
+    """A photo taken with the lens cap on: its error is no fraction of its light and must not hide
+    the others.
+    """
     table = samples(600)
     dark = table.photo == 1
     radiance = np.where(dark[:, None], np.float32(0), table.radiance)
@@ -346,8 +353,10 @@ def test_a_black_photo_has_no_relative_error() -> None:
     assert summarise([one]) is None
 
 
-def test_noise_below_black_divides_nothing() -> None:
-    """Most of a photo at and below zero, as dark raw frames are: no infinite relative error."""
+def test_noise_below_black_level_gives_no_infinite_error() -> None:
+    """Most of a photo is at or below zero, as in dark raw frames: no relative error becomes
+    infinite.
+    """
     table = samples(400, photos=1)
     radiance = np.full_like(table.radiance, -1e-3)
     radiance[:100] = 0.0
@@ -359,7 +368,7 @@ def test_noise_below_black_divides_nothing() -> None:
     assert len(found.relative) == 80
 
 
-def test_pixels_beside_a_narrow_beam_are_left_out(tmp_path: Path) -> None:
+def test_pixels_outside_narrow_beam_are_excluded(tmp_path: Path) -> None:
     """A torch lights the middle of a photo that is black elsewhere: 0/0 is no reflectance."""
     capture = read_capture(made.make_capture(tmp_path))
     scan = capture_data.open_scan(capture)

@@ -37,16 +37,16 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> SampleTable:
     return sampled(made.make_capture(tmp_path_factory.mktemp("ball")))[0]
 
 
-def test_scatter_integrates_a_plane_gaussian() -> None:
+def test_normal_quadrature_integrates_planar_gaussian() -> None:
     offsets, weights = rings()
     r2 = np.sum(offsets**2, axis=1)
     assert weights.sum() == pytest.approx(1.0)
     assert np.abs(weights @ offsets).max() < 1e-12
-    for power, moment in ((1, 2.0), (2, 8.0), (3, 48.0), (4, 384.0)):  # E r^2p of a plane Gaussian
+    for power, moment in ((1, 2.0), (2, 8.0), (3, 48.0), (4, 384.0)):  # E r^2p of a planar Gaussian
         assert weights @ r2**power == pytest.approx(moment, rel=1e-9)
 
 
-def test_no_scatter_is_the_direction_itself() -> None:
+def test_zero_normal_spread_gives_the_direction_itself() -> None:
     angles = Angles(np.array([0.1, 0.5]), np.array([0.3, 0.9]), np.array([1.0, 2.0]))
     seen, cos_i, cos_o, weights = quadrature_angles(angles, np.zeros(2))
     assert np.allclose(np.stack(seen)[..., 0], np.stack(angles))
@@ -55,14 +55,14 @@ def test_no_scatter_is_the_direction_itself() -> None:
     assert weights.tolist() == [1.0]
 
 
-def test_cells_keep_every_sample_and_the_mean_light(table: SampleTable) -> None:
+def test_cells_keep_sample_count_and_mean_light(table: SampleTable) -> None:
     cells = gather(table, 0.0)
     assert cells.count.sum() == len(table)
     light = (table.radiance / table.irradiance).sum(axis=0)
     assert np.allclose((cells.reflected * cells.count[:, None]).sum(axis=0), light, rtol=0.01)
 
 
-def test_slopes_are_those_of_the_prediction(table: SampleTable) -> None:
+def test_jacobian_matches_finite_differences_of_prediction(table: SampleTable) -> None:
     basis = default_basis()
     cells = gather(table, np.radians(1.0)).select(np.arange(0, 400))
     model = CellModel.of(cells, basis)
@@ -79,7 +79,7 @@ def test_slopes_are_those_of_the_prediction(table: SampleTable) -> None:
             assert np.abs(difference).max() < 2e-2 * max(1.0, np.abs(numeric).max())
 
 
-def test_part_of_a_model_predicts_as_the_whole(table: SampleTable) -> None:
+def test_model_subset_predicts_like_full_model(table: SampleTable) -> None:
     model = CellModel.of(gather(table, np.radians(0.5)), default_basis())
     c = 0.02 * np.random.default_rng(1).standard_normal((3, 8))
     some = np.random.default_rng(2).random(len(model.cells)) < 0.4
@@ -88,7 +88,7 @@ def test_part_of_a_model_predicts_as_the_whole(table: SampleTable) -> None:
     assert np.allclose(part.jacobian[1], whole.jacobian[1][some], rtol=1e-4, atol=1e-5)
 
 
-def test_precision_is_the_inverse_of_the_priors_covariance() -> None:
+def test_prior_precision_is_inverse_of_its_covariance() -> None:
     rng = np.random.default_rng(3)
     shared, own = rng.random(4), 0.1 + rng.random(4)
     prior = ChannelPrior(shared, own)
@@ -99,8 +99,10 @@ def test_precision_is_the_inverse_of_the_priors_covariance() -> None:
     assert np.allclose(prior.precision() @ covariance, np.eye(12))
 
 
-def test_anchors_carry_the_lobes_change_on() -> None:
-    """A BRDF that IS lobes up to the edge goes on halfway between its edge and the lobes."""
+def test_grazing_prior_continues_change_of_lobes() -> None:
+    """A BRDF that equals the lobes up to the edge continues halfway between its edge value and the
+    lobes.
+    """
     basis = default_basis()
     lobes = Lobes(np.log([0.1] * 3 + [0.3, 1.0] + [0.05] * 3 + [0.1, 1.0] + [1e-6] * 3), 0.0)
     k = basis.count
@@ -122,7 +124,7 @@ def test_anchors_carry_the_lobes_change_on() -> None:
     assert off < 0.35 * mean
 
 
-def test_lobes_find_a_lambertian_surface(table: SampleTable) -> None:
+def test_lobe_fit_recovers_lambertian_surface(table: SampleTable) -> None:
     grey = np.array([0.3, 0.2, 0.1])
     light = table.irradiance * table.cos_i[:, None] * grey.astype(np.float32)
     cells = gather(replace(table, radiance=light), 0.0)
@@ -131,8 +133,8 @@ def test_lobes_find_a_lambertian_surface(table: SampleTable) -> None:
     assert np.allclose(rho[0], grey, rtol=0.05) and lobes.misfit < 0.02
 
 
-def test_normals_come_back(table: SampleTable) -> None:
-    """A glossy material, normals tilted smoothly by two degrees: most of the tilt is found."""
+def test_smooth_normal_errors_are_recovered(table: SampleTable) -> None:
+    """A glossy material, normals tilted smoothly by two degrees: most of the tilt is recovered."""
     basis = default_basis()
     truth = made_brdf(basis)
     radiance = truth.evaluate(table.angles) * table.irradiance * table.cos_i[:, None]
@@ -149,12 +151,13 @@ def test_normals_come_back(table: SampleTable) -> None:
     def typical(normal: np.ndarray) -> float:
         return float(np.median(np.linalg.norm(normal - true, axis=1)))
 
-    # one photo fixes one of a normal's two directions, and away from highlights neither
+    # one photo fixes one of the two directions of a normal, and neither of them away from
+    # highlights
     assert typical(found.table.normal) < 0.75 * typical(wrong)
     assert np.isfinite(found.error).all() and (found.error >= 0).all()
 
 
-def test_flat_materials_leave_normals_alone(table: SampleTable) -> None:
+def test_diffuse_material_leaves_normals_unchanged(table: SampleTable) -> None:
     basis = default_basis()
     nodes = Angles(*(a.ravel() for a in basis.grid.nodes()))
     cos_i, cos_o = cosines(*nodes)
@@ -167,7 +170,7 @@ def test_flat_materials_leave_normals_alone(table: SampleTable) -> None:
     assert np.median(angle) < np.radians(0.2)
 
 
-def test_the_whole_recovers_a_material(table: SampleTable) -> None:
+def test_full_fit_recovers_known_material(table: SampleTable) -> None:
     basis = default_basis()
     truth = made_brdf(basis)
     shown = truth.evaluate(table.angles) * table.irradiance * table.cos_i[:, None]
@@ -178,29 +181,29 @@ def test_the_whole_recovers_a_material(table: SampleTable) -> None:
     assert np.median(np.abs(error)) < 0.03
     band = fit.band(angles)
     assert band.shape == (2000, 3) and (band > 0).all()
-    unseen = Angles(*(np.array([np.radians(x)]) for x in (1.0, 82.0, 90.0)))
-    assert fit.band(unseen).min() > np.median(band)
+    unobserved = Angles(*(np.array([np.radians(x)]) for x in (1.0, 82.0, 90.0)))
+    assert fit.band(unobserved).min() > np.median(band)
 
 
-def test_the_same_input_gives_the_same_bytes(table: SampleTable) -> None:
+def test_same_input_gives_identical_bytes(table: SampleTable) -> None:
     quick = MeasuredSettings(rounds=1, components=20)
     first, second = (fit_measured(table, default_basis(), quick) for _ in range(2))
     assert first.brdf.coefficients.tobytes() == second.brdf.coefficients.tobytes()
 
 
-def test_too_few_samples_are_refused(table: SampleTable) -> None:
+def test_too_few_samples_are_rejected(table: SampleTable) -> None:
     with pytest.raises(FitError, match="at least"):
         fit_measured(table.select(np.arange(10)), default_basis())
 
 
-def test_patches_touch_their_neighbours(table: SampleTable) -> None:
+def test_patches_overlap_their_neighbours(table: SampleTable) -> None:
     patches = Patches.of_points(table.point)
     assert patches.of.shape == (len(table),)
     assert np.abs(patches.neighbours.sum(axis=1)).max() < 1e-9
     assert 2.0 < len(table) / patches.count < 20.0
 
 
-def test_normals_seen_anew_agree_with_sampling(table: SampleTable) -> None:
+def test_recomputed_angles_agree_with_sampling(table: SampleTable) -> None:
     again = with_normals(table, table.normal.astype(np.float64))
     expected = half_difference(table.normal, table.light, table.view)
     assert np.allclose(again.theta_h, expected.theta_h, atol=1e-6)
@@ -208,14 +211,14 @@ def test_normals_seen_anew_agree_with_sampling(table: SampleTable) -> None:
 
 
 def made_brdf(basis: Basis) -> LogTable:
-    """A glossy material of the basis: its mean and the direction of gloss."""
+    """A glossy material of the basis: its mean shifted along the gloss component."""
     c = np.zeros((3, 6))
     c[:, 0] = 0.04
     c[:, 1] = [0.03, 0.02, 0.01]
     return LogTable.of(basis, c)
 
 
-def test_a_log_table_is_the_basis(table: SampleTable) -> None:
+def test_log_table_matches_basis(table: SampleTable) -> None:
     basis = default_basis()
     c = 0.03 * np.random.default_rng(5).standard_normal((3, 10))
     angles = Angles(*(a[:500] for a in table.angles))
@@ -224,8 +227,10 @@ def test_a_log_table_is_the_basis(table: SampleTable) -> None:
     )
 
 
-def test_cells_of_an_unlikely_material_count_less(table: SampleTable) -> None:
-    """A lobe no measured material has: its coefficients are kept to what measured ones have."""
+def test_cells_of_unlikely_material_get_less_weight(table: SampleTable) -> None:
+    """A lobe that no measured material has: the coefficients stay within the range of the measured
+    ones.
+    """
     basis = default_basis()
     prior = ChannelPrior.of(basis, basis.count, coupled=False)
     likely = made_brdf(basis).evaluate(table.angles)
@@ -241,8 +246,8 @@ def test_cells_of_an_unlikely_material_count_less(table: SampleTable) -> None:
     assert sizes[1] < 2 * MAX_MEAN_SQUARE
 
 
-def test_caution_darkens_only_what_is_unsure() -> None:
-    """One component unknown: the BRDF falls where that component matters, and nowhere else."""
+def test_shrinkage_darkens_only_uncertain_directions() -> None:
+    """One component is unknown: the BRDF decreases only where that component matters."""
     basis = default_basis()
     k = basis.count
     covariance = np.tile(1e-8 * np.eye(k), (3, 1, 1))
@@ -251,12 +256,12 @@ def test_caution_darkens_only_what_is_unsure() -> None:
     variance = basis.coefficient_variance * basis.nodes[:, 3].astype(np.float64) ** 2
     cos_i, cos_o = cosines(*(Angles(*(a.ravel() for a in basis.grid.nodes()))))
     seen = np.minimum(cos_i, cos_o) > 0.05
-    unsure, sure = seen & (variance > 0.2), seen & (variance < 0.002)
-    assert change[unsure].mean() < -0.6 * SHRINKAGE * np.minimum(variance, 1.5)[unsure].mean()
-    assert abs(change[sure].mean()) < 0.02
+    uncertain, certain = seen & (variance > 0.2), seen & (variance < 0.002)
+    assert change[uncertain].mean() < -0.6 * SHRINKAGE * np.minimum(variance, 1.5)[uncertain].mean()
+    assert abs(change[certain].mean()) < 0.02
 
 
-def test_distinct_nodes_of_each_cell() -> None:
+def test_distinct_quadrature_nodes_of_each_cell() -> None:
     index = np.random.default_rng(1).integers(0, 9, (40, 12))
     slot, indptr, node = _distinct(index)
     for i, row in enumerate(index):

@@ -1,4 +1,4 @@
-"""What is kept of a measured fit: its band between nodes, its interval, its gains."""
+"""Stored results of a measured fit: standard deviation between nodes, interval, gains."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from patina.core.fit.spread import candidate_spread
 
 
 def made_result(deviation: float, gains: dict[int, float] | None = None) -> MeasuredResult:
-    """A BRDF of the basis, everywhere as sure."""
+    """A BRDF of the basis with the same uncertainty everywhere."""
     basis = default_basis()
     grid = AngleGrid(*COARSE, basis.grid.knee)
     return MeasuredResult(
@@ -32,27 +32,27 @@ def made_result(deviation: float, gains: dict[int, float] | None = None) -> Meas
 
 @settings(deadline=None, max_examples=30)
 @given(deviation=st.floats(0.001, 1.0))
-def test_the_interval_holds_nine_of_ten_of_a_lognormal(deviation: float) -> None:
+def test_interval_covers_ninety_percent_of_lognormal(deviation: float) -> None:
     result = made_result(deviation)
     angles = Angles(*np.radians([[5.0, 40.0], [20.0, 50.0], [90.0, 30.0]]))
     low, high = result.interval(angles)
     cos_i, cos_o = cosines(*angles)
     weight = np.clip(cos_i * cos_o, 0.01, 1)[:, None]
     middle = result.brdf.evaluate(angles) * weight + 0.001
-    drawn = np.exp(deviation * np.linspace(-1.6448, 1.6448, 2))  # 5 % beyond either
+    drawn = np.exp(deviation * np.linspace(-1.6448, 1.6448, 2))  # 5 % beyond either end
     assert np.allclose(np.maximum(middle * drawn[0] - 0.001, 0) / weight, low, rtol=1e-3, atol=1e-5)
     assert np.allclose((middle * drawn[1] - 0.001) / weight, high, rtol=1e-3, atol=1e-5)
     assert (low <= high).all() and (low >= 0).all()
 
 
-def test_a_band_of_one_width_is_that_width() -> None:
+def test_uniform_band_keeps_its_width() -> None:
     spread = made_result(0.2).band.spread()
     for value in (spread.median, spread.percentile_90, spread.at_highlight):
         assert value == pytest.approx(0.2, rel=1e-5)
 
 
-def test_the_kept_band_is_the_fits_own() -> None:
-    """A posterior of known covariance: the deviation between nodes is that of Q̂ c."""
+def test_stored_band_equals_that_of_fit() -> None:
+    """A posterior of known covariance: the standard deviation between nodes is that of Q̂ c."""
     basis = default_basis()
     rng = np.random.default_rng(0)
     covariance = np.diag(rng.uniform(1e-5, 1e-3, 30))
@@ -73,14 +73,14 @@ def test_the_kept_band_is_the_fits_own() -> None:
     assert np.abs(np.median(ratio) - 1) < 0.03 and np.percentile(np.abs(ratio - 1), 95) < 0.15
 
 
-def test_only_gains_that_matter_are_told() -> None:
+def test_only_significant_gains_are_reported() -> None:
     result = made_result(0.1, {0: 1.0, 1: 1.03, 4: 0.9})
     assert result.gains_beyond(0.02) == {1: 1.03, 4: 0.9}
     assert replace(result, gains={}).gains_beyond(0.0) == {}
 
 
 def test_spread_of_candidates_is_their_standard_deviation() -> None:
-    """Two candidates apart by a step in the first component: ± half of its size."""
+    """Two candidates that differ by a step in the first component: ± half of the step."""
     basis = default_basis()
     c = np.zeros((2, 3, 5))
     c[1, :, 0] = 0.01

@@ -1,4 +1,4 @@
-"""The MERL format: round trip, an independent reading, and broken files."""
+"""The MERL file format: round trip, comparison with an independent reader, and invalid files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_round_trip_keeps_values_and_invalid_cells(table: TabulatedBRDF, tmp_pat
     assert not list(tmp_path.glob("*.part"))
 
 
-def test_a_plain_reader_finds_the_same(table: TabulatedBRDF, tmp_path: Path) -> None:
+def test_independent_reader_reads_same_values(table: TabulatedBRDF, tmp_path: Path) -> None:
     """Byte arithmetic as in the database's own sample code."""
     path = tmp_path / "x.binary"
     merl_file.write(path, table)
@@ -47,17 +47,17 @@ def test_a_plain_reader_finds_the_same(table: TabulatedBRDF, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("cut", [0, 5, 12, 1000, merl_file.SIZE - 1])
-def test_truncated_files_are_refused(table: TabulatedBRDF, tmp_path: Path, cut: int) -> None:
+def test_truncated_files_are_rejected(table: TabulatedBRDF, tmp_path: Path, cut: int) -> None:
     path = tmp_path / "x.binary"
     merl_file.write(path, table)
     with open(path, "r+b") as file:
         file.truncate(cut)
-    with pytest.raises(InputError, match=r"x\.binary") as caught:
+    with pytest.raises(InputError, match=r"x\.binary") as error:
         merl_file.read(path)
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(error.value)
 
 
-def test_wrong_dimensions_and_missing_files_are_refused(tmp_path: Path) -> None:
+def test_wrong_dimensions_and_missing_files_are_rejected(tmp_path: Path) -> None:
     path = tmp_path / "x.binary"
     path.write_bytes(np.array([90, 90, 360], "<i4").tobytes() + bytes(100))
     with pytest.raises(InputError, match="expected"):
@@ -66,7 +66,7 @@ def test_wrong_dimensions_and_missing_files_are_refused(tmp_path: Path) -> None:
         merl_file.read(tmp_path / "none.binary")
 
 
-def test_interpolation_is_exact_at_centres_and_between_them(table: TabulatedBRDF) -> None:
+def test_interpolation_at_and_between_cell_centres(table: TabulatedBRDF) -> None:
     centres = merl_grid.node_angles(0.5)
     pick = (np.array([2, 30, 60]), np.array([10, 20, 15]), np.array([179, 0, 90]))
     at = type(centres)(*(a[pick] for a in centres))
@@ -74,8 +74,8 @@ def test_interpolation_is_exact_at_centres_and_between_them(table: TabulatedBRDF
     assert np.allclose(table.nearest(at), table.values[(slice(None), *pick)].T)
 
 
-def test_genuine_numbers_read_as_published(shared: Path, tmp_path: Path) -> None:
-    """Raw numbers of genuine files, written by hand at their place, read as raw / 1500."""
+def test_values_of_genuine_files_read_as_published(shared: Path, tmp_path: Path) -> None:
+    """Raw values of genuine files, written at their index, are read as raw / 1500."""
     raw = np.loadtxt(shared / "data" / "brdf" / "real_merl_anchor_raw_rows.txt").reshape(3, 100)
     path = tmp_path / "genuine.binary"
     for row in raw:

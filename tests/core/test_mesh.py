@@ -1,4 +1,4 @@
-"""Meshes: formats, seams, polygons, attributes."""
+"""Meshes: formats, seams, polygons, face attributes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests import make_capture as made
 
 
 def write_obj_with_seams(path: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
-    """Every face with texture coordinates of its own, as an unwrapped scan has at its seams."""
+    """Each face gets its own texture coordinates, as an unwrapped scan has at its seams."""
     lines = ["# a comment", "o ball", *(f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices)]
     lines += [f"vt {i % 7 / 7:.4f} {i % 5 / 5:.4f}" for i in range(3 * len(faces))]
     for i, (a, b, c) in enumerate(faces):
@@ -37,7 +37,7 @@ def test_normals_are_smooth_across_texture_seams(tmp_path: Path) -> None:
     assert off.max() < 0.2  # 2° and more where seams cut the normals
 
 
-def test_the_same_surface_from_every_format(tmp_path: Path) -> None:
+def test_all_formats_give_same_surface(tmp_path: Path) -> None:
     vertices, faces = made.sphere_mesh(2)
     made.write_ply(tmp_path / "a.ply", vertices, faces)
     write_obj_with_seams(tmp_path / "b.obj", vertices, faces)
@@ -45,7 +45,7 @@ def test_the_same_surface_from_every_format(tmp_path: Path) -> None:
     assert np.allclose(a.vertices[a.faces], b.vertices[b.faces], atol=1e-7)
 
 
-def test_polygons_are_cut_into_triangles(tmp_path: Path) -> None:
+def test_polygons_are_triangulated(tmp_path: Path) -> None:
     path = tmp_path / "quad.obj"
     path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n")
     mesh = read_mesh(path)
@@ -65,7 +65,7 @@ def test_coordinates_keep_their_precision(tmp_path: Path) -> None:
 
 
 def test_materials_by_face_attribute(tmp_path: Path) -> None:
-    """Two halves of the ball of two colours; the mesh says which face is which."""
+    """The two halves of the ball differ in colour; a face attribute gives each face's half."""
     vertices, faces = made.sphere_mesh(5)
     path = made.make_capture(
         tmp_path / "ball",
@@ -88,13 +88,13 @@ def test_materials_by_face_attribute(tmp_path: Path) -> None:
 
 
 def two_halves(normal: np.ndarray, light: np.ndarray, view: np.ndarray) -> np.ndarray:
-    """On a sphere the normal says where a point lies: blue above, red below."""
+    """On a sphere the normal gives the position of a point: blue above, red below."""
     blue = made.blinn(normal, light, view)[:, ::-1]
     return np.where(normal[:, 2:] > 0, blue, made.blinn(normal, light, view))
 
 
-def test_degenerate_and_doubled_faces_are_dropped_with_their_attributes(tmp_path: Path) -> None:
-    """Blender drops them too: face numbers must mean the same on both sides."""
+def test_degenerate_and_duplicate_faces_are_dropped_with_attributes(tmp_path: Path) -> None:
+    """Blender drops them too: face indices must mean the same in both."""
     vertices, faces = made.sphere_mesh(1)
     more = np.concatenate([[faces[0]], [[3, 3, 4]], faces, [faces[5][[1, 2, 0]]]])
     made.write_ply(tmp_path / "m.ply", vertices, more, np.arange(len(more)))
@@ -103,13 +103,13 @@ def test_degenerate_and_doubled_faces_are_dropped_with_their_attributes(tmp_path
     assert mesh.face_attributes["part"].tolist() == [0, *range(3, len(faces) + 2)]
 
 
-def test_an_unmasked_material_is_what_no_mask_names(tmp_path: Path) -> None:
+def test_material_without_mask_covers_unmasked_pixels(tmp_path: Path) -> None:
     path = made.make_capture(tmp_path / "ball", photos=3, extra="[fit]\nheld_out = false")
     mask = np.zeros((made.HEIGHT, made.WIDTH))
     mask[:, : made.WIDTH // 2] = 255
     made.write_png(path.parent / "left.png", mask)
     text = path.read_text()
-    for i in (1, 2):  # the third photo has no mask: nobody looked there
+    for i in (1, 2):  # the third photo has no mask, so nothing is assigned there
         text = text.replace(
             f'light = "lamp{i}"\n', f'light = "lamp{i}"\nmasks = {{gold = "left.png"}}\n', 1
         )

@@ -1,4 +1,4 @@
-"""Damaged and hostile meshes: one line that names the file, soon, in little memory."""
+"""Damaged and hostile meshes: a one-line error that names the file, in bounded time and memory."""
 
 from __future__ import annotations
 
@@ -21,15 +21,17 @@ from tests import make_meshes as made
 SAMPLES = made.samples()
 FUZZ = settings(
     max_examples=150,
-    deadline=None,  # read_or_refuse counts the seconds of the reader alone
+    deadline=None,  # read_or_reject measures the seconds of the reader alone
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 MEMORY, FLOOR = 60, 16 << 20  # times the file's size; and what any file may take
 
 
-def read_or_refuse(folder: Path, name: str, content: bytes) -> Mesh | None:
-    """The mesh, which is then sound; or None after one InputError of one line that names the file.
-    Anything else fails, and so do five seconds and sixty times the file's size."""
+def read_or_reject(folder: Path, name: str, content: bytes) -> Mesh | None:
+    """Return the mesh, which is then valid, or None after one InputError of one line that names the
+    file. Anything else fails, and so do five seconds of work or sixty times the file's size in
+    memory.
+    """
     path = folder / name
     path.write_bytes(content)
     tracemalloc.start()
@@ -59,20 +61,21 @@ def read_or_refuse(folder: Path, name: str, content: bytes) -> Mesh | None:
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-def test_cut_short_anywhere(tmp_path: Path, name: str) -> None:
-    """A file that ends early is refused; an OBJ, which has no end, is read with a warning or with
-    the faces that whole lines hold."""
+def test_file_truncated_at_any_place(tmp_path: Path, name: str) -> None:
+    """A truncated file is rejected; an OBJ, which has no end mark, is read with a warning or with
+    the faces of its complete lines.
+    """
     whole = SAMPLES[name]
     rng = np.random.default_rng(5)
     for length in rng.integers(0, len(whole) - 1, 50):
-        mesh = read_or_refuse(tmp_path, name, whole[:length])
+        mesh = read_or_reject(tmp_path, name, whole[:length])
         if mesh is None:
             continue
         if name.endswith(".obj"):
             cut_in_a_line = not whole[:length].endswith(b"\n")
             assert bool(mesh.notes) == cut_in_a_line
         else:
-            # an ascii file without its last line break may still be whole
+            # an ASCII file without its last line break may still be complete
             assert name.startswith("ascii") and length > len(whole) - 16
 
 
@@ -93,7 +96,7 @@ def changed(name: str, place: int, content: bytes) -> bytes:
 @example(place=300, content=b"\x00\x00\xc0\x7f")  # NaN
 @example(place=301, content=b"-99999 ")
 def test_fuzz_changed_bytes(tmp_path: Path, name: str, place: int, content: bytes) -> None:
-    read_or_refuse(tmp_path, name, changed(name, place, content))
+    read_or_reject(tmp_path, name, changed(name, place, content))
 
 
 OBJ_WORDS = st.sampled_from(
@@ -112,8 +115,8 @@ OBJ_WORDS = st.sampled_from(
 @example(words=["f"])
 def test_fuzz_obj_text(tmp_path: Path, words: list[str]) -> None:
     base = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1 2 3\n"
-    read_or_refuse(tmp_path, "m.obj", (base + " ".join(words)).encode())
-    read_or_refuse(tmp_path, "m.obj", " ".join(words).encode())
+    read_or_reject(tmp_path, "m.obj", (base + " ".join(words)).encode())
+    read_or_reject(tmp_path, "m.obj", " ".join(words).encode())
 
 
 PLY_LINES = st.sampled_from(
@@ -139,8 +142,8 @@ PLY_LINES = st.sampled_from(
          body=bytes(9 + 36) + b"\x03" + struct.pack("<3i", 0, 1, 2))  # fmt: skip
 def test_fuzz_ply_headers(tmp_path: Path, lines: list[str], body: bytes) -> None:
     head = "\n".join(["ply", *lines, "end_header"]) + "\n"
-    read_or_refuse(tmp_path, "m.ply", head.encode() + body)
-    read_or_refuse(tmp_path, "m.ply", head.encode() + body.hex(" ").encode())
+    read_or_reject(tmp_path, "m.ply", head.encode() + body)
+    read_or_reject(tmp_path, "m.ply", head.encode() + body.hex(" ").encode())
 
 
 JSON = st.recursive(
@@ -193,7 +196,7 @@ def test_fuzz_gltf_documents(tmp_path: Path, place: tuple, value: object) -> Non
         holder = holder[key]
     holder[place[-1]] = value
     text = json.dumps(document)
-    read_or_refuse(tmp_path, "m.gltf", text.encode())
+    read_or_reject(tmp_path, "m.gltf", text.encode())
 
 
 PLY_HEAD = (
@@ -207,28 +210,28 @@ PLY_HEAD = (
 def test_absurd_counts_in_ply(tmp_path: Path, form: str, v: int, f: int) -> None:
     head = PLY_HEAD.format(form=form, v=v, f=f, count="uchar").encode()
     body = b"0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n" if form == "ascii" else bytes(36) + b"\3" + bytes(12)
-    assert read_or_refuse(tmp_path, "m.ply", head + body) is None
+    assert read_or_reject(tmp_path, "m.ply", head + body) is None
 
 
 @pytest.mark.parametrize("count", [-1, 2**31 - 1, -(2**31)])
-def test_absurd_lists_in_ply(tmp_path: Path, count: int) -> None:
+def test_absurd_list_lengths_in_ply(tmp_path: Path, count: int) -> None:
     head = PLY_HEAD.format(form="binary_little_endian", v=3, f=2, count="int").encode()
     good = struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0)
     for rows in ((3, count), (count, 3)):
         body = b"".join(struct.pack("<4i", n, 0, 1, 2) for n in rows)
-        assert read_or_refuse(tmp_path, "m.ply", head + good + body) is None
+        assert read_or_reject(tmp_path, "m.ply", head + good + body) is None
 
 
 def test_absurd_counts_in_stl_and_glb(tmp_path: Path) -> None:
     stl = bytearray(SAMPLES["binary.stl"])
     for count in (0, 79, 81, 2**31, 2**32 - 1):
         stl[80:84] = struct.pack("<I", count)
-        assert read_or_refuse(tmp_path, "m.stl", bytes(stl)) is None
+        assert read_or_reject(tmp_path, "m.stl", bytes(stl)) is None
     glb = SAMPLES["one.glb"]
     for place in (8, 12):  # the length of all, of the JSON
         for length in (0, 7, 2**31, 2**32 - 1):
             content = glb[:place] + struct.pack("<I", length) + glb[place + 4 :]
-            assert read_or_refuse(tmp_path, "m.glb", content) is None
+            assert read_or_reject(tmp_path, "m.glb", content) is None
 
 
 @pytest.mark.parametrize(
@@ -242,8 +245,8 @@ def test_absurd_counts_in_stl_and_glb(tmp_path: Path) -> None:
         "v 0,5 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
     ],
 )
-def test_numbers_no_surface_has(tmp_path: Path, text: str) -> None:
-    assert read_or_refuse(tmp_path, "m.obj", text.encode()) is None
+def test_invalid_coordinates_are_rejected(tmp_path: Path, text: str) -> None:
+    assert read_or_reject(tmp_path, "m.obj", text.encode()) is None
 
 
 @pytest.mark.parametrize(
@@ -258,7 +261,7 @@ def test_numbers_no_surface_has(tmp_path: Path, text: str) -> None:
         ("f 1 2 99999999999999999999999", "the file has 3"),
     ],
 )
-def test_a_wrong_face_is_named_with_its_line(tmp_path: Path, face: str, message: str) -> None:
+def test_invalid_face_error_names_its_line(tmp_path: Path, face: str, message: str) -> None:
     path = tmp_path / "m.obj"
     path.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n{face}\n")
     with pytest.raises(InputError, match=rf"m\.obj:6: .*{message}"):
@@ -266,15 +269,15 @@ def test_a_wrong_face_is_named_with_its_line(tmp_path: Path, face: str, message:
 
 
 @pytest.mark.parametrize("name", ["plain.obj", "ascii.ply", "ascii.stl"])
-def test_texts_in_another_encoding(tmp_path: Path, name: str) -> None:
+def test_text_in_other_encodings(tmp_path: Path, name: str) -> None:
     text = SAMPLES[name].decode()
-    assert read_or_refuse(tmp_path, name, text.encode("utf-16")) is None
-    assert read_or_refuse(tmp_path, name, text.encode("utf-32-le")) is None
-    assert read_or_refuse(tmp_path, name, b"\x1f\x8b" + bytes(range(256)) * 4) is None
+    assert read_or_reject(tmp_path, name, text.encode("utf-16")) is None
+    assert read_or_reject(tmp_path, name, text.encode("utf-32-le")) is None
+    assert read_or_reject(tmp_path, name, b"\x1f\x8b" + bytes(range(256)) * 4) is None
 
 
-def test_meshes_repeated_without_end(tmp_path: Path) -> None:
-    """A small file whose nodes all show one mesh of many triangles."""
+def test_excessive_mesh_instances_are_rejected(tmp_path: Path) -> None:
+    """A small file whose nodes all instance one mesh of many triangles."""
     writer = made.GltfWriter()
     count = 60_000
     vertices = np.zeros((3, 3))
@@ -292,47 +295,47 @@ def test_meshes_repeated_without_end(tmp_path: Path) -> None:
     assert time.process_time() - begin < 5
 
 
-def test_accessors_of_nothing_are_counted(tmp_path: Path) -> None:
-    """An accessor without a bufferView is all zeros, of whatever length the document asks for."""
+def test_accessors_without_buffer_count_towards_limit(tmp_path: Path) -> None:
+    """An accessor without a bufferView is all zeros, of any length that the document requests."""
     writer = made.simple_gltf(*made.two_triangles())
     writer.document["accessors"][0] = {"componentType": 5126, "count": 2**45, "type": "VEC3"}
-    assert read_or_refuse(tmp_path, "m.glb", writer.glb()) is None
+    assert read_or_reject(tmp_path, "m.glb", writer.glb()) is None
 
 
-def test_files_that_are_long_to_look_at(tmp_path: Path) -> None:
-    """Self-cutting faces of all sizes; rows of no use; nodes and materials without number."""
+def test_slow_to_parse_files_are_bounded(tmp_path: Path) -> None:
+    """Self-intersecting faces of all sizes, unused rows, and very many nodes and materials."""
     rng = np.random.default_rng(0)
     vertices = "".join(f"v {x:.3f} {y:.3f} 0\n" for x, y in rng.random((300, 2)))
     faces = [rng.permutation(300)[:n] + 1 for n in range(4, 256)]
     text = vertices + "".join("f " + " ".join(map(str, face)) + "\n" for face in faces)
-    read_or_refuse(tmp_path, "m.obj", text.encode())
-    read_or_refuse(tmp_path, "m.obj", (text * 20).encode())
-    read_or_refuse(tmp_path, "m.obj", (vertices + "f " + "1 2 3 " * 200_000).encode())
+    read_or_reject(tmp_path, "m.obj", text.encode())
+    read_or_reject(tmp_path, "m.obj", (text * 20).encode())
+    read_or_reject(tmp_path, "m.obj", (vertices + "f " + "1 2 3 " * 200_000).encode())
     head = PLY_HEAD.format(form="binary_little_endian", v=3, f=1, count="uchar")
     edges = "element edge 400000\nproperty list uchar uchar b\nelement vertex"
-    read_or_refuse(
+    read_or_reject(
         tmp_path, "m.ply", head.replace("element vertex", edges).encode() + b"\1" * 10**6
     )
     many = {"asset": {"version": "2.0"}, "nodes": [{}] * 300_000}
-    assert read_or_refuse(tmp_path, "m.gltf", json.dumps(many).encode()) is None
+    assert read_or_reject(tmp_path, "m.gltf", json.dumps(many).encode()) is None
     switches = "".join(f"usemtl {i}\nf 1 2 3\n" for i in range(20_000))
     library = "".join(f"newmtl {i}\nmap_Kd {i}.png\n" for i in range(20_000))
     (tmp_path / "m.mtl").write_text(library)
-    read_or_refuse(tmp_path, "m.obj", f"mtllib m.mtl\n{vertices}{switches}".encode())
+    read_or_reject(tmp_path, "m.obj", f"mtllib m.mtl\n{vertices}{switches}".encode())
 
 
-def test_deep_json_and_deep_trees(tmp_path: Path) -> None:
-    assert read_or_refuse(tmp_path, "m.gltf", b"[" * 200_000) is None
-    assert read_or_refuse(tmp_path, "m.gltf", b'{"a":' * 200_000) is None
+def test_deeply_nested_json_and_node_trees(tmp_path: Path) -> None:
+    assert read_or_reject(tmp_path, "m.gltf", b"[" * 200_000) is None
+    assert read_or_reject(tmp_path, "m.gltf", b'{"a":' * 200_000) is None
     writer = made.simple_gltf(*made.two_triangles())
     depth = 5_000
     writer.document["nodes"] = [{"children": [i + 1]} for i in range(depth)] + [{"mesh": 0}]
-    assert read_or_refuse(tmp_path, "m.glb", writer.glb()) is not None
+    assert read_or_reject(tmp_path, "m.glb", writer.glb()) is not None
     writer.document["nodes"][-1] = {"children": [0]}
-    assert read_or_refuse(tmp_path, "m.glb", writer.glb()) is None
+    assert read_or_reject(tmp_path, "m.glb", writer.glb()) is None
 
 
-def test_names_that_leave_the_folder(tmp_path: Path) -> None:
+def test_paths_outside_mesh_folder_are_not_followed(tmp_path: Path) -> None:
     """Neither a library nor a texture is followed out of the mesh's folder, nor is it an error."""
     folder = tmp_path / "scan"
     folder.mkdir()
@@ -363,13 +366,13 @@ def test_names_that_leave_the_folder(tmp_path: Path) -> None:
 @example(name="~/x")
 @example(name="x" * 5000)
 @example(name="//server/share/x.png")
-def test_fuzz_names(name: str) -> None:
+def test_fuzz_file_names(name: str) -> None:
     here = Path(__file__)
     found = resolve_inside(here, name)
     assert found is None or here.parent.resolve() in found.parents
 
 
-def test_things_that_are_no_files(tmp_path: Path) -> None:
+def test_paths_that_are_not_files(tmp_path: Path) -> None:
     (tmp_path / "d.glb").mkdir()
     (tmp_path / "e.stl").write_bytes(b"")
     for name, says in (("d.glb", "not a file"), ("e.stl", "empty"), ("none.ply", "not a file")):

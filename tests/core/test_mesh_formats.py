@@ -1,4 +1,4 @@
-"""Every mesh format, written by hand, comes back as the surface it was written from."""
+"""Every mesh format: a hand-written file reads back as the surface it was written from."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def corner_positions(mesh: Mesh) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", made.samples())
-def test_one_ball_from_every_format(tmp_path: Path, name: str) -> None:
+def test_all_formats_give_same_ball(tmp_path: Path, name: str) -> None:
     vertices, faces = sphere_mesh(1)
     mesh = read_mesh(saved(tmp_path, name, made.samples()[name]))
     assert np.allclose(corner_positions(mesh), vertices[faces], atol=2e-7)
@@ -64,7 +64,9 @@ def test_ply_with_everything(tmp_path: Path, form: str, coordinate: str, line_br
 
 @pytest.mark.parametrize("form", ["ascii", "binary_little_endian", "binary_big_endian"])
 def test_ply_attributes_follow_their_polygons(tmp_path: Path, form: str) -> None:
-    """A library that cuts polygons itself drops what the faces say; every triangle inherits it."""
+    """A library that triangulates by itself drops face attributes; here every triangle inherits
+    them.
+    """
     vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0]], float)
     faces = [[0, 1, 2, 3], [1, 4, 2], [4, 5, 2]]
     wedge = [np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) / 2, UV[0], UV[1]]
@@ -74,19 +76,19 @@ def test_ply_attributes_follow_their_polygons(tmp_path: Path, form: str) -> None
     mesh = read_mesh(saved(tmp_path, "m.ply", content))
     assert mesh.face_attributes["part"].tolist() == [5, 5, 6, 7]
     assert mesh.uv is not None
-    # in the square u and v are half of x and y
+    # in the square, u and v are half of x and y
     assert np.allclose(mesh.uv[:2], corner_positions(mesh)[:2, :, :2] / 2)
     assert np.array_equal(mesh.uv[2:], UV.astype(np.float32))
 
 
-def test_ply_texture_coordinates_of_vertices(tmp_path: Path) -> None:
+def test_ply_vertex_texture_coordinates(tmp_path: Path) -> None:
     vertices, faces = made.two_triangles()
     st_pairs = vertices[:, :2] * 0.5
     mesh = read_mesh(saved(tmp_path, "m.ply", made.ply_bytes(vertices, faces, vertex_uv=st_pairs)))
     assert mesh.uv is not None and np.allclose(mesh.uv, st_pairs[faces])
 
 
-def test_colours_of_floats_and_of_16_bits(tmp_path: Path) -> None:
+def test_float_and_16_bit_colours(tmp_path: Path) -> None:
     for kind, values in (("float", "1.0 0.5 0.0"), ("ushort", "65535 32896 0")):
         head = "ply\nformat ascii 1.0\nelement vertex 3\n"
         head += "".join(f"property float {a}\n" for a in "xyz")
@@ -103,7 +105,7 @@ def test_obj_materials_textures_and_libraries(tmp_path: Path) -> None:
     names = ["wire#1"] * 5 + ["grüner Lack"] * 10 + ["wire#1"] * 5
     content = made.obj_text(vertices, faces, materials=names, lib="my lib.mtl")
     path = saved(tmp_path, "m.obj", content)
-    mesh = read_mesh(path)  # no library at all
+    mesh = read_mesh(path)  # no material library at all
     assert mesh.face_materials == ("wire#1", "grüner Lack") and mesh.textures == ()
     assert mesh.face_attributes["material"].tolist() == [0] * 5 + [1] * 10 + [0] * 5
     saved(
@@ -116,7 +118,7 @@ def test_obj_materials_textures_and_libraries(tmp_path: Path) -> None:
     assert mesh.textures == (None, tmp_path.resolve() / "tex" / "lack 2.png")
 
 
-def test_faces_before_the_first_material_have_none(tmp_path: Path) -> None:
+def test_obj_faces_before_first_material_have_none(tmp_path: Path) -> None:
     text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nusemtl a\nf 1 3 4\n"
     mesh = read_mesh(saved(tmp_path, "m.obj", text))
     assert mesh.face_attributes["material"].tolist() == [-1, 0]
@@ -125,7 +127,7 @@ def test_faces_before_the_first_material_have_none(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "style", ["{v}", "{v}/{t}", "{v}//{n}", "{v}/{t}/{n}", "{v}/{t}/", "{v}//"]
 )
-def test_every_way_to_write_a_corner(tmp_path: Path, style: str) -> None:
+def test_all_obj_corner_notations(tmp_path: Path, style: str) -> None:
     vertices, faces = made.two_triangles()
     lines = [f"  v\t{x} {y} {z}  # where" for x, y, z in vertices]
     lines += [f"vt {u} {v} 0" for u, v in vertices[:, :2]] + ["vn 0 0 1"]
@@ -140,7 +142,7 @@ def test_every_way_to_write_a_corner(tmp_path: Path, style: str) -> None:
 
 
 def test_relative_indices_count_from_their_own_line(tmp_path: Path) -> None:
-    """Counted from the end of the file instead, both faces would be the second triangle."""
+    """If they counted from the end of the file, both faces would be the second triangle."""
     text = (
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf -3/-3 -2/-2 -1/-1\n"
         "v 5 0 0\nv 6 0 0\nv 5 1 0\nvt .5 0\nvt .5 .5\nvt 0 .5\nf -3/-3 -2/-2 -1/-1\n"
@@ -150,7 +152,7 @@ def test_relative_indices_count_from_their_own_line(tmp_path: Path) -> None:
     assert mesh.uv is not None and mesh.uv[1].tolist() == [[0.5, 0], [0.5, 0.5], [0, 0.5]]
 
 
-def test_faces_without_texture_coordinates_among_others(tmp_path: Path) -> None:
+def test_mixed_faces_with_and_without_texture_coordinates(tmp_path: Path) -> None:
     text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt .5 .25\nvt 1 0 0\nf 1/1 2/2 3/-1\nf 1 3 4\n"
     mesh = read_mesh(saved(tmp_path, "m.obj", text))
     assert mesh.uv is not None and "3 face corners" in mesh.notes[0]
@@ -170,7 +172,7 @@ def test_obj_vertex_colours(tmp_path: Path, scale: int) -> None:
 
 
 def test_seams_do_not_split_the_surface(tmp_path: Path) -> None:
-    """Formats that store one texture coordinate a vertex repeat vertices along seams."""
+    """Formats that store one texture coordinate per vertex repeat vertices along seams."""
     vertices, faces = made.two_triangles()
     apart = vertices[faces].reshape(-1, 3)
     uv = UV.reshape(-1, 2)
@@ -186,7 +188,7 @@ def test_seams_do_not_split_the_surface(tmp_path: Path) -> None:
         assert np.allclose(mesh.uv, expected)
 
 
-def test_stl_binaries_that_begin_with_solid(tmp_path: Path) -> None:
+def test_binary_stl_that_begins_with_solid(tmp_path: Path) -> None:
     vertices, faces = sphere_mesh(0)
     content = made.stl_bytes(vertices, faces, title=b"solid facet of a CAD program")
     mesh = read_mesh(saved(tmp_path, "m.stl", content))
@@ -201,7 +203,7 @@ def turned(axis: int, degrees: float) -> np.ndarray:
 
 
 def test_gltf_nodes_primitives_and_materials(tmp_path: Path) -> None:
-    """Two nodes under a turned one; mesh 1 of two primitives; a mirrored instance."""
+    """Two nodes under a rotated parent; mesh 1 has two primitives; one instance is mirrored."""
     vertices, faces = sphere_mesh(0)
     writer = made.GltfWriter()
     parent = turned(0, 90) @ turned(2, 30)
@@ -229,7 +231,7 @@ def test_gltf_nodes_primitives_and_materials(tmp_path: Path) -> None:
             (parent @ np.diag([-1.0, 1, 1, 1]), vertices),
         ]  # fmt: skip
         expected = [(v @ m[:3, :3].T + m[:3, 3])[faces] for m, v in placed]
-        expected[3] = expected[3][:, ::-1]  # outside stays outside
+        expected[3] = expected[3][:, ::-1]  # colours outside stay outside
         assert np.allclose(corner_positions(mesh), np.concatenate(expected), atol=1e-5)
         assert mesh.face_materials == ("gold", "material 1")
         numbers = np.repeat([1, 0, -1, 1], len(faces))
@@ -242,8 +244,8 @@ def test_gltf_nodes_primitives_and_materials(tmp_path: Path) -> None:
         assert (outward > 0).all()
 
 
-def test_gltf_against_another_reader(tmp_path: Path) -> None:
-    """A scene that trimesh wrote: the same surface, the same area and volume."""
+def test_gltf_written_by_trimesh(tmp_path: Path) -> None:
+    """The surface, its area and its volume are the same as in trimesh."""
     ball = trimesh.creation.icosphere(subdivisions=2)
     box = trimesh.creation.box((1, 2, 3))
     scene = trimesh.Scene()
@@ -275,7 +277,7 @@ def test_gltf_colours_are_linear_and_textures_are_named(tmp_path: Path) -> None:
     assert mesh.textures == () and "inside the mesh file" in mesh.notes[0]
 
 
-def test_gltf_strips_fans_and_lists_without_indices(tmp_path: Path) -> None:
+def test_gltf_strips_fans_and_unindexed_triangles(tmp_path: Path) -> None:
     vertices, _ = made.two_triangles()
     for mode, order, expected in (
         (4, [0, 1, 2, 0, 2, 3], [[0, 1, 2], [0, 2, 3]]),
@@ -289,12 +291,12 @@ def test_gltf_strips_fans_and_lists_without_indices(tmp_path: Path) -> None:
         mesh = read_mesh(saved(tmp_path, "m.glb", writer.glb()))
         c = corner_positions(mesh)
         normal = np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0])
-        assert np.allclose(normal, [0, 0, 1])  # both the same way round, half the square each
+        assert np.allclose(normal, [0, 0, 1])  # same orientation, each half of the square
         found = sorted(tuple(sorted(map(tuple, t))) for t in c)
         assert found == sorted(tuple(sorted(map(tuple, vertices[t]))) for t in expected)
 
 
-def test_gltf_quantised_and_sparse(tmp_path: Path) -> None:
+def test_gltf_quantised_and_sparse_accessors(tmp_path: Path) -> None:
     vertices, faces = made.two_triangles()
     writer = made.GltfWriter()
     position = writer.array(vertices * 32767, 5122, 3, normalized=True)
@@ -317,7 +319,7 @@ def test_gltf_quantised_and_sparse(tmp_path: Path) -> None:
     assert corner_positions(mesh)[0, 2].tolist() == [1, 1, 9]
 
 
-def test_gltf_buffers_beside_the_file(tmp_path: Path) -> None:
+def test_gltf_external_buffers(tmp_path: Path) -> None:
     vertices, faces = made.two_triangles()
     folder = tmp_path / "mesh"
     (folder / "data").mkdir(parents=True)
@@ -342,22 +344,24 @@ def test_gltf_buffers_beside_the_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("extension", "says"),
+    ("extension", "expected_text"),
     [
         ("KHR_draco_mesh_compression", "Draco"),
         ("EXT_meshopt_compression", "meshopt"),
         ("VENDOR_anything", "VENDOR_anything"),
     ],
 )
-def test_gltf_extensions_are_refused_by_name(tmp_path: Path, extension: str, says: str) -> None:
+def test_unsupported_gltf_extensions_are_rejected_by_name(
+    tmp_path: Path, extension: str, expected_text: str
+) -> None:
     writer = made.simple_gltf(*made.two_triangles())
     writer.document["extensionsRequired"] = [extension]
-    with pytest.raises(InputError, match=says):
+    with pytest.raises(InputError, match=expected_text):
         read_mesh(saved(tmp_path, "m.glb", writer.glb()))
-    if says != extension:
+    if expected_text != extension:
         writer = made.simple_gltf(*made.two_triangles())
         writer.document["meshes"][0]["primitives"][0]["extensions"] = {extension: {}}
-        with pytest.raises(InputError, match=says):
+        with pytest.raises(InputError, match=expected_text):
             read_mesh(saved(tmp_path, "m.glb", writer.glb()))
 
 
@@ -368,8 +372,10 @@ def star(radii: list[float]) -> np.ndarray:
 
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.floats(0.2, 1.0), min_size=4, max_size=14), st.integers(0, 3))
-def test_dented_polygons_are_cut_inside(radii: list[float], turn: int) -> None:
-    """The triangles of a star-shaped polygon are all turned its way and add up to its area."""
+def test_concave_polygons_are_triangulated_inside(radii: list[float], turn: int) -> None:
+    """The triangles of a star-shaped polygon have its orientation, and their areas add up to its
+    area.
+    """
     corners = star(radii)
     lifted = np.roll(np.concatenate([corners, np.zeros((len(corners), 1))], axis=1), turn, axis=1)
     flat = plane_coordinates(lifted[None])
@@ -383,8 +389,8 @@ def test_dented_polygons_are_cut_inside(radii: list[float], turn: int) -> None:
     assert is_convex(plane_coordinates(star([1.0] * len(radii))[None] @ np.eye(2, 3)))[0]
 
 
-def test_a_fan_would_leave_the_arrow(tmp_path: Path) -> None:
-    """From the first corner of this dented quad a fan covers what is outside it."""
+def test_concave_quad_is_not_triangulated_as_fan(tmp_path: Path) -> None:
+    """A fan from the first corner of this concave quad would cover area outside it."""
     text = "v 0 0 0\nv 2 1 0\nv 0 2 0\nv 1.5 1 0\nf 1 2 3 4\n"
     for order in ("1 2 3 4", "2 3 4 1"):
         mesh = read_mesh(saved(tmp_path, "m.obj", text.replace("1 2 3 4", order)))
@@ -395,8 +401,8 @@ def test_a_fan_would_leave_the_arrow(tmp_path: Path) -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(st.lists(st.lists(st.floats(0.2, 1.0), min_size=3, max_size=20), min_size=1, max_size=9))
-def test_dented_faces_of_many_sizes(stars: list[list[float]]) -> None:
-    """Each face's triangles are its own: they follow each other and have its area."""
+def test_concave_faces_of_many_sizes(stars: list[list[float]]) -> None:
+    """The triangles of each face are consecutive and have its area."""
     rings = [star(radii) + np.array([3.0 * i, 0]) for i, radii in enumerate(stars)]
     flat = np.concatenate(rings)
     sizes = np.array([len(ring) for ring in rings])
@@ -413,7 +419,7 @@ def test_dented_faces_of_many_sizes(stars: list[list[float]]) -> None:
     assert np.allclose(found, expected)
 
 
-def test_many_corners(tmp_path: Path) -> None:
+def test_polygon_with_many_corners(tmp_path: Path) -> None:
     n = 5000
     angle = 2 * np.pi * np.arange(n) / n
     round_ = [f"v {np.cos(a):.12f} {np.sin(a):.12f} 0" for a in angle]
@@ -425,8 +431,8 @@ def test_many_corners(tmp_path: Path) -> None:
         read_mesh(saved(tmp_path, "m.obj", "\n".join([*round_, face]) + "\n"))
 
 
-def test_what_is_not_read_is_named(tmp_path: Path) -> None:
-    for name, content, says in (
+def test_unread_data_is_named_in_warnings(tmp_path: Path) -> None:
+    for name, content, expected_text in (
         ("m.fbx", b"x", "fbx"),
         ("m.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
                   b"element tristrips 1\nproperty list int int vertex_indices\nend_header\n",
@@ -434,5 +440,5 @@ def test_what_is_not_read_is_named(tmp_path: Path) -> None:
         ("m.glb", struct.pack("<IIIII", 0x46546C67, 1, 20, 0, 0), "version 1"),
         ("m.gltf", json.dumps({"asset": {"version": "1.0"}}).encode(), "glTF '1.0'"),
     ):  # fmt: skip
-        with pytest.raises(InputError, match=says):
+        with pytest.raises(InputError, match=expected_text):
             read_mesh(saved(tmp_path, name, content))

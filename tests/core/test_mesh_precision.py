@@ -1,4 +1,4 @@
-"""Georeferenced meshes: nothing is lost on the way, and what the file has lost is said."""
+"""Georeferenced meshes: reading loses no precision; precision lost in the file is reported."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ UTM = np.array([500_000.123456, 4_649_776.654321, 123.987654])
 
 
 def exact_ball() -> tuple[np.ndarray, np.ndarray]:
-    """A ball whose coordinates, and their sums with whole numbers below 2^23, are exact."""
+    """A ball whose coordinates, and their sums with integers below 2^23, are exact in binary."""
     vertices, faces = sphere_mesh(3)
     return np.round(vertices * 2**20) / 2**20, faces.astype(np.int32)
 
 
 @pytest.mark.parametrize("name", ["m.obj", "ascii.ply", "little.ply", "big.ply"])
-def test_what_a_file_says_is_what_is_read(tmp_path: Path, name: str) -> None:
-    """Nine decimals beside 4.6 million, to the last bit of a double."""
+def test_coordinates_are_read_to_last_bit(tmp_path: Path, name: str) -> None:
+    """Nine decimals next to an offset of 4.6 million, to the last bit of a double."""
     vertices, faces = sphere_mesh(1)
     far = vertices * 1e-3 + UTM  # an object of 2 mm
     if name == "m.obj":
@@ -46,7 +46,9 @@ def test_what_a_file_says_is_what_is_read(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize("name", ["m.stl", "m.glb", "m.ply"])
 @pytest.mark.parametrize(("away", "lost"), [(0.0, False), (500.0, False), (5e6, True)])
-def test_what_32_bits_have_lost_is_said(tmp_path: Path, name: str, away: float, lost: bool) -> None:
+def test_precision_lost_in_float32_is_reported(
+    tmp_path: Path, name: str, away: float, lost: bool
+) -> None:
     vertices, faces = sphere_mesh(1)
     far = vertices + away
     content = {
@@ -63,8 +65,8 @@ def test_what_32_bits_have_lost_is_said(tmp_path: Path, name: str, away: float, 
     assert (off > 1e-4 * 2 * 3**0.5) <= lost
 
 
-def test_a_gltf_node_may_carry_the_distance(tmp_path: Path) -> None:
-    """Local coordinates in 32 bits under a translation in doubles: nothing is lost."""
+def test_gltf_node_translation_keeps_precision(tmp_path: Path) -> None:
+    """Local coordinates in float32 under a translation in doubles: nothing is lost."""
     vertices, faces = sphere_mesh(1)
     writer = made.simple_gltf(vertices, faces)
     writer.document["nodes"][0]["translation"] = UTM.tolist()
@@ -76,7 +78,7 @@ def test_a_gltf_node_may_carry_the_distance(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("offset", [(5e6, -5e6, 5e6), (5e6, 0.0, 0.0)])
-def test_geometry_far_away_is_that_at_the_origin(offset: tuple[float, float, float]) -> None:
+def test_geometry_far_from_origin_equals_that_at_origin(offset: tuple[float, float, float]) -> None:
     vertices, faces = exact_ball()
     near, far = Mesh(vertices, faces), Mesh(vertices + offset, faces)
     assert far.size == near.size
@@ -90,12 +92,12 @@ def test_geometry_far_away_is_that_at_the_origin(offset: tuple[float, float, flo
     a = scenes[0].first_hits(eye, directions)
     b = scenes[1].first_hits(eye + offset, directions)
     assert (a.face >= 0).sum() > 300
-    same = a.face == b.face  # a ray through an edge may meet either side of it
+    same = a.face == b.face  # a ray through an edge may hit either of its faces
     assert same.mean() > 0.999
     hit = same & (a.face >= 0)
     a, b = (type(a)(*(column[hit] for column in hits)) for hits in (a, b))
     points = scenes[0].points(a), scenes[1].points(b) - offset
     normals = scenes[0].normals(a), scenes[1].normals(b)
-    # rays are cast in 32 bits about the mesh's middle, wherever that is
+    # rays are cast in float32 about the mesh's middle, wherever that is
     assert np.abs(points[0] - points[1]).max() < 2e-6 * near.size
     assert np.abs(normals[0] - normals[1]).max() < 1e-5

@@ -1,4 +1,4 @@
-"""cameras.xml of Metashape and PhotoScan: scenes that project themselves, and real files."""
+"""cameras.xml of Metashape and PhotoScan: synthetic scenes with known projections, real files."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ def test_round_trip(tmp_path, version, seed):
     path = written(tmp_path, made.chunk_xml(scene, version), version=version)
     found = read_reconstruction(path)
     made.agree(found, scene)
-    said = " ".join(found.notes)
-    assert "1 disabled camera left out" in said
-    assert "not aligned" in said
+    expected_note = " ".join(found.notes)
+    assert "1 disabled camera left out" in expected_note
+    assert "not aligned" in expected_note
     names = {"1.2.0": "chunk transform"}.get(version, "component 0")
     R, t, scale = scene.transform or scene.components[0]
     move = found.frames[names]
     points = np.random.default_rng(1).normal(size=(10, 3))
     np.testing.assert_allclose(move.points(points), scale * points @ R.T + t, atol=1e-9)
-    # the cameras see moved points where they saw the points
+    # the cameras see transformed points where they saw the points
     moved = found.moved(names)
     for before, after in zip(found.cameras, moved.cameras, strict=True):
         np.testing.assert_allclose(
@@ -45,7 +45,7 @@ def test_round_trip(tmp_path, version, seed):
         )
 
 
-def test_lenses_go_to_colmap_where_they_can(tmp_path):
+def test_lenses_convert_to_colmap_where_possible(tmp_path):
     scene = made.scene("2.0.0")
     found = read_reconstruction(written(tmp_path, made.chunk_xml(scene)))
     models = {c.label: c.model for c in found.cameras}
@@ -58,7 +58,7 @@ def test_lenses_go_to_colmap_where_they_can(tmp_path):
     assert models["S7_IMG_0000"] == "EQUIRECTANGULAR"
 
 
-def test_a_matrix_of_sixteen_numbers_is_a_chunk_transform_too(tmp_path):
+def test_chunk_transform_as_sixteen_numbers(tmp_path):
     scene = made.simple()
     R = made.rotation(np.random.default_rng(3))
     matrix = made.motion(2.5 * R, (1.0, 2.0, 3.0))
@@ -71,7 +71,7 @@ def test_a_matrix_of_sixteen_numbers_is_a_chunk_transform_too(tmp_path):
     )
 
 
-def test_duplicate_labels_are_told_apart(tmp_path):
+def test_duplicate_labels_are_distinguished(tmp_path):
     scene = made.simple(5)
     for camera, (label, group) in zip(
         scene.cameras,
@@ -80,7 +80,7 @@ def test_duplicate_labels_are_told_apart(tmp_path):
     ):
         camera.label, camera.group = label, group
     found = read_reconstruction(written(tmp_path, made.chunk_xml(scene)))
-    # ids are given in the order of the scene: the two B are 3 and 4
+    # ids follow the order of the scene: the two B are 3 and 4
     assert [c.label for c in found.cameras] == [
         "A",
         "left/A",
@@ -91,7 +91,7 @@ def test_duplicate_labels_are_told_apart(tmp_path):
     assert any("renamed" in note for note in found.notes)
 
 
-def test_a_rig_two_sensors_deep(tmp_path):
+def test_rig_with_two_levels_of_sensors(tmp_path):
     """The master in the cameras need not be the sensors' master."""
     rng = np.random.default_rng(2)
     offsets = [made.motion(made.rotation(rng), rng.normal(size=3) * 0.1) for _ in range(2)]
@@ -113,7 +113,7 @@ def components(with_transforms):
     world = [c.matrix for c in scene.cameras]
     for number, camera in enumerate(scene.cameras):
         camera.component = number // 2
-        if camera.component == 1:  # the same place in the world, seen from the other frame
+        if camera.component == 1:  # the same place in the world, in the other frame
             (R0, t0, s0), (R1, t1, s1) = frames
             place = R1.T @ (s0 * R0 @ camera.matrix[:3, 3] + t0 - t1) / s1
             camera.matrix = made.motion(R1.T @ R0 @ camera.matrix[:3, :3], place)
@@ -122,7 +122,7 @@ def components(with_transforms):
 
 
 @pytest.mark.parametrize("active", [0, 7])
-def test_components_that_know_the_world_come_together(tmp_path, active):
+def test_georeferenced_components_are_merged(tmp_path, active):
     scene, first_frame = components(True)
     scene.active = active
     found = read_reconstruction(written(tmp_path, made.chunk_xml(scene)))
@@ -135,7 +135,7 @@ def test_components_that_know_the_world_come_together(tmp_path, active):
     assert any("2 components" in note for note in found.notes)
 
 
-def test_components_that_do_not_are_left_out(tmp_path):
+def test_components_without_world_frame_are_left_out(tmp_path):
     scene, _ = components(False)
     scene.active = 1
     found = read_reconstruction(written(tmp_path, made.chunk_xml(scene)))
@@ -143,7 +143,7 @@ def test_components_that_do_not_are_left_out(tmp_path):
     assert any("2 cameras of other components left out" in note for note in found.notes)
 
 
-def test_a_rig_camera_is_of_its_masters_component(tmp_path):
+def test_rig_camera_belongs_to_component_of_its_master(tmp_path):
     scene, _ = components(False)
     slave = scene.cameras[3]
     slave.component, slave.master = None, 2
@@ -168,30 +168,30 @@ class TestChunks:
         path = written(tmp_path, *self.chunks())
         assert read_reconstruction(path, chunk="b").cameras[0].label == "bIMG_0000"
 
-    def test_the_active_one(self, tmp_path):
+    def test_active_chunk(self, tmp_path):
         found = read_reconstruction(written(tmp_path, *self.chunks(), active=1))
         assert found.cameras[0].label == "bIMG_0000"
         assert "active" in found.notes[0]
 
-    def test_the_only_one_with_poses(self, tmp_path):
+    def test_only_chunk_with_poses(self, tmp_path):
         found = read_reconstruction(written(tmp_path, *self.chunks(("a",), ("b", "c")), active=1))
         assert found.cameras[0].label == "aIMG_0000"
 
-    def test_none_is_guessed(self, tmp_path):
+    def test_ambiguous_chunk_is_not_guessed(self, tmp_path):
         with pytest.raises(InputError, match=r"2 chunks with aligned cameras.*'a', 'b', 'c'"):
             read_reconstruction(written(tmp_path, *self.chunks()))
 
-    def test_the_unknown_is_refused(self, tmp_path):
+    def test_unknown_label_is_rejected(self, tmp_path):
         with pytest.raises(InputError, match="no chunk 'z'; expected one of 'a', 'b', 'c'"):
             read_reconstruction(written(tmp_path, *self.chunks()), chunk="z")
 
-    def test_twice_the_same_label_is_refused(self, tmp_path):
+    def test_duplicate_chunk_label_is_rejected(self, tmp_path):
         with pytest.raises(InputError, match="2 chunks with the label 'a'"):
             read_reconstruction(written(tmp_path, *self.chunks(("a", "a"), ())), chunk="a")
 
 
 def ecef(latitude, longitude, altitude):
-    """Geocentric metres of a place in degrees: the textbook's closed form, WGS84."""
+    """Geocentric metres of a place in degrees: the textbook's closed form on WGS84."""
     phi, lam = math.radians(latitude), math.radians(longitude)
     flattening = 1 / 298.257223563
     e2 = flattening * (2 - flattening)
@@ -205,12 +205,12 @@ def ecef(latitude, longitude, altitude):
     )
 
 
-PLACES = [(35.7, 139.5, 60.0), (-33.9, 18.4, 1085.0), (0.0, -180.0, -5.0), (89.99, 12.0, 3000.0),
+POSITIONS = [(35.7, 139.5, 60.0), (-33.9, 18.4, 1085.0), (0.0, -180.0, -5.0), (89.99, 12.0, 3000.0),
           (-64.8, -64.1, 10.0), (51.5, 0.0, 8849.0)]  # fmt: skip
 
 
-@pytest.mark.parametrize("place", PLACES)
-def test_where_on_earth(tmp_path, place):
+@pytest.mark.parametrize("place", POSITIONS)
+def test_georeference_of_local_frame(tmp_path, place):
     latitude, longitude, altitude = place
     rng = np.random.default_rng(7)
     scene = made.simple(8)
@@ -233,7 +233,7 @@ def test_where_on_earth(tmp_path, place):
         np.testing.assert_allclose(axis, towards / np.linalg.norm(towards), atol=1e-5)
 
 
-def test_a_local_or_absurd_place_is_none(tmp_path):
+def test_local_or_absurd_position_has_no_georeference(tmp_path):
     scene = made.simple()
     scene.transform = np.eye(3), np.zeros(3), 1.0
     assert read_reconstruction(written(tmp_path, made.chunk_xml(scene))).georeference is None
@@ -243,27 +243,27 @@ def test_a_local_or_absurd_place_is_none(tmp_path):
     assert any("Earth's surface" in note for note in found.notes)
 
 
-def test_the_poles_and_the_centre_of_the_earth():
+def test_georeference_at_poles_and_centre_of_earth():
     latitude, _, altitude = geodetic(np.array([0.0, 0.0, 6356752.314245179]))
     assert math.degrees(latitude) == pytest.approx(90.0) and abs(altitude) < 1e-6
     assert all(math.isfinite(v) for v in geodetic(np.zeros(3)))
 
 
 @pytest.mark.parametrize(
-    ("extra", "said"),
+    ("extra", "expected_note"),
     [
         ("<rolling_shutter><rotation>1 0 0 0 1 0 0 0 1</rotation></rolling_shutter>", "Rolling"),
     ],
 )
-def test_what_is_left_aside_is_said(tmp_path, extra, said):
+def test_ignored_data_is_noted(tmp_path, extra, expected_note):
     scene = made.simple()
     scene.cameras[0].extra = extra
     found = read_reconstruction(written(tmp_path, made.chunk_xml(scene)))
-    assert any(said in note for note in found.notes)
+    assert any(expected_note in note for note in found.notes)
     made.agree(found, scene)
 
 
-def test_initial_calibrations_are_a_last_resort(tmp_path):
+def test_initial_calibration_is_used_only_as_fallback(tmp_path):
     scene = made.simple()
     text = made.chunk_xml(scene)
     other = made.Sensor(values={"f": 999.0}, adjusted=False)
@@ -275,7 +275,7 @@ def test_initial_calibrations_are_a_last_resort(tmp_path):
     assert any("initial calibration" in note for note in found.notes)
 
 
-def test_viewpoints_and_references_are_no_cameras(tmp_path):
+def test_viewpoints_and_markers_are_not_cameras(tmp_path):
     text = made.chunk_xml(made.simple())
     matrix = "<transform>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</transform>"
     text = text.replace("</cameras>", f'<camera id="70" label="view">{matrix}</camera></cameras>')
@@ -286,25 +286,25 @@ def test_viewpoints_and_references_are_no_cameras(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("kind", "size", "said"),
+    ("kind", "size", "expected_note"),
     [
         ("cylindrical", (4000, 3000), "has the type 'cylindrical'"),
         ("rpc", (4000, 3000), "has the type 'rpc'"),
         ("spherical", (4000, 3000), "is a panorama of 4000 × 3000"),
     ],
 )
-def test_lenses_that_are_not_read_are_named(tmp_path, kind, size, said):
+def test_unsupported_lenses_are_named(tmp_path, kind, size, expected_note):
     scene = made.simple()
     scene.sensors[0] = made.Sensor(kind, *size, values={"f": 1000.0}, label="Pan 3")
-    with pytest.raises(InputError, match=f"cameras.xml:\\d+: 'Pan 3' {said}"):
+    with pytest.raises(InputError, match=f"cameras.xml:\\d+: 'Pan 3' {expected_note}"):
         read_reconstruction(written(tmp_path, made.chunk_xml(scene)))
 
 
-# ------------------------------------------------------------------------------ files of the wild
+# ------------------------------------------------------------------------------ real files
 
 
-def test_the_first_photoscan_example(tmp_path):
-    """Calibration as in a forum's PhotoScan 1.2 file: absolute cx, cy."""
+def test_photoscan_1_2_example(tmp_path):
+    """Calibration as in a PhotoScan 1.2 file from a forum: absolute cx, cy."""
     text = made.chunk_xml(made.simple(), "1.2.0")
     start, end = text.index("<calibration"), text.index("</calibration>")
     text = (
@@ -336,13 +336,13 @@ def test_real_files(shared, name, count, frames, notes):
     assert found.georeference is None
 
 
-def test_a_template_without_cameras_is_refused(shared):
+def test_template_without_cameras_is_rejected(shared):
     path = shared / "data" / "cameras" / "metashape" / "hollydinkel_astrobeecd_cameras_template.xml"
     with pytest.raises(InputError, match="holds no cameras; expected a chunk with aligned photos"):
         read_metashape(path, None, None)
 
 
-def test_the_bronze_is_in_its_photos(shared):
+def test_bronze_mesh_projects_into_its_photos(shared):
     """Calibrated at 8688 × 5792, shipped at a quarter; the mesh lies in the chunk's frame."""
     from patina.core.scan import scan as scans
 
@@ -354,7 +354,8 @@ def test_the_bronze_is_in_its_photos(shared):
     assert lens.principal_point_x == pytest.approx(1087.3327, abs=1e-4)
     assert lens.principal_point_y == pytest.approx(719.4692, abs=1e-4)
     assert not any("is in the frame" in note for note in read.notes)
-    # its 16 photos show all of the figure that the mesh covers; in the chunk's world they would not
+    # its 16 photos show all of the figure that the mesh covers; in the chunk's world frame they
+    # would not
     labels = {photo.stem for photo in (folder / "photos").iterdir()}
     shown = [camera for camera in read.cameras if camera.label in labels]
     assert len(shown) == 16
@@ -364,7 +365,7 @@ def test_the_bronze_is_in_its_photos(shared):
     assert scans.seen_fraction(elsewhere, read.mesh) < 0.9
 
 
-def test_similarities_between_frames_compose():
+def test_frame_similarities_compose():
     from patina.core.scan.readers.metashape_frames import between
 
     rng = np.random.default_rng(1)

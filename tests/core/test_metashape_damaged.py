@@ -1,4 +1,4 @@
-"""cameras.xml that is damaged, hostile, or says what cannot be: one line, in time."""
+"""Damaged, hostile or contradictory cameras.xml files: a one-line error in bounded time."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def good():
     return made.document(made.chunk_xml(made.scene("2.0.0")))
 
 
-def refused(folder, data, match, seconds=SECONDS):
-    """The error's one line, which names the file."""
+def error_line(folder, data, match, seconds=SECONDS):
+    """Return the error's single line, which names the file."""
     path = folder / "cameras.xml"
     path.write_bytes(data if isinstance(data, bytes) else data.encode())
     started = time.process_time()
@@ -37,7 +37,7 @@ def refused(folder, data, match, seconds=SECONDS):
     return message
 
 
-def survives(path):
+def check_survives(path):
     started = time.process_time()
     try:
         found = read_reconstruction(path)
@@ -51,25 +51,25 @@ def survives(path):
     assert time.process_time() - started < SECONDS
 
 
-# ----------------------------------------------------------------------------------- what XML can
+# ------------------------------------------------------------------------------- generic XML
 
 
-def test_truncated_anywhere(tmp_path, good):
+def test_file_truncated_at_any_place(tmp_path, good):
     data = good.encode()
     for at in np.random.default_rng(0).integers(0, len(data) - 20, 50):
-        said = refused(tmp_path, data[:at], "is not valid XML")
+        said = error_line(tmp_path, data[:at], "is not valid XML")
         assert re.match(r".*cameras\.xml:\d+: ", said)
 
 
 def test_encodings(tmp_path, good):
     head = '<?xml version="1.0" encoding="{}"?>'
     body = good.removeprefix(made.HEAD).replace("Chunk 1", "Büste")
-    refused(tmp_path, (head.format("UTF-8") + body).encode("latin-1"), "invalid token")
-    refused(tmp_path, (head.format("UTF-16") + body).encode(), "encoding specified")
-    refused(tmp_path, (head.format("klingon") + body).encode(), "unknown encoding: klingon")
-    refused(tmp_path, (head.format("shift_jis") + body).encode(), "expected UTF-8")
-    refused(tmp_path, b"\0" * 1000, "is not valid XML")
-    refused(tmp_path, b"", "no element found")
+    error_line(tmp_path, (head.format("UTF-8") + body).encode("latin-1"), "invalid token")
+    error_line(tmp_path, (head.format("UTF-16") + body).encode(), "encoding specified")
+    error_line(tmp_path, (head.format("klingon") + body).encode(), "unknown encoding: klingon")
+    error_line(tmp_path, (head.format("shift_jis") + body).encode(), "expected UTF-8")
+    error_line(tmp_path, b"\0" * 1000, "is not valid XML")
+    error_line(tmp_path, b"", "no element found")
     for encoding in ("UTF-8", "UTF-16", "ISO-8859-1", "windows-1252"):
         path = tmp_path / "good.xml"
         path.write_bytes((head.format(encoding) + body).encode(encoding))
@@ -91,39 +91,41 @@ BOMBS = {
 
 
 @pytest.mark.parametrize("name", BOMBS)
-def test_bombs(tmp_path, name):
-    said = refused(tmp_path, made.HEAD + BOMBS[name], "declares a document type")
+def test_entity_expansion_bombs(tmp_path, name):
+    said = error_line(tmp_path, made.HEAD + BOMBS[name], "declares a document type")
     assert "cameras.xml:2:" in said
 
 
-def test_nesting_and_numbers(tmp_path):
-    refused(tmp_path, "<document>" + "<chunk>" * 100_000, "nested more than 100 deep")
+def test_deep_nesting_and_long_numbers(tmp_path):
+    error_line(tmp_path, "<document>" + "<chunk>" * 100_000, "nested more than 100 deep")
     groups = "<group>" * 50_000 + "</group>" * 50_000
-    refused(tmp_path, f"<document><chunk><cameras>{groups}</cameras></chunk></document>", "nested")
+    error_line(
+        tmp_path, f"<document><chunk><cameras>{groups}</cameras></chunk></document>", "nested"
+    )
     attributes = " ".join(f'a{i}="1"' for i in range(100_000))
-    refused(tmp_path, f"<document {attributes}/>", "holds no chunk")
+    error_line(tmp_path, f"<document {attributes}/>", "holds no chunk")
 
 
-def test_too_much(tmp_path, monkeypatch):
+def test_size_limits(tmp_path, monkeypatch):
     monkeypatch.setattr(xml_file, "MAX_ELEMENTS", 1000)
-    refused(
+    error_line(
         tmp_path, "<document>" + "<a/>" * 1000 + "</document>", "holds more than 1,000 elements"
     )
     monkeypatch.setattr(xml_file, "MAX_XML_BYTES", 1 << 20)
-    refused(tmp_path, b"<document>" + b" " * (1 << 20) + b"</document>", "too large")
+    error_line(tmp_path, b"<document>" + b" " * (1 << 20) + b"</document>", "too large")
 
 
 @pytest.mark.slow
-def test_too_much_in_earnest(tmp_path):
+def test_large_document_in_bounded_time_and_memory(tmp_path):
     resource = pytest.importorskip("resource")
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     many = "<document>" + "<a/>" * 1_100_000 + "</document>"
-    refused(tmp_path, many, "1,000,000 elements", seconds=15)  # 3 where nothing else runs
+    error_line(tmp_path, many, "1,000,000 elements", seconds=15)  # 3 s on an idle machine
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before  # kB
     assert grown < 1 << 19
 
 
-def test_elements_know_their_lines():
+def test_errors_name_line_of_element():
     root = read_xml(b"<a>\n<b/>\n\n<c><d/></c></a>", "f.xml")
     assert [line_of(e) for e in root.iter()] == [1, 2, 4, 4]
     assert line_of(None) is None
@@ -131,14 +133,14 @@ def test_elements_know_their_lines():
         read_xml(b"<a>\n</b>", "f.xml")
 
 
-def test_a_folder_and_a_missing_file(tmp_path):
+def test_folder_and_missing_file_are_rejected(tmp_path):
     with pytest.raises(InputError, match="cannot be read"):
         read_xml(tmp_path)
     with pytest.raises(InputError, match="cannot be read"):
         read_xml(tmp_path / "none.xml")
 
 
-# ------------------------------------------------------------------------ what Metashape would not
+# --------------------------------------------------------- contents that Metashape never writes
 
 
 @pytest.mark.parametrize(
@@ -150,8 +152,8 @@ def test_a_folder_and_a_missing_file(tmp_path):
         ("<document><chunk/></document>", "holds no cameras; expected a chunk with aligned photos"),
     ],
 )
-def test_other_documents(tmp_path, data, said):
-    refused(tmp_path, data, said)
+def test_other_xml_documents_are_rejected(tmp_path, data, said):
+    error_line(tmp_path, data, said)
 
 
 def scene(**sensor):
@@ -179,12 +181,12 @@ MATRIX = re.compile(r"(<camera [^>]*><transform>)[^<]*")
         ("1 0 0 1e300 0 1 0 0 0 0 1 0 0 0 0 1", "has a translation of 1e.300 units"),
     ],
 )
-def test_poses_that_are_none(tmp_path, matrix, said):
+def test_invalid_poses_are_rejected(tmp_path, matrix, said):
     data = MATRIX.sub(rf"\g<1>{matrix}", scene(), count=1)
-    assert re.match(r".*cameras\.xml(:\d+)?: ", refused(tmp_path, data, said))
+    assert re.match(r".*cameras\.xml(:\d+)?: ", error_line(tmp_path, data, said))
 
 
-def test_an_empty_transform_is_an_unaligned_camera(tmp_path):
+def test_empty_transform_means_unaligned_camera(tmp_path):
     path = tmp_path / "cameras.xml"
     path.write_text(MATRIX.sub(r"\g<1>", scene(), count=1))
     found = read_reconstruction(path)
@@ -203,12 +205,12 @@ def test_an_empty_transform_is_an_unaligned_camera(tmp_path):
         ({"k3": 1e200}, "parameter above 1e12"),
     ],
 )
-def test_lenses_that_are_none(tmp_path, values, said):
-    refused(tmp_path, scene(**values), said)
+def test_invalid_lenses_are_rejected(tmp_path, values, said):
+    error_line(tmp_path, scene(**values), said)
 
 
-def test_zero_focal_length(tmp_path):
-    refused(tmp_path, scene().replace("<f>3600.0</f>", "<f>0</f>"), "a focal length of 0 pixels")
+def test_zero_focal_length_is_rejected(tmp_path):
+    error_line(tmp_path, scene().replace("<f>3600.0</f>", "<f>0</f>"), "a focal length of 0 pixels")
 
 
 @pytest.mark.parametrize(
@@ -227,29 +229,29 @@ def test_zero_focal_length(tmp_path):
         ("<calibration", "<other", "is not valid XML"),
     ],
 )
-def test_ids_and_sizes(tmp_path, old, new, said):
-    refused(tmp_path, scene().replace(old, new), said)
+def test_invalid_ids_and_sizes_are_rejected(tmp_path, old, new, said):
+    error_line(tmp_path, scene().replace(old, new), said)
 
 
-def test_no_calibration(tmp_path):
+def test_missing_calibration(tmp_path):
     data = re.sub(r"<calibration.*</calibration>", "", scene())
-    refused(tmp_path, data, "'lens' has no calibration with a focal length")
-    # only a camera's sensor needs one: Metashape keeps sensors of photos that were taken out
+    error_line(tmp_path, data, "'lens' has no calibration with a focal length")
+    # only the sensor of a camera needs one: Metashape keeps sensors of photos that were removed
     path = tmp_path / "cameras.xml"
     path.write_text(scene().replace("</sensors>", '<sensor id="9" label="ghost"/></sensors>'))
     assert len(read_reconstruction(path).cameras) == 3
 
 
-def test_masters(tmp_path):
+def test_invalid_masters_are_rejected(tmp_path):
     chunk = made.simple()
     chunk.cameras[0].master, chunk.cameras[1].master = 1, 0
-    refused(tmp_path, made.document(made.chunk_xml(chunk)), "leads back to itself")
+    error_line(tmp_path, made.document(made.chunk_xml(chunk)), "leads back to itself")
     chunk.cameras[1].master = 55
-    refused(tmp_path, made.document(made.chunk_xml(chunk)), "'55' is not in the chunk")
+    error_line(tmp_path, made.document(made.chunk_xml(chunk)), "'55' is not in the chunk")
     many = made.simple(300)
     for number, camera in enumerate(many.cameras[:-1]):
         camera.master = number + 1
-    refused(tmp_path, made.document(made.chunk_xml(many)), "leads back")
+    error_line(tmp_path, made.document(made.chunk_xml(many)), "leads back")
 
 
 @pytest.mark.parametrize(
@@ -264,9 +266,9 @@ def test_masters(tmp_path):
         "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0",
     ],
 )
-def test_chunk_transforms_that_are_none(tmp_path, transform):
+def test_invalid_chunk_transforms_are_rejected(tmp_path, transform):
     chunk = made.chunk_xml(made.simple(), extra=f"<transform>{transform}</transform>")
-    refused(tmp_path, made.document(chunk), r"cameras\.xml:\d+: .*(expected|not a similarity)")
+    error_line(tmp_path, made.document(chunk), r"cameras\.xml:\d+: .*(expected|not a similarity)")
 
 
 # -------------------------------------------------------------------------------------- fuzzing
@@ -291,14 +293,14 @@ TOKENS = [
 @settings(
     max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
-def test_fuzz_edits(good, tmp_path, edits):
+def test_fuzz_edited_text(good, tmp_path, edits):
     text = good
     for where, length, token in edits:
         at = int(where * len(text))
         text = text[:at] + token + text[at + length :]
     path = tmp_path / "fuzz.xml"
     path.write_bytes(text.encode())
-    survives(path)
+    check_survives(path)
 
 
 NUMBER = re.compile(r"(?<=[ >])-?\d+\.\d+(?:e-?\d+)?(?=[ <])")
@@ -315,7 +317,7 @@ NUMBER = re.compile(r"(?<=[ >])-?\d+\.\d+(?:e-?\d+)?(?=[ <])")
     max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 def test_fuzz_numbers(good, tmp_path, places, values):
-    """Well-formed files in which any number is any other."""
+    """Well-formed files in which any number is replaced by any other."""
     found = list(NUMBER.finditer(good))
     chosen = sorted({int(p * len(found)) for p in places}, reverse=True)
     text = good
@@ -324,4 +326,4 @@ def test_fuzz_numbers(good, tmp_path, places, values):
         text = f"{text[: match.start()]}{value!r}{text[match.end() :]}"
     path = tmp_path / "fuzz.xml"
     path.write_text(text)
-    survives(path)
+    check_survives(path)

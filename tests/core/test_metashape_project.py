@@ -1,4 +1,4 @@
-"""Projects of Metashape: .psx with its folder, .psz; good, moved about, and hostile."""
+"""Metashape projects (.psx with its folder, .psz): valid, moved to another place, and hostile."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def scene():
     return made.scene("2.0.0")
 
 
-def refused(path, match, **more):
+def error_line(path, match, **more):
     started = time.process_time()
     with pytest.raises(InputError, match=match) as caught:
         read_reconstruction(path, **more)
@@ -59,7 +59,7 @@ def test_round_trip(tmp_path, scene, kind):
     assert any("Export Model" in note for note in found.notes)
 
 
-def test_a_psz_may_hold_a_tree_of_documents(tmp_path, scene):
+def test_psz_with_nested_documents(tmp_path, scene):
     chunk = made.chunk_xml(scene).replace(
         "</chunk>", '<frames><frame id="0" path="0/doc.xml"/></frames></chunk>'
     )
@@ -91,19 +91,19 @@ def test_chunks_of_a_project(tmp_path):
     path = made.write_psx(tmp_path, "p", chunks, active=1)
     assert read_reconstruction(path).cameras[0].label == "bIMG_0000"
     assert read_reconstruction(path, chunk="a").cameras[0].label == "aIMG_0000"
-    refused(path, "no chunk 'c'; expected one of 'a', 'b'", chunk="c")
+    error_line(path, "no chunk 'c'; expected one of 'a', 'b'", chunk="c")
 
 
-def test_the_folder_must_be_there(tmp_path, scene):
+def test_missing_project_folder_is_rejected(tmp_path, scene):
     path = made.write_psx(tmp_path, "p", [made.chunk_xml(scene)])
     lonely = tmp_path / "other.psx"
     shutil.copy(path, lonely)
-    refused(lonely, "its folder 'other.files' with 'project.zip' is missing")
+    error_line(lonely, "its folder 'other.files' with 'project.zip' is missing")
     shutil.rmtree(tmp_path / "p.files" / "0")
-    refused(path, r"its chunk '0' is missing; expected the file 'p.files/0/chunk.zip'")
+    error_line(path, r"its chunk '0' is missing; expected the file 'p.files/0/chunk.zip'")
 
 
-def test_without_its_frame_the_photos_are_not_known(tmp_path, scene):
+def test_missing_frame_document_leaves_photos_unknown(tmp_path, scene):
     path = made.write_psx(tmp_path, "p", [made.chunk_xml(scene)], {0: "a.jpg"})
     shutil.rmtree(tmp_path / "p.files" / "0" / "0")
     found = read_reconstruction(path)
@@ -124,32 +124,32 @@ def test_without_its_frame_the_photos_are_not_known(tmp_path, scene):
         "a\0b",
     ],
 )
-def test_paths_stay_in_the_project(tmp_path, scene, place):
+def test_paths_must_stay_inside_project(tmp_path, scene, place):
     made.write_zip(tmp_path / "secret.zip", {"doc.xml": made.chunk_xml(scene)})
     path = tmp_path / "in" / "p.psx"
     path.parent.mkdir()
     listed = f'<document><chunks><chunk id="0" path="{place}"/></chunks></document>'
     if "\0" not in place:
         path.write_text(f'<document path="{place}"/>')
-        refused(path, "leads outside the project's folder")
+        error_line(path, "leads outside the project's folder")
         path.write_text('<document path="{projectname}.files/project.zip"/>')
         made.write_zip(path.parent / "p.files" / "project.zip", {"doc.xml": listed})
-        refused(path, "leads outside the project's folder")
+        error_line(path, "leads outside the project's folder")
         psz = made.write_zip(path.parent / "p.psz", {"doc.xml": listed})
-        refused(psz, "leads outside the project's folder")
+        error_line(psz, "leads outside the project's folder")
     else:
         path.write_text(f'<document path="{place}"/>')
-        refused(path, "is not valid XML")
+        error_line(path, "is not valid XML")
 
 
-def test_a_name_no_file_can_have(tmp_path):
+def test_impossible_file_name_is_rejected(tmp_path):
     path = tmp_path / "p.psx"
     path.write_text(f'<document path="{"x" * 5000}/project.zip"/>')
-    refused(path, "is missing; copy the folder")
+    error_line(path, "is missing; copy the folder")
 
 
 def bomb(size, method=zipfile.ZIP_DEFLATED):
-    """A zip whose doc.xml unpacks to ``size`` bytes of nothing."""
+    """A zip whose doc.xml unpacks to ``size`` bytes without content."""
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", method) as archive, archive.open("doc.xml", "w") as entry:
         for _ in range(size >> 20):
@@ -160,25 +160,25 @@ def bomb(size, method=zipfile.ZIP_DEFLATED):
 def test_zip_bombs(tmp_path):
     path = tmp_path / "p.psz"
     path.write_bytes(bomb(64 << 20))
-    refused(path, "unpacks to 64 MB")
+    error_line(path, "unpacks to 64 MB")
     path.write_bytes(bomb(3 << 20, zipfile.ZIP_LZMA))
-    refused(path, "unpacks to 3 MB|compressed with method")
+    error_line(path, "unpacks to 3 MB|compressed with method")
     inner = bomb(64 << 20)
     listed = '<document><chunks><chunk id="0" path="0.zip"/></chunks></document>'
     made.write_zip(path, {"doc.xml": listed, "0.zip": inner})
-    refused(path, "unpacks to 64 MB")
+    error_line(path, "unpacks to 64 MB")
 
 
-def test_a_zip_that_lies_about_its_size(tmp_path):
+def test_zip_with_false_uncompressed_size(tmp_path):
     data = bytearray(bomb(64 << 20))
     start = data.rindex(b"PK\x01\x02")
-    struct.pack_into("<I", data, start + 24, 100)  # uncompressed size in the list of files
+    struct.pack_into("<I", data, start + 24, 100)  # uncompressed size in the central directory
     path = tmp_path / "p.psz"
     path.write_bytes(data)
-    refused(path, "p.psz")
+    error_line(path, "p.psz")
 
 
-def test_a_project_of_many_large_documents(tmp_path, monkeypatch):
+def test_many_large_documents_hit_total_limit(tmp_path, monkeypatch):
     from patina.core.scan.readers import metashape_project
 
     chunk = made.chunk_xml(made.simple(), extra="<x>" + "y" * 5000 + "</x>")
@@ -188,17 +188,17 @@ def test_a_project_of_many_large_documents(tmp_path, monkeypatch):
         {"doc.xml": f"<document><chunks>{listed}</chunks></document>", "0.xml": chunk},
     )
     monkeypatch.setattr(metashape_project, "MAX_TOTAL_BYTES", 20 * len(chunk))
-    refused(path, "too large for a Metashape project")
+    error_line(path, "too large for a Metashape project")
 
 
-def test_a_list_of_files_that_is_too_long(tmp_path, scene, monkeypatch):
+def test_too_long_file_list_is_rejected(tmp_path, scene, monkeypatch):
     path = made.write_psz(tmp_path / "p.psz", [made.chunk_xml(scene)])
     monkeypatch.setattr(metashape_zip, "MAX_DIRECTORY_BYTES", 10)
-    refused(path, "lists too many files")
+    error_line(path, "lists too many files")
 
 
-def test_a_large_zips_list_of_files(tmp_path, scene):
-    """Zips beyond 4 GB say the list's size elsewhere: the same project with that end."""
+def test_zip64_file_list(tmp_path, scene):
+    """Zips beyond 4 GB store the list's size in a zip64 record; here a small one has it too."""
     path = made.write_psz(tmp_path / "p.psz", [made.chunk_xml(scene)])
     data = path.read_bytes()
     at = data.rindex(b"PK\x05\x06")
@@ -213,22 +213,24 @@ def test_a_large_zips_list_of_files(tmp_path, scene):
 
 
 @pytest.mark.parametrize("name", ["empty.psz", "text.psz", "empty.psx"])
-def test_no_project_at_all(tmp_path, name):
+def test_file_that_is_no_project(tmp_path, name):
     path = tmp_path / name
     path.write_bytes(b"" if "empty" in name else b"hello, world" * 100)
-    refused(path, name)
+    error_line(path, name)
 
 
-def test_zips_without_a_document(tmp_path):
-    refused(made.write_zip(tmp_path / "p.psz", {"other.xml": "<a/>"}), "holds no doc.xml")
-    refused(made.write_zip(tmp_path / "q.psz", {"doc.xml": "<a/>"}), "not a Metashape <document>")
+def test_zip_without_document_is_rejected(tmp_path):
+    error_line(made.write_zip(tmp_path / "p.psz", {"other.xml": "<a/>"}), "holds no doc.xml")
+    error_line(
+        made.write_zip(tmp_path / "q.psz", {"doc.xml": "<a/>"}), "not a Metashape <document>"
+    )
     psx = tmp_path / "r.psx"
     psx.write_text("<document version='1.2.0'/>")
-    refused(psx, "is not a Metashape project")
+    error_line(psx, "is not a Metashape project")
 
 
-def survives(path):
-    """Read, or refused in one line, in time."""
+def check_survives(path):
+    """Read, or reject with one line, in bounded time."""
     started = time.process_time()
     try:
         found = read_reconstruction(path)
@@ -246,12 +248,12 @@ def packed(tmp_path_factory):
     return made.write_psz(folder / "p.psz", [made.chunk_xml(made.simple())], {0: "a.jpg"})
 
 
-def test_truncated_anywhere(packed, tmp_path):
+def test_project_truncated_at_any_place(packed, tmp_path):
     data = packed.read_bytes()
     for at in np.random.default_rng(0).integers(0, len(data), 50):
         path = tmp_path / "cut.psz"
         path.write_bytes(data[:at])
-        survives(path)
+        check_survives(path)
 
 
 @given(
@@ -269,4 +271,4 @@ def test_fuzz_bytes_of_a_project(packed, tmp_path, changes):
         data[int(where * len(data))] = value
     path = tmp_path / "fuzz.psz"
     path.write_bytes(data)
-    survives(path)
+    check_survives(path)

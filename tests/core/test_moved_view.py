@@ -1,4 +1,4 @@
-"""What a photo shows that lies beside where the scan says: the surface's own normal there."""
+"""Camera pose correction: normals and visibility of the surface that a displaced pixel shows."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from patina.core.geometry.view import cast_shadow
 from patina.core.scan import Mesh
 from tests.make_lit_ball import changed, lit_ball
 
-RADIUS = 0.4  # of the ball
-PIXEL = 0.01  # scan units
+RADIUS = 0.4  # radius of the ball
+PIXEL = 0.01  # pixel size in scan units
 
 
-def test_normals_of_a_ball_are_those_of_the_place_that_is_shown():
-    """Far beside where a pixel should look a straight line leaves the ball; rays do not."""
-    context, truth = _on_a_real_ball()
+def test_ball_normals_are_those_at_displaced_pixel():
+    """Far from the original pixel a linear extrapolation leaves the ball; traced rays do not."""
+    context, truth = _ball_context()
     effect = CameraPose.of(context)
     x = np.tile([6.0, 0.0, 0.0], len(effect.photos))
     straight = effect.shading(ShadingState.of(context.pixels), x).normal
@@ -29,13 +29,13 @@ def test_normals_of_a_ball_are_those_of_the_place_that_is_shown():
     known = seen.seen.known
     assert known.mean() > 0.9
     found = seen.shading(ShadingState.of(context.pixels), x).normal
-    missed = [np.linalg.norm(n - truth, axis=1)[known] for n in (straight, found)]
-    assert np.median(missed[1]) < 0.2 * np.median(missed[0])
-    assert np.percentile(missed[1], 95) < 0.01
+    errors = [np.linalg.norm(n - truth, axis=1)[known] for n in (straight, found)]
+    assert np.median(errors[1]) < 0.2 * np.median(errors[0])
+    assert np.percentile(errors[1], 95) < 0.01
 
 
-def test_about_where_it_was_looked_for_it_turns_as_before():
-    context, _ = _on_a_real_ball()
+def test_derivatives_with_rays_match_linear_model():
+    context, _ = _ball_context()
     effect = CameraPose.of(context)
     x = np.tile([3.0, 1.0, 0.5], len(effect.photos))
     seen = effect.with_rays(context, x)
@@ -44,15 +44,17 @@ def test_about_where_it_was_looked_for_it_turns_as_before():
     one, other = (
         e.shading(now, x + step).normal - e.shading(now, x).normal for e in (effect, seen)
     )
-    calm = ~seen.seen.ends  # elsewhere it is the light that changes
-    assert calm.mean() > 0.8
-    np.testing.assert_allclose(other[calm], one[calm], atol=3e-5)
+    unchanged = ~seen.seen.ends  # elsewhere the visibility changes
+    assert unchanged.mean() > 0.8
+    np.testing.assert_allclose(other[unchanged], one[unchanged], atol=3e-5)
     assert not other[seen.seen.ends & seen.seen.known].any()
 
 
-def test_a_photo_far_beside_is_found_by_trial():
-    """Slopes say nothing of a shadow that has moved by five pixels; rays that are tried do."""
-    context, _ = _on_a_real_ball(boxes=True)
+def test_large_camera_offset_is_found_by_ray_search():
+    """Derivatives carry no information about a shadow displaced by five pixels; a search with
+    traced rays does.
+    """
+    context, _ = _ball_context(boxes=True)
     effect = CameraPose.of(context)
     x = np.zeros(3 * len(effect.photos))
     x[3] = 5.0
@@ -66,9 +68,9 @@ def test_a_photo_far_beside_is_found_by_trial():
     np.testing.assert_allclose(found[0::3], x[0::3], atol=0.3)
 
 
-def test_shadows_are_those_of_the_place_that_is_shown():
-    """Boxes stand between lamps and ball; six pixels beside, their shadows lie otherwise."""
-    context, truth = _on_a_real_ball(boxes=True)
+def test_shadows_are_those_at_displaced_pixel():
+    """Boxes stand between the lamps and the ball; six pixels away their shadows fall elsewhere."""
+    context, truth = _ball_context(boxes=True)
     pixels = context.pixels
     lit, told = (
         (~cast_shadow(context.rays, RADIUS * normal, normal, pixels.light, None)).astype(np.float32)
@@ -81,14 +83,15 @@ def test_shadows_are_those_of_the_place_that_is_shown():
     seen = effect.with_rays(context, x)
     found = seen.shading(ShadingState.of(pixels), x).visible
     facing = np.einsum("ij,ij->i", truth, pixels.light) > 0.05
-    missed = [np.abs(v - lit)[facing].mean() for v in (told, found)]
-    assert missed[0] > 0.015
-    assert missed[1] < 0.1 * missed[0]
+    errors = [np.abs(v - lit)[facing].mean() for v in (told, found)]
+    assert errors[0] > 0.015
+    assert errors[1] < 0.1 * errors[0]
 
 
-def _on_a_real_ball(boxes: bool = False):
-    """(The lit ball with a mesh, (n, 3) normals six pixels to the right of each pixel.) boxes: on
-    the three axes, beside it."""
+def _ball_context(boxes: bool = False):
+    """(The lit ball with a mesh, (n, 3) normals six pixels to the right of each pixel.) boxes:
+    occluders on the three axes, next to the ball.
+    """
     context = lit_ball(3)
     ball = trimesh.creation.icosphere(subdivisions=5, radius=RADIUS)
     if boxes:

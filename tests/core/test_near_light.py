@@ -1,4 +1,4 @@
-"""Lamps near the object and flashes on the camera: physics, and truth from a sphere."""
+"""Lamps near the object and flashes on the camera: physics, and ground truth from a sphere."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def written(folder: Path, key: str, values: list, lamp_of, extra: str = "") -> P
 
 
 def flash(rotation, translation):
-    """Where a flash at OFFSET of the lens stands."""
+    """Position of a flash at OFFSET from the lens."""
     return rotation.T @ (OFFSET - translation)
 
 
@@ -62,7 +62,7 @@ def flash_photos(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @given(st.floats(0.2, 50), st.floats(1.5, 4))
-def test_irradiance_falls_with_the_square(distance: float, factor: float) -> None:
+def test_irradiance_follows_inverse_square_law(distance: float, factor: float) -> None:
     lamp = NearLight("l", np.zeros(3), np.array([3.0, 2.0, 1.0]))
     points = np.array([[0, 0, distance], [0, 0, factor * distance]])
     found = lamp.incidence(points, camera())
@@ -71,7 +71,7 @@ def test_irradiance_falls_with_the_square(distance: float, factor: float) -> Non
     assert np.allclose(found.towards, [[0, 0, -1], [0, 0, -1]])
 
 
-def test_a_lamp_far_away_is_a_distant_one() -> None:
+def test_far_lamp_equals_distant_light() -> None:
     direction = np.array([0.48, -0.6, 0.64])
     far = 1e5
     near = NearLight("l", far * direction, np.full(3, 2.0 * far**2))
@@ -83,8 +83,8 @@ def test_a_lamp_far_away_is_a_distant_one() -> None:
 
 
 @given(st.integers(0, 50))
-def test_a_flash_moves_with_its_camera(seed: int) -> None:
-    """In the camera's own frame it always stands at its offset, and its beam looks forward."""
+def test_flash_moves_with_its_camera(seed: int) -> None:
+    """In the camera's frame it always stands at its offset, and its beam points forward."""
     one = camera(seed)
     light = MountedLight("f", OFFSET, np.ones(3), beam=np.radians(30))
     at = light.position(one)
@@ -96,16 +96,18 @@ def test_a_flash_moves_with_its_camera(seed: int) -> None:
     assert found.irradiance[1, 0] == pytest.approx(0.5 * found.irradiance[0, 0])
 
 
-def test_samples_under_a_flash_read_the_true_reflectance(flash_photos: Path) -> None:
+def test_samples_under_flash_give_true_reflectance(flash_photos: Path) -> None:
     table, _ = sampled(flash_photos)
     truth = made.blinn(*(np.asarray(v, float) for v in (table.normal, table.light, table.view)))
     assert len(table) > 5000
     error = np.abs(table.rho / truth - 1)
-    assert np.percentile(error, 90) < 0.03  # the mesh has facets, the sphere has not
+    assert np.percentile(error, 90) < 0.03  # the mesh has facets, the sphere does not
 
 
-def test_taking_a_flash_for_a_distant_light_is_wrong(flash_photos: Path, tmp_path: Path) -> None:
-    """The same photos with the flash believed at the lens: what refining must mend."""
+def test_flash_at_wrong_position_gives_wrong_reflectance(
+    flash_photos: Path, tmp_path: Path
+) -> None:
+    """The same photos, with the flash assumed at the lens: refinement must correct the error."""
     table, _ = sampled(flash_photos)
     right = np.abs(table.rho / made.blinn(
         *(np.asarray(v, float) for v in (table.normal, table.light, table.view))) - 1)  # fmt: skip
@@ -127,8 +129,8 @@ def refined_lights(path: Path):
     return drained(refined(lights, capture, scan, photos, rays, default_basis()))
 
 
-def test_a_flash_is_found_from_the_photos(flash_photos: Path) -> None:
-    """Offset unknown (started at the lens) and intensity unknown."""
+def test_flash_position_is_recovered_from_photos(flash_photos: Path) -> None:
+    """Unknown offset (started at the lens) and unknown intensity."""
     text = flash_photos.read_text().replace(str(OFFSET.tolist()), "[0, 0, 0]")
     text = text.replace(f"intensity = {[INTENSITY] * 3}", "refine = true")
     path = flash_photos.with_name("unknown.capture.toml")
@@ -137,30 +139,36 @@ def test_a_flash_is_found_from_the_photos(flash_photos: Path) -> None:
     light = found.by_name["lamp"]
     assert isinstance(light, MountedLight)
     assert np.abs(light.offset - OFFSET)[:2].max() < 0.08  # of a camera 3.6 away: 1.3 degrees
-    assert np.abs(light.offset - OFFSET)[2] < 0.4  # along the view the photos say little
+    assert (
+        np.abs(light.offset - OFFSET)[2] < 0.4
+    )  # along the view direction the photos carry little information
     before, after = found.unexplained
     assert after < 0.5 * before
     errors = [error for _, error in found.moved["lamp"].values()]
     assert np.isfinite(errors).all() and errors[0] < 0.15
 
 
-def seen_off(offset: np.ndarray) -> float:
-    """Degrees between where a flash is and where it was found, as the object sees it. Outwards and
-    backwards together change little, and the photos say little of it."""
+def angular_error(offset: np.ndarray) -> float:
+    """Degrees between the true and the estimated flash position, as seen from the object.
+
+    Moving outwards and backwards together changes little, so the photos hardly determine it.
+    """
     ball = np.array([0, 0, made.DISTANCE])
     a, b = (x - ball for x in (offset, OFFSET))
     return float(np.degrees(np.arccos(a @ b / np.linalg.norm(a) / np.linalg.norm(b))))
 
 
-def test_a_known_intensity_does_not_pull_the_flash(flash_photos: Path) -> None:
-    """From the true place with the true strength, refining stays there."""
+def test_true_flash_with_known_intensity_stays_in_place(flash_photos: Path) -> None:
+    """Started at the true position with the true intensity, refinement stays there."""
     path = flash_photos.with_name("known.capture.toml")
     path.write_text(flash_photos.read_text().replace("mounted", "refine = true\nmounted"))
-    assert seen_off(refined_lights(path).by_name["lamp"].offset) < 1.0
+    assert angular_error(refined_lights(path).by_name["lamp"].offset) < 1.0
 
 
-def test_two_materials_are_told_apart(tmp_path: Path) -> None:
-    """Half of the sphere is another material: one for both would move the light."""
+def test_light_refinement_with_two_materials(tmp_path: Path) -> None:
+    """Half of the sphere is another material: one material for both halves would displace the
+    light.
+    """
     path = written(tmp_path, "mounted", [0, 0, 0], flash, "refine = true")
     vertices, faces = made.sphere_mesh()
     right = vertices[faces].mean(axis=1)[:, 0] > made.CENTRE[0]
@@ -176,15 +184,15 @@ def test_two_materials_are_told_apart(tmp_path: Path) -> None:
         made.write_exr(tmp_path / f"lit_{i}.exr", lit)
     materials = "".join(f'[[material]]\nname = "{name}"\nfaces = "part"\n' for name in "ab")
     path.write_text(path.read_text() + materials)
-    assert seen_off(refined_lights(path).by_name["lamp"].offset) < 1.5
+    assert angular_error(refined_lights(path).by_name["lamp"].offset) < 1.5
 
 
-def test_too_little_to_refine_from_is_said(flash_photos: Path) -> None:
+def test_too_few_photos_to_refine_lights_are_reported(flash_photos: Path) -> None:
     text = flash_photos.read_text().replace(f"intensity = {[INTENSITY] * 3}", "refine = true")
     text = text.replace(str(OFFSET.tolist()), "[0, 0, 0]\nbeam = 5")
     path = flash_photos.with_name("narrow.capture.toml")
     path.write_text(text)
-    assert refined_lights(path).by_name["lamp"] is not None  # a narrow beam is a start like others
+    assert refined_lights(path).by_name["lamp"] is not None  # a narrow beam works as a start too
     for i in range(1, 7):
         made.write_exr(flash_photos.with_name(f"black_{i}.exr"), np.zeros((90, 120, 3)))
         text = text.replace(f'"lit_{i}.exr"', f'"black_{i}.exr"')
@@ -193,7 +201,7 @@ def test_too_little_to_refine_from_is_said(flash_photos: Path) -> None:
         refined_lights(path)
 
 
-def test_a_near_lamp_is_found_from_the_photos(tmp_path: Path) -> None:
+def test_near_lamp_is_recovered_from_photos(tmp_path: Path) -> None:
     lamp = made.CENTRE + np.array([0.5, -0.6, 2.6])
     start = (lamp + np.array([0.5, 0.4, -0.3])).round(6).tolist()
     path = written(tmp_path, "position", start, lambda r, t: lamp, "refine = true")
@@ -205,8 +213,8 @@ def test_a_near_lamp_is_found_from_the_photos(tmp_path: Path) -> None:
     assert np.linalg.norm(towards[0]) == pytest.approx(np.linalg.norm(towards[1]), rel=0.15)
 
 
-def test_directions_are_refined(tmp_path: Path) -> None:
-    """Six distant lights, each 3° off: their photos lead them back."""
+def test_distant_light_directions_are_refined(tmp_path: Path) -> None:
+    """Six distant lights, each 3° off: refinement from the photos corrects them."""
     path = made.make_capture(tmp_path)
     rng = np.random.default_rng(5)
     text, truth = path.read_text(), list(made.light_directions(6))
@@ -226,8 +234,8 @@ def test_directions_are_refined(tmp_path: Path) -> None:
     assert max(angles) < 1.5
 
 
-def test_a_bracket_of_a_flash_is_one_photo(flash_photos: Path, tmp_path: Path) -> None:
-    """Three exposures with clipping merge to the radiance of one."""
+def test_flash_bracket_is_merged_to_one_photo(flash_photos: Path, tmp_path: Path) -> None:
+    """Three exposures with clipping merge to the radiance of one photo."""
     capture = read_capture(flash_photos)
     whole = LitPhotos.open(capture).read(0).radiance
     files = []

@@ -1,4 +1,4 @@
-"""Cameras without perspective, and cameras of scaled photos."""
+"""Orthographic cameras, and cameras of scaled photos."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def camera(width: int = 90, height: int = 70, scale: float = 25.0) -> Camera:
 
 
 @given(st.integers(0, 1000))
-def test_rays_go_through_what_they_see(seed: int) -> None:
+def test_rays_pass_through_projected_points(seed: int) -> None:
     one = camera()
     points = made.CENTRE + np.random.default_rng(seed).normal(size=(20, 3)) * 0.3
     pixels = one.project(points)
@@ -33,9 +33,10 @@ def test_rays_go_through_what_they_see(seed: int) -> None:
     assert np.abs(away - along[:, None] * directions).max() < 1e-9
 
 
-def test_a_sphere_is_a_circle_and_its_normals_are_exact() -> None:
-    """Without perspective the outline of a sphere of radius 1 has the radius of its scale, and the
-    normal at (x, y) is (x, y, √(1 − x² − y²)) in the camera's axes."""
+def test_orthographic_sphere_outline_and_normals() -> None:
+    """The outline of a sphere of radius 1 has the radius of the camera's scale, and the normal at
+    (x, y) is (x, y, √(1 − x² − y²)) in the camera's axes.
+    """
     vertices, faces = made.sphere_mesh(6)
     rays = RayScene.build(Mesh(vertices, faces.astype(np.int32)))
     one = camera()
@@ -50,7 +51,7 @@ def test_a_sphere_is_a_circle_and_its_normals_are_exact() -> None:
     assert np.allclose(view.view, -one.pose.rotation[2])
 
 
-def test_a_similarity_moves_cameras_with_points() -> None:
+def test_similarity_transforms_cameras_with_points() -> None:
     rng = np.random.default_rng(3)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
@@ -64,7 +65,7 @@ def test_a_similarity_moves_cameras_with_points() -> None:
         assert np.allclose(before, after, atol=1e-9, equal_nan=True)
 
 
-def test_a_scaled_photo_has_a_scaled_camera() -> None:
+def test_scaled_photo_scales_its_camera() -> None:
     rotation, translation = next(iter(made.poses(4)))
     parameters = (2000.0, 1990.0, 1210.0, 890.0, 0.05, -0.02, 1e-3, -2e-3)
     whole = Camera("p", 2400, 1800, "OPENCV", parameters, Pose(rotation, translation))

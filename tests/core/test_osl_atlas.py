@@ -1,4 +1,4 @@
-"""The pictures that OSL reads: the BRDF itself, by the same interpolation as the basis'."""
+"""Textures that the OSL shader reads: they hold the BRDF with the interpolation of the basis."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def angles() -> Angles:
     return Angles(*(np.concatenate([a[kept], e]) for a, e in zip(drawn, edges, strict=True)))
 
 
-def _through_pictures(brdf: PrincipalBRDF, angles: Angles, coefficients) -> np.ndarray:
-    """ρ as the shader computes it from the texels of ``brdf``, with these as its inputs."""
+def _through_textures(brdf: PrincipalBRDF, angles: Angles, coefficients) -> np.ndarray:
+    """ρ as the shader computes it from the textures of ``brdf`` with these values as its inputs."""
     grid = brdf.basis.grid
     half_pi = np.pi / 2
     u = np.stack(
@@ -54,27 +54,27 @@ def _relative(read: np.ndarray, exact: np.ndarray, angles: Angles) -> np.ndarray
 
 
 @pytest.mark.parametrize("count", [5, 6, 20, 100])
-def test_the_shader_reads_the_brdf_itself(angles: Angles, count: int) -> None:
+def test_shader_textures_reproduce_brdf(angles: Angles, count: int) -> None:
     basis = default_basis()
     c = np.random.default_rng(2).normal(0, np.sqrt(basis.coefficient_variance), (3, count))
-    # component by component, at every direction: no table of sums in between
+    # component by component, at every direction: no table of partial sums in between
     exact = basis.evaluate(c, angles).astype(float)
-    error = _relative(_through_pictures(PrincipalBRDF(basis, c), angles, c), exact, angles)
+    error = _relative(_through_textures(PrincipalBRDF(basis, c), angles, c), exact, angles)
     assert error.max() < 1e-4
 
 
-def test_moving_a_coefficient_is_another_member_of_the_basis(angles: Angles) -> None:
-    """An artist's change goes through half floats: a thousandth, not more."""
+def test_changed_coefficient_gives_another_brdf_of_basis(angles: Angles) -> None:
+    """A change by the user goes through half floats: an error of a thousandth, not more."""
     basis = default_basis()
     c = np.random.default_rng(3).normal(0, np.sqrt(basis.coefficient_variance), (3, 60))
     moved = c.copy()
     moved[:, :8] += np.random.default_rng(4).normal(0, 0.06, (3, 8))
     exact = basis.evaluate(moved, angles).astype(float)
-    error = _relative(_through_pictures(PrincipalBRDF(basis, c), angles, moved), exact, angles)
+    error = _relative(_through_textures(PrincipalBRDF(basis, c), angles, moved), exact, angles)
     assert np.sqrt(np.mean(error**2)) < 5e-4 and error.max() < 5e-3
 
 
-def test_the_files_are_small_and_hold_what_was_written(tmp_path: Path) -> None:
+def test_texture_files_are_small_and_keep_values(tmp_path: Path) -> None:
     import OpenImageIO as oiio
 
     basis = default_basis()
@@ -90,7 +90,7 @@ def test_the_files_are_small_and_hold_what_was_written(tmp_path: Path) -> None:
     assert not list(tmp_path.glob("*.part*"))
 
 
-def test_every_brdf_has_a_file_of_its_own() -> None:
+def test_each_brdf_has_its_own_file() -> None:
     basis = default_basis()
     c = np.random.default_rng(6).normal(0, 0.06, (3, 10))
     name = osl_atlas.remainder_name(PrincipalBRDF(basis, c))
@@ -98,7 +98,7 @@ def test_every_brdf_has_a_file_of_its_own() -> None:
     assert name != osl_atlas.remainder_name(PrincipalBRDF(basis, c + 1e-9))
 
 
-def test_source_has_every_input_and_no_word_left():
+def test_shader_source_has_all_inputs_and_no_placeholder():
     text = osl_source.source(default_basis(), COUNT)
     assert "@" not in text
     for item in osl_source.inputs(COUNT):

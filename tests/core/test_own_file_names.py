@@ -1,4 +1,4 @@
-"""Which file names of a .blend are Patina's own: those it makes, and no other."""
+"""File names in a .blend that Patina accepts as its own: those it generates, and no others."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from patina.core.photo import write_exr, write_png
 GOOD = "patina_components_0123456789ab.exr"
 
 
-def test_the_names_that_are_made_are_accepted(tmp_path):
+def test_generated_names_are_accepted(tmp_path):
     basis = default_basis()
     brdf = PrincipalBRDF(basis, np.zeros((3, 5)))
     made = (
@@ -32,7 +32,7 @@ def test_the_names_that_are_made_are_accepted(tmp_path):
 
 
 @given(st.sampled_from(["components", "brdf", "sampling"]), st.integers(0, 16**12 - 1))
-def test_every_digest_is_accepted(kind, number):
+def test_all_digests_are_accepted(kind, number):
     assert osl_atlas.is_own_name(f"patina_{kind}_{number:012x}.exr")
 
 
@@ -40,7 +40,7 @@ def test_every_digest_is_accepted(kind, number):
     st.text() | st.builds(lambda a, b: a + GOOD + b, st.text(), st.text())
     | st.builds(lambda i, c: GOOD[:i] + c + GOOD[i:], st.integers(0, len(GOOD)), st.text())
 )  # fmt: skip
-def test_what_is_accepted_is_a_bare_name_everywhere(name):
+def test_accepted_names_are_bare_names_on_every_platform(name):
     if osl_atlas.is_own_name(name):
         assert PurePosixPath(name).name == PureWindowsPath(name).name == name
         assert name.isascii() and name.endswith(".exr") and len(name) < 40
@@ -55,7 +55,7 @@ def test_what_is_accepted_is_a_bare_name_everywhere(name):
         GOOD.replace("0", "\u0660"), "", ".", "..", None, 7, [GOOD], GOOD.encode(),
     ],
 )  # fmt: skip
-def test_others_are_refused(name):
+def test_other_names_are_rejected(name):
     assert not osl_atlas.is_own_name(name)
 
 

@@ -1,4 +1,4 @@
-"""What is shipped: the manifest, the wheels, and what the code may import."""
+"""The released package: manifest, wheels, and the modules that the code may import."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LIBRARIES = {"numpy", "scipy", "pycolmap", "OpenImageIO", "embreex"} | {
     "sunposition",
     "threadpoolctl",
     "tomlkit",
-    "rawpy",  # where it is there
+    "rawpy",  # where it exists
 }
 BLENDER = {
     "bpy",
@@ -39,7 +39,7 @@ BLENDER = {
     "blf",
     "addon_utils",
 }
-# The list of the Blender extensions platform.
+# The tag list of the Blender extensions platform.
 TAGS = {
     "3D View", "Add Curve", "Add Mesh", "Animation", "Bake", "Camera", "Compositing",
     "Development", "Game Engine", "Geometry Nodes", "Grease Pencil", "Import-Export", "Lighting",
@@ -50,7 +50,7 @@ TAGS = {
 
 
 def sources(*rooms: str) -> list[Path]:
-    """The Python files of some rooms, and the root package's own where asked for as "."."""
+    """The Python files of some packages, and the root package's own where "." is given."""
     found = [ROOT / "__init__.py"] if "." in rooms else []
     for room in rooms:
         if room != ".":
@@ -67,7 +67,7 @@ def imports(path: Path) -> Iterator[tuple[int, str]]:
             yield node.lineno, node.module.partition(".")[0]
 
 
-def foreign(paths: list[Path], allowed: set[str]) -> list[str]:
+def forbidden_imports(paths: list[Path], allowed: set[str]) -> list[str]:
     """Every import of those files that is neither relative nor allowed, as "file:line name"."""
     known = allowed | set(sys.stdlib_module_names)
     return [
@@ -83,7 +83,7 @@ def manifest() -> dict:
     return tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
 
 
-def test_manifest_says_what_blender_asks_for(manifest: dict) -> None:
+def test_manifest_has_fields_required_by_blender(manifest: dict) -> None:
     assert manifest["schema_version"] == "1.0.0"
     assert manifest["id"] == "patina"
     assert manifest["blender_version_min"] == "4.2.0"
@@ -111,8 +111,8 @@ def test_manifest_lists_exactly_the_pinned_wheels(manifest: dict) -> None:
     assert tuple(manifest["platforms"]) == wheels.PLATFORMS
 
 
-def test_every_library_comes_for_every_platform_and_python() -> None:
-    pure = sum(tags is None for tags in wheels.TAGS.values())  # one wheel serves them all
+def test_wheels_cover_every_platform_and_python() -> None:
+    pure = sum(tags is None for tags in wheels.TAGS.values())  # one wheel serves all of them
     each = len(wheels.PLATFORMS) * len(wheels.PYTHONS)
     assert len(set(wheels.wheel_names())) == (len(wheels.PINS) - pure) * each + pure
     raw = set(wheels.wheel_names(raw=True)) - set(wheels.wheel_names())
@@ -124,7 +124,7 @@ def test_numpy_is_not_shipped(manifest: dict) -> None:
     assert not [name for name in manifest["wheels"] if "numpy" in name.lower()]
 
 
-def test_filtered_manifest_changes_nothing_else(manifest: dict) -> None:
+def test_platform_filter_changes_only_wheels_and_platforms(manifest: dict) -> None:
     text = staging.filtered_manifest(["macos-arm64"], ["cp313"], raw=False)
     filtered = tomllib.loads(text)
     assert filtered["platforms"] == ["macos-arm64"]
@@ -144,16 +144,16 @@ def test_only_the_extension_is_shipped() -> None:
     assert {path.name for path in staging.shipped()} <= allowed
 
 
-def test_imports_are_relative_or_of_allowed_libraries() -> None:
-    assert not foreign(sources(".", *ROOMS[1:]), LIBRARIES | BLENDER)
-    assert not foreign([ROOT / "headless.py", ROOT / "api.py"], LIBRARIES | BLENDER)
+def test_imports_are_relative_or_from_allowed_libraries() -> None:
+    assert not forbidden_imports(sources(".", *ROOMS[1:]), LIBRARIES | BLENDER)
+    assert not forbidden_imports([ROOT / "headless.py", ROOT / "api.py"], LIBRARIES | BLENDER)
 
 
-def test_core_knows_no_blender() -> None:
+def test_core_does_not_import_blender() -> None:
     # OpenEXR's own wheel is not allowed either: it exports the C functions of the OpenEXR library,
     # and on Linux those of Blender's copy are called in their place. Writing then fails and
-    # corrupts memory. OpenImageIO keeps its copy to itself and writes the same files.
-    assert not foreign(sources("core"), LIBRARIES)
+    # corrupts memory. OpenImageIO keeps its copy private and writes the same files.
+    assert not forbidden_imports(sources("core"), LIBRARIES)
 
 
 def test_core_loads_without_blender() -> None:
@@ -170,9 +170,9 @@ def test_core_loads_without_blender() -> None:
 
 
 def test_tools_need_only_the_standard_library() -> None:
-    """run.py runs on a bare Python: so must every module it reaches without an environment."""
+    """run.py runs on a bare Python: so must every module it imports outside an environment."""
     own = [ROOT / "tools" / f"{name}.py" for name in SETUP]
-    assert not foreign([*own, ROOT / "run.py"], {"tools"})
+    assert not forbidden_imports([*own, ROOT / "run.py"], {"tools"})
 
 
 def test_no_file_is_longer_than_500_lines() -> None:
@@ -185,7 +185,7 @@ def test_no_file_is_longer_than_500_lines() -> None:
     assert not long
 
 
-def test_nothing_shipped_changes_the_search_path_or_runs_strings() -> None:
+def test_shipped_code_neither_changes_search_path_nor_evaluates_strings() -> None:
     pattern = re.compile(
         r"sys\.path\s*(\.|\+=|=|\[)|(?<![.\w])(eval|exec)\(|\bpickle\b|\bpip install"
     )

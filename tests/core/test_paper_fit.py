@@ -1,4 +1,4 @@
-"""The paper's estimator: each assumption does what it says, and the whole recovers a material."""
+"""The paper's estimator: each assumption has its stated effect; the fit recovers a material."""
 
 from __future__ import annotations
 
@@ -34,32 +34,32 @@ def test_ridge_solves_the_regularised_normal_equations() -> None:
     assert np.abs(gradient).max() < 1e-10
 
 
-def test_condition_numbers_are_numpys() -> None:
+def test_condition_numbers_match_numpy() -> None:
     rng = np.random.default_rng(1)
-    chosen, candidates = rng.normal(size=(3, 5)), rng.normal(size=(20, 5))
-    found = selection.condition_numbers(chosen, candidates)
-    expected = [np.linalg.cond(np.vstack([chosen, row])) for row in candidates]
+    selected, candidates = rng.normal(size=(3, 5)), rng.normal(size=(20, 5))
+    found = selection.condition_numbers(selected, candidates)
+    expected = [np.linalg.cond(np.vstack([selected, row])) for row in candidates]
     assert np.allclose(found, expected)
 
 
-def test_selection_beats_random_sets_and_keeps_the_fixed_row() -> None:
+def test_selection_beats_random_sets_and_keeps_fixed_row() -> None:
     rng = np.random.default_rng(2)
     rows = rng.normal(size=(300, 6)) * np.array([30, 10, 5, 3, 2, 1])
-    everything = lambda chosen: np.ones(300, bool)  # noqa: E731
-    chosen = selection.choose(rows, 6, everything, fixed=17)
-    assert chosen is not None and 17 in chosen and len(set(chosen.tolist())) == 6
-    ours = np.linalg.cond(rows[chosen])
+    everything = lambda selected: np.ones(300, bool)  # noqa: E731
+    selected = selection.choose(rows, 6, everything, fixed=17)
+    assert selected is not None and 17 in selected and len(set(selected.tolist())) == 6
+    ours = np.linalg.cond(rows[selected])
     others = [np.linalg.cond(rows[[17, *rng.choice(300, 5, replace=False)]]) for _ in range(500)]
     assert ours < np.min(others)
-    nothing = lambda chosen: np.zeros(300, bool)  # noqa: E731
+    nothing = lambda selected: np.zeros(300, bool)  # noqa: E731
     assert selection.choose(rows, 6, nothing) is None
 
 
-def test_chosen_samples_are_monotone_and_calm(table: SampleTable) -> None:
+def test_selected_samples_are_monotone_and_well_conditioned(table: SampleTable) -> None:
     fit = fit_paper(table, default_basis(), PaperSettings(trials=3))
     order = np.argsort(fit.chosen.theta_h)
     rho = fit.chosen.rho.mean(axis=1)[order]
-    assert (np.diff(rho) < 0).all()  # farther from the half vector: darker
+    assert (np.diff(rho) < 0).all()  # farther from the half vector, hence darker
     assert (np.abs(fit.chosen.curvature[1:]) <= 0.2).all()
     assert fit.chosen.theta_h[0] == 0  # the specular peak
 
@@ -78,10 +78,10 @@ def test_every_assumption_can_be_switched_off(table: SampleTable) -> None:
     ]
     assert all(fit.chosen.theta_h[0] == 0 for fit in free)
     rising = [np.diff(f.chosen.rho.mean(axis=1)[np.argsort(f.chosen.theta_h)]) > 0 for f in free]
-    assert np.any(rising)  # without the test some chosen sets are not monotone
+    assert np.any(rising)  # without the test some selected sets are not monotone
 
 
-def test_the_peak_takes_the_half_vector_for_its_normal(table: SampleTable) -> None:
+def test_peak_uses_half_vector_as_normal(table: SampleTable) -> None:
     row, peak = reliability.highest_intensity(table)
     assert row == table.radiance.mean(axis=1).argmax()
     light = peak.light.astype(float)
@@ -92,9 +92,10 @@ def test_the_peak_takes_the_half_vector_for_its_normal(table: SampleTable) -> No
     assert np.allclose(peak.rho, expected, rtol=1e-5)
 
 
-def test_the_fit_is_the_material(table: SampleTable) -> None:
-    """A Blinn lobe is no MERL material: within a fifth over what the photos saw is what six
-    samples can do; the colour of the body is right."""
+def test_fit_recovers_material(table: SampleTable) -> None:
+    """A Blinn lobe is not a MERL material: six samples can reach a fifth over the directions in the
+    photos; the diffuse colour is right.
+    """
     fit = fit_paper(table, default_basis())
     seen = fit.brdf.evaluate(table.angles)
     ratio = np.log(seen / table.rho)
@@ -105,7 +106,7 @@ def test_the_fit_is_the_material(table: SampleTable) -> None:
     assert np.array_equal(fit.brdf.coefficients, fit.candidates[best])
 
 
-def test_same_seed_same_coefficients(table: SampleTable) -> None:
+def test_same_seed_gives_same_coefficients(table: SampleTable) -> None:
     a, b, c = (
         fit_paper(table, default_basis(), PaperSettings(trials=2, seed=seed)) for seed in (4, 4, 5)
     )
@@ -126,7 +127,7 @@ def test_similarity_is_the_cosine(table: SampleTable) -> None:
         assert found[i] == pytest.approx(expected, rel=1e-4)
 
 
-def test_a_held_out_photo_is_predicted_and_one_photo_is_none(table: SampleTable) -> None:
+def test_held_out_photo_is_predicted_and_single_photo_has_none(table: SampleTable) -> None:
     basis = default_basis()
     assert photos_to_hold_out(table) == list(range(6))
     parts = [fit_without_photo(table, photo, basis, PaperSettings(trials=2)) for photo in range(6)]
@@ -136,7 +137,7 @@ def test_a_held_out_photo_is_predicted_and_one_photo_is_none(table: SampleTable)
     assert photos_to_hold_out(table.select(table.photo == 0)) == [] and summarise([]) is None
 
 
-def test_too_few_samples_are_refused(table: SampleTable) -> None:
+def test_too_few_samples_are_rejected(table: SampleTable) -> None:
     with pytest.raises(FitError, match="at least 24"):
         fit_paper(table.select(np.arange(10)), default_basis())
 
@@ -149,7 +150,7 @@ def test_equal_candidates_have_no_spread() -> None:
     assert candidate_spread(default_basis(), c).median > 0.01
 
 
-def test_unknown_irradiance_is_one_scale(tmp_path: Path) -> None:
+def test_unknown_irradiance_is_a_single_scale(tmp_path: Path) -> None:
     path = made.make_capture(tmp_path / "ball", photos=2)
     known, _ = sampled(path)
     path.write_text(path.read_text().replace("irradiance = [3.0, 3.0, 3.0]\n", ""))
@@ -157,7 +158,7 @@ def test_unknown_irradiance_is_one_scale(tmp_path: Path) -> None:
     assert np.allclose(unknown.rho, known.rho * made.IRRADIANCE, rtol=1e-5)
 
 
-def test_defaults_are_the_papers() -> None:
+def test_default_settings_are_those_of_paper() -> None:
     s = PaperSettings()
     assert (s.samples, s.trials, s.eta, s.curvature) == (6, 10, 40.0, 0.2)
     assert s.monotonicity and s.highest_intensity
@@ -168,7 +169,7 @@ def test_descent_improves_on_greedy_growth() -> None:
     gained = 0
     for _ in range(10):
         rows = rng.normal(size=(200, 6)) * np.array([30, 10, 5, 3, 2, 1])
-        everything = lambda chosen: np.ones(200, bool)  # noqa: E731
+        everything = lambda selected: np.ones(200, bool)  # noqa: E731
         greedy = selection.choose(rows, 6, everything, sweeps=0)
         descended = selection.choose(rows, 6, everything)
         assert greedy is not None and descended is not None
@@ -178,8 +179,8 @@ def test_descent_improves_on_greedy_growth() -> None:
     assert gained >= 5
 
 
-def test_a_brighter_lamp_is_no_highlight(table: SampleTable) -> None:
-    """Twenty times the light on one photo: the same reflectance, the same peak."""
+def test_brighter_lamp_is_not_a_highlight(table: SampleTable) -> None:
+    """Twenty times the light in one photo: the same reflectance, the same peak."""
     factor = np.ones(6, np.float32)
     factor[1] = 20
     brighter = replace(
@@ -190,8 +191,8 @@ def test_a_brighter_lamp_is_no_highlight(table: SampleTable) -> None:
     assert reliability.highest_intensity(brighter)[0] == reliability.highest_intensity(table)[0]
 
 
-def test_unknown_irradiance_fits_the_same_in_any_unit(table: SampleTable) -> None:
-    """The mapping is not blind to scale; the level it is given must be."""
+def test_fit_with_unknown_irradiance_is_independent_of_unit(table: SampleTable) -> None:
+    """The mapping depends on scale, so the level that it is given must not."""
     basis = default_basis()
     found = []
     for unit in (1e-3, 1.0, 500.0):
@@ -206,8 +207,10 @@ def test_unknown_irradiance_fits_the_same_in_any_unit(table: SampleTable) -> Non
         assert factor == pytest.approx(found[0][1], rel=1e-4)
 
 
-def test_a_wrong_hue_is_an_error_too(table: SampleTable) -> None:
-    """Red too bright and green too dark by as much: the channel mean is right, the photo is not."""
+def test_hue_error_counts_as_error(table: SampleTable) -> None:
+    """Red too bright and green too dark by the same amount: the channel mean is right, the photo is
+    not.
+    """
     basis = default_basis()
     brdf = fit_paper(table.select(table.photo != 0), basis, PaperSettings(trials=2, seed=1)).brdf
     exact = brdf.evaluate(table.angles) * table.irradiance * table.cos_i[:, None]

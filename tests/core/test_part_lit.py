@@ -1,4 +1,6 @@
-"""Pixels that a shadow's edge cuts, and shadows that go with the lamp, against plain geometry."""
+"""Partly lit pixels at shadow edges, and shadows that follow a corrected lamp, against plain
+geometry.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +25,8 @@ from patina.core.geometry.lift import MIN_LIFT, SHADOW_LIFT, facet_lift
 from patina.core.scan import Mesh
 from tests import make_lit_ball
 
-WALL = 0.5  # high, at x = 0 across a floor
-WIDE = 0.02  # a pixel on the floor
+WALL = 0.5  # height; the wall stands at x = 0 across a floor
+WIDE = 0.02  # width of a pixel on the floor
 
 
 def _floor_and_wall() -> RayScene:
@@ -53,27 +55,28 @@ def _towards(elevation: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("elevation", [0.2, 0.5, 1.0])
-def test_a_pixel_is_lit_as_far_as_the_shadow_does_not_reach(elevation: float) -> None:
+def test_visibility_is_unshadowed_fraction_of_pixel(elevation: float) -> None:
     ends = WALL / np.tan(elevation)  # of the shadow
     x = ends + WIDE * np.linspace(-2, 2, 41)
     towards = _towards(elevation)
     pixels = _row_of_pixels(x, towards)
     found = partial_visibility(_floor_and_wall(), pixels, pixels.light)
     true = np.clip((x - ends) / WIDE + 0.5, 0, 1)
-    # columns of rays, and the lift by which a shadow begins late
+    # columns of rays, and the ray offset by which a shadow begins late
     late = SHADOW_LIFT * 4 / np.tan(elevation) / WIDE
     assert np.abs(found - true).max() <= 0.5 / SIDE + late + 1e-6
     assert abs(found.mean() - true.mean()) < 0.02 + late
 
 
-def test_what_is_turned_away_is_not_in_a_shadow() -> None:
+def test_back_facing_surface_is_not_cast_shadow() -> None:
     pixels = _row_of_pixels(np.array([0.1]), _towards(0.5))
     assert partial_visibility(_floor_and_wall(), pixels, -pixels.light) == pytest.approx(1.0)
 
 
-def test_a_wide_lamp_softens_the_edge_of_whole_pixels() -> None:
-    """Against the shadow of a wall under a disc of lamps, seen by square pixels; a lamp of next to
-    no size is a point."""
+def test_wide_lamp_gives_penumbra_over_whole_pixels() -> None:
+    """Compared with the shadow of a wall under a disc of lamps, seen by square pixels; a very small
+    lamp equals a point.
+    """
     high, rng = 0.5, np.random.default_rng(0)
     ends = WALL / np.tan(high)
     wide = 5 * WIDE  # than which the penumbra is narrower
@@ -97,9 +100,10 @@ def test_a_wide_lamp_softens_the_edge_of_whole_pixels() -> None:
         assert abs(effect.free[:, place].mean() - true.mean()) < 0.02
 
 
-def test_shadows_go_with_the_lamp() -> None:
-    """A lamp that is found lower casts a longer shadow; what is said of it changes nothing where
-    the lamp is where the capture says."""
+def test_shadow_follows_corrected_lamp() -> None:
+    """A lamp corrected downwards casts a longer shadow; the correction changes nothing where the
+    lamp is where the capture states.
+    """
     low, high = 0.45, 0.5
     x = np.linspace(0.7, 1.3, 61)
     rays = _floor_and_wall()
@@ -116,14 +120,15 @@ def test_shadows_go_with_the_lamp() -> None:
     assert (cast.visible < 0.5).sum() > (pixels.visible < 0.5).sum() + 3
     still = DisplacedShadows.of(context, effect, np.zeros(2))
     assert np.abs(still.more).max() == 0
-    one_ray = replace(pixels, visible=np.round(pixels.visible))  # as beside no edge
+    one_ray = replace(pixels, visible=np.round(pixels.visible))  # as away from any edge
     still = DisplacedShadows.of(replace(context, pixels=one_ray), effect, np.zeros(2))
     assert np.abs(still.more).max() == 0
 
 
-def test_the_lift_is_as_fine_as_the_mesh() -> None:
-    """Of a sphere it is about the height of the cap over a facet, between what float32 needs and
-    what is enough for every scan."""
+def test_ray_offset_follows_mesh_resolution() -> None:
+    """On a sphere it is about the height of the cap over a facet, between the float32 minimum and
+    the upper limit that suffices for every scan.
+    """
     lifts = []
     for level in (1, 5, 6):
         ball = trimesh.creation.icosphere(subdivisions=level)
@@ -134,15 +139,15 @@ def test_the_lift_is_as_fine_as_the_mesh() -> None:
     assert lifts[0] == SHADOW_LIFT and lifts[0] > lifts[1] > lifts[2]
 
 
-def test_every_column_is_selected() -> None:
-    """A new column of Pixels comes along wherever some are chosen."""
+def test_pixel_selection_keeps_every_column() -> None:
+    """A new column of Pixels is kept by every selection."""
     pixels = make_lit_ball.lit_ball().pixels
     some = pixels.select(slice(3, 7))
     assert all(len(getattr(some, f.name)) == 4 for f in fields(Pixels))
 
 
-def test_a_hollow_under_its_lamp_is_lit() -> None:
-    """The plane at a pixel's middle lies under the mesh all around it; the mesh is what is lit."""
+def test_concave_surface_facing_lamp_is_lit() -> None:
+    """The plane at a pixel's centre lies below the mesh all around it; the mesh itself is lit."""
     side = np.linspace(-0.4, 0.4, 81)
     x, y = (v.ravel() for v in np.meshgrid(side, side))
     number = np.arange(len(x)).reshape(len(side), -1)

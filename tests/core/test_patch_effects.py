@@ -1,5 +1,6 @@
-"""Bumps that the mesh does not have, patch by patch, and what is not to be taken for them; what
-is a little outside the basis."""
+"""Surface bumps that the mesh lacks, estimated patch by patch, and the basis slack; both must not
+be confused with albedo.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ DEEP = np.radians(6.0)
 
 def bumpy(seed: int, wide: float) -> tuple[DiagnosisContext, np.ndarray]:
     """A ball with round bumps that its mesh does not have: photos of it, and its normals (n, 3).
-    wide: of a bump, scan units."""
+    wide: width of a bump in scan units.
+    """
     context = lit_ball(seed)
     pixels = context.pixels
     slope = DEEP * np.sin(2 * np.pi * pixels.point / wide)
@@ -45,9 +47,10 @@ def deviation_of(context: DiagnosisContext) -> np.ndarray:
     return expected_deviation(context.pixels, context.brdfs, np.radians(0.2))
 
 
-def test_patches_follow_bumps_that_are_as_wide_as_a_few_of_them():
-    """Normals are found to a third of what the mesh is off by; flat patches, which only tilt, leave
-    more."""
+def test_patch_normals_recover_bumps_a_few_patches_wide():
+    """The normals' error falls to a third of the mesh's own; flat patches, which only tilt, leave
+    more.
+    """
     context, normal = bumpy(1, 0.4)
     effect = NormalError.of(context)
     left = {}
@@ -56,19 +59,20 @@ def test_patches_follow_bumps_that_are_as_wide_as_a_few_of_them():
         model = Model(context.pixels, context.brdfs).with_effect(replace(effect, prior=usual))
         fitted = fit(model, deviation_of(context))
         found = fitted.model.shading().normal
-        missed = np.linalg.norm(np.cross(found, normal), axis=1)
+        errors = np.linalg.norm(np.cross(found, normal), axis=1)
         known = effect.patch >= 0
-        left[way] = np.sqrt(np.mean(missed[known] ** 2))
+        left[way] = np.sqrt(np.mean(errors[known] ** 2))
     scan = np.linalg.norm(np.cross(context.pixels.normal, normal), axis=1)
     before = np.sqrt(np.mean(scan[effect.patch >= 0] ** 2))
     assert left["bent"] < before / 3
     assert left["bent"] < 0.8 * left["flat"]
 
 
-def test_bumps_are_not_taken_for_paint_as_well():
-    """Beside patches that are accepted, other patches are judged against a model that knows the
-    first ones in left-out squares, too: else all that they stand for is gained twice, 16,000 nats
-    here for paint that is not there."""
+def test_bumps_are_not_also_explained_as_albedo():
+    """Next to accepted patches, other patches are judged against a model that includes the accepted
+    ones in held-out squares too. Otherwise all that they explain is gained twice: 16,000 nats here
+    for albedo variation that does not exist.
+    """
     context, _ = bumpy(2, 0.5)
     model = Model(context.pixels, context.brdfs).with_effect(NormalError.of(context))
     now = fit(model, deviation_of(context))
@@ -79,9 +83,10 @@ def test_bumps_are_not_taken_for_paint_as_well():
     assert not paint.is_accepted
 
 
-def test_a_white_wall_is_hardly_outside():
-    """Lambert's law at three times the albedo of the brightest measured material: the slack that
-    is left for it is a shape, and small."""
+def test_white_lambertian_wall_needs_little_slack():
+    """Lambert's law at three times the albedo of the brightest measured material: the remaining
+    basis slack has a small magnitude.
+    """
     context = lit_ball(3)
     pixels, basis = context.pixels, default_basis()
     light = np.maximum(np.sum(pixels.normal * pixels.light, axis=1, keepdims=True), 0)
@@ -94,4 +99,4 @@ def test_a_white_wall_is_hardly_outside():
     fitted = fit(Model(context.pixels, context.brdfs), deviation_of(context))
     assert np.median(np.abs(fitted.predicted / observed - 1)) < 1.5 * NOISE
     hats = fitted.model.brdfs.coefficients[..., -basis_slack.COUNT :]
-    assert np.abs(hats).max() < 0.2  # 0.46 where the hats have to make it brighter, too
+    assert np.abs(hats).max() < 0.2  # 0.46 where the basis functions must make it brighter, too

@@ -1,4 +1,4 @@
-"""Exposure, time and place from the file; what is damaged or ambiguous is missing, not guessed."""
+"""Exposure, time and place from the file; damaged or ambiguous values are absent, not guessed."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
         made.write_jpeg(folder / f"{name}.jpg", PIXELS, (made.app1_exif(whole),))
         made.write_png(folder / f"{name}.png", PIXELS, [(b"eXIf", whole)])
         made.write_tiff(folder / f"{name}.tif", PIXELS, MAIN, order=order, exif=EXIF, gps=GPS)
-    # camera RAW: structures of the TIFF family, or boxes and JPEGs that hold one
+    # camera RAW: structures of the TIFF family, or boxes and JPEGs that contain one
     (folder / "p.nef").write_bytes(block)
     (folder / "p.orf").write_bytes(b"IIRO" + block[4:])
     (folder / "p.rw2").write_bytes(b"IIU\0" + block[4:])
@@ -76,7 +76,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return sorted(folder.iterdir())
 
 
-def test_every_kind_of_file_says_the_same(files: list[Path]) -> None:
+def test_all_file_formats_give_same_metadata(files: list[Path]) -> None:
     assert len(files) == 11
     for path in files:
         found = read_exif(path)
@@ -102,7 +102,7 @@ def of(tmp_path: Path, main=None, exif=None, gps=None) -> Exif:
     return read_exif(path)
 
 
-def test_relative_exposure_goes_as_light_does(tmp_path: Path) -> None:
+def test_relative_exposure_is_proportional_to_light(tmp_path: Path) -> None:
     def relative(time, aperture, iso) -> float:
         exif = {0x829A: made.rationals(time), 0x829D: made.rationals(aperture), 0x8827: (3, [iso])}
         return of(tmp_path, exif=exif).relative_exposure
@@ -116,13 +116,13 @@ def test_relative_exposure_goes_as_light_does(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("tag", [0x829A, 0x829D])
 @pytest.mark.parametrize("value", [(0, 0), (1, 0), (0, 1)])
-def test_zero_denominators_are_missing(tmp_path: Path, tag: int, value) -> None:
+def test_zero_denominators_count_as_missing(tmp_path: Path, tag: int, value) -> None:
     found = of(tmp_path, exif={**EXIF, tag: made.rationals(value)})
     assert found.relative_exposure is None
     assert found.missing == ({0x829A: "exposure time", 0x829D: "f-number"}[tag],)
 
 
-def test_apex_numbers_stand_in(tmp_path: Path) -> None:
+def test_apex_values_are_used_as_fallback(tmp_path: Path) -> None:
     exif = {
         0x9201: made.rationals((7, 1), signed=True),
         0x9202: made.rationals((6, 1)),
@@ -133,11 +133,11 @@ def test_apex_numbers_stand_in(tmp_path: Path) -> None:
     assert (found.exposure_time, found.f_number, found.iso) == (1 / 128, 8, 102400)
 
 
-def test_the_time_of_an_edit_is_not_the_time_of_the_photo(tmp_path: Path) -> None:
+def test_edit_time_is_not_photo_time(tmp_path: Path) -> None:
     main = {306: made.ascii_tag("2020:01:01 00:00:00")}
     exif = {
-        0x9004: made.ascii_tag("2019:01:01 00:00:00"),  # digitised
-        0x9010: made.ascii_tag("-05:00"),  # zone of the edit
+        0x9004: made.ascii_tag("2019:01:01 00:00:00"),  # time of digitisation
+        0x9010: made.ascii_tag("-05:00"),  # time zone of the edit
     }
     found = of(tmp_path, main, exif)
     assert found.datetime_original is None and found.offset_original is None
@@ -147,7 +147,7 @@ def test_the_time_of_an_edit_is_not_the_time_of_the_photo(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     "text", ["0000:00:00 00:00:00", "    :  :     :  :  ", "2018:02:30 10:00:00", "", "x" * 19]
 )
-def test_times_that_are_none(tmp_path: Path, text: str) -> None:
+def test_invalid_times_are_ignored(tmp_path: Path, text: str) -> None:
     assert of(tmp_path, exif={0x9003: made.ascii_tag(text)}).datetime_original is None
 
 
@@ -158,7 +158,7 @@ def test_times_that_are_none(tmp_path: Path, text: str) -> None:
         ("+25:00", None), ("+05:61", None),
     ],
 )  # fmt: skip
-def test_offsets(tmp_path: Path, text: str, hours) -> None:
+def test_time_zone_offsets(tmp_path: Path, text: str, hours) -> None:
     found = of(tmp_path, exif={0x9011: made.ascii_tag(text)}).offset_original
     assert found == (None if hours is None else timedelta(hours=hours))
 
@@ -175,18 +175,18 @@ def test_offsets(tmp_path: Path, text: str, hours) -> None:
         {0x1D: made.ascii_tag("")},
     ],
 )
-def test_places_that_are_none(tmp_path: Path, change: dict) -> None:
+def test_invalid_places_are_ignored(tmp_path: Path, change: dict) -> None:
     found = of(tmp_path, gps=GPS | change)
     wrong = found.gps_utc if max(change) >= 7 else found.latitude
     assert wrong is None and found.longitude == pytest.approx(151.2)
 
 
-def test_decimal_degrees(tmp_path: Path) -> None:
+def test_place_in_decimal_degrees(tmp_path: Path) -> None:
     found = of(tmp_path, gps=GPS | {2: made.rationals((338570000, 10000000), (0, 0), (0, 0))})
     assert found.latitude == pytest.approx(-33.857, abs=1e-9)
 
 
-def test_files_without(tmp_path: Path) -> None:
+def test_files_without_metadata(tmp_path: Path) -> None:
     made.write_png(tmp_path / "p.png", PIXELS)
     made.write_jpeg(tmp_path / "p.jpg", PIXELS)
     for name in ("p.png", "p.jpg"):
@@ -234,7 +234,9 @@ def test_damaged_structures(data: st.DataObject) -> None:
 @example(
     struct.pack("<I", 8) + struct.pack("<HHHI4s", 65535, 0x8769, 4, 1, b"\x08\0\0\0"), b"II*\0"
 )
-def test_any_bytes(tmp_path_factory: pytest.TempPathFactory, data: bytes, head: bytes) -> None:
+def test_arbitrary_bytes_are_read_without_error(
+    tmp_path_factory: pytest.TempPathFactory, data: bytes, head: bytes
+) -> None:
     path = tmp_path_factory.getbasetemp() / "any.nef"
     path.write_bytes(head + data)
     found = read_exif(path)
@@ -254,10 +256,10 @@ def test_damaged_files(files: list[Path], tmp_path_factory, data: st.DataObject)
     assert found.latitude is None or abs(found.latitude) <= 90
 
 
-def test_a_photo_from_the_air(shared: Path) -> None:
+def test_aerial_photo(shared: Path) -> None:
     found = read_exif(shared / "data/real/brighton_sun.jpg")
     assert found.datetime_original == datetime(2016, 6, 23, 16, 33, 18)
-    assert found.offset_original is None and found.utc is None  # nobody wrote the zone
+    assert found.offset_original is None and found.utc is None  # no time zone is stored
     assert found.latitude == pytest.approx(46 + 50 / 60 + 32.7621 / 3600, abs=1e-7)
     assert found.longitude == pytest.approx(-(91 + 59 / 60 + 39.6002 / 3600), abs=1e-7)
     assert found.altitude == pytest.approx(198.609)

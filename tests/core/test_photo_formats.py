@@ -1,4 +1,4 @@
-"""Every kind of file: the right pixels, never turned; or one line that says what is wrong."""
+"""Every file format: the right pixels, never rotated, or a one-line error with the cause."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ HEIGHT, WIDTH = 24, 36
 
 
 def ramp(dtype=np.uint8, channels: int = 3) -> np.ndarray:
-    """No two rows, columns or channels alike: a turned or mixed up picture is another one."""
+    """No two rows, columns or channels are alike: a rotated or mixed up image differs."""
     y, x, c = np.mgrid[:HEIGHT, :WIDTH, :channels]
     part = (0.55 * y / HEIGHT + 0.3 * x / WIDTH + 0.1 * c / max(channels, 1)) + 0.02
     return (part * np.iinfo(dtype).max).astype(dtype) if np.dtype(dtype).kind == "u" else part
@@ -66,7 +66,7 @@ def test_orientation_is_never_applied(tmp_path: Path, orientation: int) -> None:
         assert read_exif(path).orientation == orientation
 
 
-def test_layouts_of_tiff(tmp_path: Path) -> None:
+def test_tiff_layouts(tmp_path: Path) -> None:
     path = tmp_path / "p.tif"
     for kind, dtype in (("uint8", np.uint8), ("uint16", np.uint16)):
         pixels, top = ramp(dtype), np.iinfo(dtype).max
@@ -83,14 +83,14 @@ def test_layouts_of_tiff(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("compression", ["none", "rle", "zip", "piz", "pxr24"])
 @pytest.mark.parametrize("tile", [0, 16])
-def test_layouts_of_exr(tmp_path: Path, compression: str, tile: int) -> None:
+def test_exr_layouts(tmp_path: Path, compression: str, tile: int) -> None:
     rng = np.random.default_rng(3)
     light = rng.random((300, 40, 3)).astype(np.float16)  # more rows than are read at once
     write(tmp_path / "p.exr", light, "half", tile, compression=compression)
     assert np.array_equal(read_radiance(tmp_path / "p.exr"), light.astype(np.float32))
 
 
-def test_more_rows_than_are_read_at_once(tmp_path: Path) -> None:
+def test_image_with_more_rows_than_one_block(tmp_path: Path) -> None:
     rng = np.random.default_rng(4)
     pixels = rng.integers(0, 256, (700, 9, 3), np.uint8)
     made.write_tiff(tmp_path / "p.tif", pixels)
@@ -119,7 +119,7 @@ def test_grey_and_alpha(tmp_path: Path, dtype) -> None:
                 assert np.abs(got * top - colour).max() < 0.01, (name, channels)
 
 
-def test_palettes_and_few_bits(tmp_path: Path) -> None:
+def test_palettes_and_low_bit_depths(tmp_path: Path) -> None:
     path = tmp_path / "p.png"
     codes = np.tile(np.arange(4), (3, 5))
     palette = [0, 0, 0, 10, 20, 30, 100, 110, 120, 255, 254, 253]
@@ -159,7 +159,7 @@ def test_pages(tmp_path: Path) -> None:
 
 
 RGBE = np.array([[[128, 64, 32, 129], [255, 255, 255, 128]], [[0, 0, 0, 0], [200, 1, 3, 140]]])
-# G. Ward: mantissa / 256 · 2^(exponent − 128), some readers add half a step
+# G. Ward: mantissa / 256 · 2^(exponent − 128); some readers add half a step
 RGBE_LIGHT = RGBE[..., :3] * 2.0 ** (RGBE[..., 3:] - 136.0)
 RGBE_STEP = 2.0 ** (RGBE[..., 3:] - 136.0)
 
@@ -195,7 +195,7 @@ def test_hdr_exposure(tmp_path: Path, lines, scale) -> None:
         ([], "", "resolution|image"),
     ],
 )
-def test_wrong_hdr_headers(tmp_path: Path, lines, resolution, message: str) -> None:
+def test_invalid_hdr_headers(tmp_path: Path, lines, resolution, message: str) -> None:
     path = tmp_path / "p.hdr"
     made.write_hdr(path, RGBE, lines, " " if resolution == "" else resolution)
     with pytest.raises(InputError, match=message):
@@ -288,7 +288,7 @@ def broken_exr(path: Path) -> None:
         ("p.jpg", lambda path: None, "no such file"),
     ],
 )
-def test_refusals(tmp_path: Path, name: str, make, message: str) -> None:
+def test_unsupported_images_are_rejected(tmp_path: Path, name: str, make, message: str) -> None:
     make(tmp_path / name)
     with pytest.raises(InputError, match=message) as caught:
         read_photo(tmp_path / name)
@@ -296,7 +296,7 @@ def test_refusals(tmp_path: Path, name: str, make, message: str) -> None:
 
 
 def seeds(folder: Path) -> dict[str, Path]:
-    """One small file of every kind and of the layouts that take different roads."""
+    """One small file of every format and of the layouts that take different code paths."""
     exif = made.tiff_bytes({274: (3, [6])}, exif={0x829A: made.rationals((1, 50))})
     app = (made.app1_exif(exif), made.app2_icc(made.icc_profile(made.curv(563), made.ADOBE_D50)))
     light = ramp(np.float32)
@@ -327,7 +327,10 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 def attempt(path: Path) -> bool:
-    """Every reader: pixels of the header's size, or one line; in time. Whether pixels came."""
+    """Run every reader: pixels of the header's size, or a one-line error, in bounded time.
+
+    Returns whether pixels came.
+    """
     start, read = time.perf_counter(), False
     for reader in (read_photo, read_exif, read_mask, read_encoded):
         try:
@@ -346,14 +349,14 @@ def attempt(path: Path) -> bool:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_truncated(
+def test_truncated_files(
     whole: dict[str, Path], tmp_path: Path, name: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     data = whole[name].read_bytes()
     rng = random.Random(name)
     for _ in range(50):
         (tmp_path / name).write_bytes(data[: rng.randrange(len(data) - 2)])
-        # the tail of a strip that the last row does not need may go
+        # the end of a strip that the last row does not need may be missing
         assert not attempt(tmp_path / name)
     assert capfd.readouterr().err == ""
 
@@ -380,7 +383,7 @@ def test_flipped_bytes(whole: dict[str, Path], tmp_path: Path, name: str, places
 
 @pytest.mark.slow
 def test_memory_of_a_large_photo(tmp_path: Path) -> None:
-    """24 MP: the result (288 MB and two masks), and little more."""
+    """24 MP: the result (288 MB and two masks) and little more."""
     path = tmp_path / "p.tif"
     row = np.tile(np.arange(6000) % 256, (16, 1)).astype(np.uint8)
     spec = oiio.ImageSpec(6000, 4000, 3, "uint8")

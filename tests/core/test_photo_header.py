@@ -1,4 +1,4 @@
-"""Sizes come from headers, whole files are checked once, and a changed file is read again."""
+"""Image sizes come from headers, whole files are checked once, and a changed file is read again."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_a_file_is_read_again_only_after_a_change(tmp_path: Path) -> None:
 
     path.write_bytes(b"1")
     assert [content(path), content(path)] == [b"1", b"1"]
-    assert len(reads) == 2  # too young: a second change could bear the same time
+    assert len(reads) == 2  # too recent: a second change could have the same modification time
     os.utime(path, (LONG_AGO, LONG_AGO))
     assert [content(path), content(path)] == [b"1", b"1"]
     assert len(reads) == 3
@@ -58,7 +58,7 @@ def test_a_file_is_read_again_only_after_a_change(tmp_path: Path) -> None:
         content(path)
 
 
-def test_damage_is_found_in_a_file_that_was_whole(tmp_path: Path) -> None:
+def test_later_damage_of_valid_file_is_detected(tmp_path: Path) -> None:
     path = tmp_path / "a.png"
     made.write_png(path, noise())
     os.utime(path, (LONG_AGO, LONG_AGO))

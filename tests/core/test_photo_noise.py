@@ -1,4 +1,4 @@
-"""Noise from one photo, and exposures merged by it: against noise that was put in."""
+"""Noise estimated from one photo, and exposures merged with it, against synthetic noise."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TINT = np.array([1.0, 0.6, 0.35])
 
 
 def scene(seed: int, plain: float = 0.5) -> np.ndarray:
-    """(h, w, 3) light 0.02 … 0.9: shading, edges, and texture but for the part ``plain``."""
+    """(h, w, 3) light 0.02 … 0.9: shading, edges, and texture except in the part ``plain``."""
     rng = np.random.default_rng(seed)
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     light = 0.04 + 0.6 * (x / WIDTH) ** 2 + 0.15 * np.sin(y / 130) ** 2
@@ -60,9 +60,10 @@ def photo(pixels: np.ndarray, top: float = np.inf) -> Photo:
 
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize(("shot", "read"), [(1e-4, 1e-3), (1e-3, 2e-3), (1e-5, 5e-4), (0, 3e-3)])
-def test_noise_that_was_put_in(seed: int, shot: float, read: float) -> None:
-    """Standard deviation within 10 % at every brightness the scene has; shot and read within 20 %
-    where they make a good part of the variance, else they cannot be told apart."""
+def test_synthetic_noise_is_recovered(seed: int, shot: float, read: float) -> None:
+    """Standard deviation within 10 % at every brightness in the scene; shot and read noise within
+    20 % where each makes a good part of the variance, because otherwise they cannot be separated.
+    """
     light = scene(seed)
     found = estimate_noise(photo(noisy(light, shot, read, seed)))
     assert found.step == 1 and found.blocks > 200
@@ -77,14 +78,14 @@ def test_noise_that_was_put_in(seed: int, shot: float, read: float) -> None:
             assert found.read[channel] == pytest.approx(read, rel=0.2)
 
 
-def test_a_dark_background_does_not_outvote_the_object() -> None:
+def test_dark_background_does_not_dominate_estimate() -> None:
     light = scene(3)
     light[:, :400] = 1e-4 * TINT
     found = estimate_noise(photo(noisy(light, 1e-3, 1e-6)))
     assert np.allclose(found.shot, 1e-3, rtol=0.2)
 
 
-def test_clipped_and_black_pixels_do_not_count() -> None:
+def test_clipped_and_black_pixels_are_ignored() -> None:
     light = scene(4)
     light[:200] = 3.0  # saturated: no noise at all
     pixels = noisy(light, 1e-3, 1e-3)
@@ -94,7 +95,7 @@ def test_clipped_and_black_pixels_do_not_count() -> None:
     assert np.allclose(found.variance(np.full(3, 0.3)), truth, rtol=0.2)
 
 
-def test_demosaiced_noise_is_correlated_and_still_found() -> None:
+def test_correlated_noise_of_demosaiced_photo_is_recovered() -> None:
     light = scene(5)
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     red, blue = (y % 2 == 0) & (x % 2 == 0), (y % 2 == 1) & (x % 2 == 1)
@@ -116,21 +117,22 @@ def test_demosaiced_noise_is_correlated_and_still_found() -> None:
 
 @pytest.mark.parametrize("shape", [(5, 5), (40, 3), (20, 300), (100, 100)])
 @pytest.mark.parametrize("value", [0.0, 0.3, np.inf])
-def test_photos_that_say_nothing(shape: tuple[int, int], value: float) -> None:
+def test_photos_without_information_give_no_estimate(shape: tuple[int, int], value: float) -> None:
     pixels = np.full((*shape, 3), min(value, 1.0))
     info = PhotoInfo("png", Transfer.named("srgb"), "made", levels=256)
     lost = np.full(shape, value == np.inf)
     found = estimate_noise(Photo(pixels.astype(np.float32), lost, pixels[..., 0] == 0, info))
     assert found.blocks == 0
-    # rounding to 256 codes of the sRGB curve makes this much by itself
+    # rounding to the 256 codes of the sRGB curve causes this much by itself
     step = 1 / 255 * (2.4 / 1.055) * ((0.5 + 0.055) / 1.055) ** 1.4
     half = ((0.5 + 0.055) / 1.055) ** 2.4
     assert np.allclose(found.variance(np.full(3, half)), step**2 / 12, rtol=0.02)
 
 
 def shot_of_channel_difference(pixels: np.ndarray) -> float:
-    """Red and green of one material differ by a locally constant factor: what is left of the high
-    pass of their difference is noise, whatever the texture. Pure shot noise assumed."""
+    """Red and green of one material differ by a locally constant factor: the residual of the high
+    pass of their difference is noise, whatever the texture. Pure shot noise is assumed.
+    """
 
     def high(a):
         d = a[:-2] - 2 * a[1:-1] + a[2:]
@@ -143,7 +145,7 @@ def shot_of_channel_difference(pixels: np.ndarray) -> float:
     lit = uniform_filter((pixels > 0).all(axis=2).astype(float), 15)[1:-1, 1:-1] > 0.999
     mean, factor = mean[1:-1, 1:-1], factor[1:-1, 1:-1]
     rest = (high(red) - factor * high(green)) ** 2 / (mean * (1 + factor))
-    return float(np.median(rest[lit]) / 0.4549)  # median of chi-squared with one degree
+    return float(np.median(rest[lit]) / 0.4549)  # median of chi-squared with one degree of freedom
 
 
 @pytest.mark.parametrize("name", ["bunny_red/lit/00", "bunny_bronze/lit/00", "bunny_fabric/lit/01"])
@@ -159,20 +161,21 @@ NOISE = Noise(np.full(3, SHOT), np.full(3, READ))
 
 
 def bracket(light: np.ndarray, exposures=EXPOSURES) -> list[Photo]:
-    """As a camera: clipped at 1 and, like most files, at 0."""
+    """As a camera: clipped at 1 and, as in most files, at 0."""
     return [
         photo(np.maximum(noisy(light * e, SHOT, READ, i), 0), TOP) for i, e in enumerate(exposures)
     ]
 
 
 def test_merged_radiance_and_its_variance() -> None:
-    light = scene(6) * 8  # up to 7: seven times what the longest exposure holds
+    light = scene(6) * 8  # up to 7: seven times the clipping level of the longest exposure
     merged = merge_bracket(bracket(light), EXPOSURES, [NOISE] * 3)
     assert merged.valid.all() and merged.warnings == ()
     z = (merged.radiance - light) / np.sqrt(merged.variance)
     for low, high in ((0, 0.3), (0.3, 1), (1, 3), (3, 10)):
         part = z[(light > low) & (light <= high)]
-        # two in-band selection effects: clipping by noise at the top, both below a tenth sigma
+        # two selection effects within the range: clipping of noise at the top; both are below a
+        # tenth of sigma
         assert abs(part.mean()) < 0.1 and part.std() == pytest.approx(1, abs=0.05)
     assert merged.factors == pytest.approx((1, 1, 1), abs=0.003)
     assert max(merged.moved) < 1e-3
@@ -188,14 +191,14 @@ def test_merging_beats_the_best_single_exposure() -> None:
     assert np.mean((shots[0].radiance - light) ** 2) > 1.5 * ideal.mean()
 
 
-def test_noise_is_estimated_where_it_is_not_given() -> None:
+def test_missing_noise_model_is_estimated() -> None:
     light = scene(8) * 4
     merged = merge_bracket(bracket(light), EXPOSURES)
     z = (merged.radiance - light) / np.sqrt(merged.variance)
     assert z.std() == pytest.approx(1, abs=0.1)
 
 
-def test_wrong_exposures_are_measured() -> None:
+def test_wrong_exposures_are_measured_and_reported() -> None:
     light = scene(9) * 4
     true = (0.25 * 1.08, 1.0, 0.0625 * 0.9)
     merged = merge_bracket(bracket(light, true), EXPOSURES, [NOISE] * 3)
@@ -207,7 +210,7 @@ def test_wrong_exposures_are_measured() -> None:
     assert np.median(again.radiance / light) == pytest.approx(1, abs=0.002)
 
 
-def test_movement_is_told() -> None:
+def test_movement_between_exposures_is_reported() -> None:
     light = scene(10) * 4
     shots = bracket(light)
     moved = Photo(*(np.roll(a, 12, axis=1) for a in (shots[0].radiance, shots[0].clipped,
@@ -217,7 +220,7 @@ def test_movement_is_told() -> None:
     assert any(w.startswith("a ") and "moved" in w for w in merged.warnings)
 
 
-def test_clipped_everywhere_is_not_valid() -> None:
+def test_pixels_clipped_in_all_exposures_are_invalid() -> None:
     light = scene(11)
     light[10:20, 30:50] = 100.0
     merged = merge_bracket(bracket(light), EXPOSURES, [NOISE] * 3)
@@ -228,7 +231,7 @@ def test_clipped_everywhere_is_not_valid() -> None:
     assert np.isfinite(merged.variance[truth]).all()
 
 
-def test_one_photo_is_itself() -> None:
+def test_single_exposure_is_unchanged() -> None:
     light = scene(12)
     (shot,) = bracket(light, [0.5])
     merged = merge_bracket([shot], [0.5], [NOISE])
@@ -236,7 +239,7 @@ def test_one_photo_is_itself() -> None:
     assert np.allclose(merged.variance, NOISE.variance(shot.radiance) / 0.25, rtol=1e-3)
 
 
-def test_exposures_with_nothing_in_common() -> None:
+def test_exposures_without_common_range_are_rejected() -> None:
     light = scene(13)
     merged = merge_bracket(bracket(light, (1.0, 1e-6)), (1.0, 1e-6), [NOISE] * 2)
     assert math.isnan(merged.factors[1]) and "could not be checked" in merged.warnings[0]
@@ -244,7 +247,7 @@ def test_exposures_with_nothing_in_common() -> None:
 
 
 @pytest.mark.parametrize("exposures", [(1.0,), (1.0, 0.0), (1.0, -1.0), (1.0, math.nan)])
-def test_impossible_exposures(exposures) -> None:
+def test_impossible_exposures_are_rejected(exposures) -> None:
     shots = bracket(scene(14), (1.0, 0.5))
     with pytest.raises(InputError, match="exposures"):
         merge_bracket(shots, exposures)
@@ -252,7 +255,7 @@ def test_impossible_exposures(exposures) -> None:
         merge_bracket([shots[0], photo(np.ones((4, 4, 3)))], (1.0, 0.5), [NOISE] * 2)
 
 
-def test_memory_does_not_grow_with_the_number_of_photos() -> None:
+def test_memory_does_not_grow_with_photo_count() -> None:
     light = scene(15).astype(np.float32)
 
     def reader(exposure: float) -> Callable[[], Photo]:

@@ -1,4 +1,4 @@
-"""Predictions of photos: errors by hand, encodings inverted, and photos that no fit has seen."""
+"""Predictions of photos: errors computed by hand, inverted encodings, and held-out photos."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def fitted(ball: patina.Capture) -> patina.FitResult:
     return patina.fit(patina.select_photos(ball, [0, 1, 2]))
 
 
-def test_errors_are_those_computed_by_hand() -> None:
+def test_errors_match_values_computed_by_hand() -> None:
     measured = np.array([[0.5, 0.0, 0.4]])
     predicted = np.array([[0.4, 0.002, 0.6]])
     errors = PhotoErrors.of(predicted, measured)
@@ -55,9 +55,7 @@ def test_linear_floating_point_files_are_not_clipped() -> None:
     assert (encoded == 2.5).all()
 
 
-def test_a_photo_that_no_fit_has_seen_is_predicted(
-    ball: patina.Capture, fitted: patina.FitResult
-) -> None:
+def test_held_out_photo_is_predicted(ball: patina.Capture, fitted: patina.FitResult) -> None:
     (found,) = patina.predict(ball, fitted, photos=[3])
     assert found.name == ball.photo_name(3) and found.place == 3
     assert found.radiance.shape == found.measured.shape == (made.HEIGHT, made.WIDTH, 3)
@@ -68,10 +66,10 @@ def test_a_photo_that_no_fit_has_seen_is_predicted(
     assert again == found.errors
 
 
-def test_nothing_is_taken_from_the_predicted_photo(
+def test_prediction_does_not_use_predicted_photo(
     ball: patina.Capture, fitted: patina.FitResult
 ) -> None:
-    """The file of another photo in its place changes the error, not the prediction."""
+    """Replacing the file by another photo changes the error, not the prediction."""
     photos = (*ball.photos[:3], replace(ball.photos[3], files=ball.photos[0].files))
     (own,) = patina.predict(ball, fitted, photos=[3])
     (other,) = patina.predict(replace(ball, photos=photos), fitted, photos=[3])
@@ -79,7 +77,7 @@ def test_nothing_is_taken_from_the_predicted_photo(
     assert other.errors.typical > own.errors.typical
 
 
-def test_twice_the_exposure_is_twice_the_encoded_prediction(
+def test_prediction_scales_with_exposure_before_encoding(
     ball: patina.Capture, fitted: patina.FitResult
 ) -> None:
     (one,) = patina.predict(ball, fitted, photos=[3])
@@ -99,12 +97,12 @@ def test_select_photos_keeps_lines_and_lights(ball: patina.Capture) -> None:
 
 
 @pytest.mark.parametrize(("photos", "said"), [(["no.exr"], "no photo"), ([9], "9"), ([], "left")])
-def test_wrong_photos_are_named(ball: patina.Capture, photos: list, said: str) -> None:
+def test_invalid_photo_selection_is_named(ball: patina.Capture, photos: list, said: str) -> None:
     with pytest.raises(InputError, match=said):
         patina.select_photos(ball, photos)
 
 
-def test_an_unknown_light_of_unknown_strength_is_refused(
+def test_light_of_unknown_intensity_is_rejected(
     ball: patina.Capture, fitted: patina.FitResult
 ) -> None:
     lights = tuple(replace(light, name=f"{light.name}x", strength=None) for light in ball.lights)
@@ -113,7 +111,7 @@ def test_an_unknown_light_of_unknown_strength_is_refused(
         patina.predict(replace(ball, lights=lights, photos=photos), fitted, photos=[0])
 
 
-def test_entries_with_arrays_compare(ball: patina.Capture) -> None:
+def test_entries_with_arrays_compare_equal(ball: patina.Capture) -> None:
     light = ball.lights[0]
     assert entries_equal(light, replace(light, direction=np.array(light.direction)))
     assert not entries_equal(light, replace(light, direction=-np.array(light.direction)))
@@ -132,7 +130,7 @@ def test_export_writes_what_the_command_line_reads(
         patina.export(fitted, tmp_path, ["nonsense"])
 
 
-def test_the_package_offers_what_api_offers() -> None:
+def test_package_exports_names_of_api() -> None:
     from patina import api
 
     assert sorted(patina.__all__) == sorted(api.__all__)

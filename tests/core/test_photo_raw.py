@@ -1,4 +1,4 @@
-"""Camera RAW, against mosaics whose light is known."""
+"""Camera RAW files, against mosaics of known light."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ COLOUR = np.array([0.3, 0.4, 0.2])
 
 
 def mosaic(light: np.ndarray, camera=None) -> np.ndarray:
-    """(h, w) sensor numbers of (h, w, 3) linear Rec.709 light, 1 = saturation of green."""
+    """(h, w) sensor values of (h, w, 3) linear Rec.709 light, 1 = saturation of green."""
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     channel = np.where((y % 2 == 0) & (x % 2 == 0), 0, np.where((y % 2) & (x % 2), 2, 1))
     seen = (light @ (np.eye(3) if camera is None else camera).T) * NEUTRAL
@@ -35,7 +35,7 @@ def shaded() -> np.ndarray:
 
 @pytest.mark.parametrize("orientation", [1, 3, 6, 8])
 @pytest.mark.parametrize("camera", [None, CAMERA])
-def test_linear_light_of_a_mosaic(tmp_path: Path, orientation: int, camera) -> None:
+def test_linear_light_is_recovered_from_mosaic(tmp_path: Path, orientation: int, camera) -> None:
     pytest.importorskip("rawpy")
     path = tmp_path / "p.dng"
     more = {} if camera is None else {"camera": camera}
@@ -50,9 +50,10 @@ def test_linear_light_of_a_mosaic(tmp_path: Path, orientation: int, camera) -> N
     assert photo.info.kind == "raw" and "AHD" in photo.info.reason
 
 
-def test_brightness_is_the_sensors_own(tmp_path: Path) -> None:
-    """No scale from the photo itself: half the light is half the numbers, and a photo whose
-    brightest pixel lies just below saturation is not stretched."""
+def test_brightness_is_not_rescaled_to_photo(tmp_path: Path) -> None:
+    """The photo itself sets no scale: half the light gives half the values, and a photo whose
+    brightest pixel lies just below saturation is not stretched.
+    """
     pytest.importorskip("rawpy")
     means = []
     for factor in (1.0, 0.5, 2.2):
@@ -99,7 +100,7 @@ def test_damaged_raw_files(tmp_path: Path) -> None:
             assert photo.radiance.shape[:2] == image_size(path)[::-1]
 
 
-def test_without_rawpy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_rawpy_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "p.cr2"
     path.write_bytes(made.tiff_bytes({}))
     monkeypatch.setitem(sys.modules, "rawpy", None)

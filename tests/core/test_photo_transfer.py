@@ -1,4 +1,4 @@
-"""Encoded numbers → linear light: curves, embedded profiles, and what files say of themselves."""
+"""Encoded values → linear light: curves, embedded profiles, and encodings that files state."""
 
 from __future__ import annotations
 
@@ -41,17 +41,17 @@ TRUTH = {
 
 
 @pytest.mark.parametrize("name", TRUTH)
-def test_curves(name: str) -> None:
+def test_transfer_curves_match_standards(name: str) -> None:
     table = Transfer.named(name).table(65536)
     assert table.shape == (65536, 3) and table.dtype == np.float32
     truth = TRUTH[name](np.arange(65536) / 65535)
     assert np.abs(table - truth[:, None]).max() < 1e-6
-    x = np.linspace(0, 3, 300).reshape(10, 10, 3)  # floats go beyond 1
+    x = np.linspace(0, 3, 300).reshape(10, 10, 3)  # floats may exceed 1
     assert np.allclose(Transfer.named(name).decode(x), TRUTH[name](x), rtol=1e-5, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["", "sRGB ", "gamma", "gamma:", "gamma:0", "gamma:nan", "lut"])
-def test_unknown_curves(name: str) -> None:
+def test_unknown_curves_are_rejected(name: str) -> None:
     with pytest.raises(InputError, match=r'expected "auto", "srgb"'):
         Transfer.named(name)
 
@@ -61,7 +61,7 @@ def test_unknown_curves(name: str) -> None:
     st.lists(st.floats(0.01, 1), min_size=1, max_size=30),
     st.lists(st.floats(0, 1), min_size=30, max_size=30),
 )
-def test_sampled_curves_pass_through_their_points_and_rise(steps, rises) -> None:
+def test_sampled_curves_interpolate_points_monotonically(steps, rises) -> None:
     x = np.cumsum([0.0, *steps])
     x /= x[-1]
     y = np.cumsum([0.0, *rises[: len(steps)]]) + x
@@ -71,7 +71,7 @@ def test_sampled_curves_pass_through_their_points_and_rise(steps, rises) -> None
     assert (np.diff(curve.table(1001), axis=0) >= 0).all()
 
 
-def test_sampled_curves_for_each_channel_and_wrong_ones() -> None:
+def test_sampled_curves_per_channel_and_invalid_ones() -> None:
     x = np.linspace(0, 1, 50)
     curve = Transfer.sampled(np.tile(x, (3, 1)), [x, 2 * x, srgb(x)])
     got = curve.decode(np.full((1, 3), 0.5))
@@ -90,7 +90,7 @@ def test_sampled_curves_for_each_channel_and_wrong_ones() -> None:
 
 
 @pytest.mark.parametrize("name", TRUTH)
-def test_an_asked_curve_rules(tmp_path: Path, name: str) -> None:
+def test_requested_curve_overrides_file(tmp_path: Path, name: str) -> None:
     made.write_png(tmp_path / "p.png", STRIP, [(b"sRGB", b"\0")])
     photo = read_photo(tmp_path / "p.png", name)
     assert np.abs(photo.radiance[1, :, 0] - TRUTH[name](CODES / 255)).max() < 1e-6
@@ -98,7 +98,7 @@ def test_an_asked_curve_rules(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("bits", [8, 16])
-def test_without_a_statement_srgb_is_assumed(tmp_path: Path, bits: int) -> None:
+def test_srgb_is_assumed_by_default(tmp_path: Path, bits: int) -> None:
     strip = STRIP if bits == 8 else STRIP.astype(np.uint16) * 257
     made.write_tiff(tmp_path / "p.tif", strip)
     made.write_png(tmp_path / "p.png", strip)
@@ -110,7 +110,7 @@ def test_without_a_statement_srgb_is_assumed(tmp_path: Path, bits: int) -> None:
         assert photo.info.saturation == 1.0 and photo.info.levels == 2**bits
 
 
-def test_floats_are_linear(tmp_path: Path) -> None:
+def test_float_images_are_linear(tmp_path: Path) -> None:
     light = np.geomspace(1e-4, 1e3, 96, dtype=np.float32).reshape(4, 8, 3)
     made.write_tiff(tmp_path / "p.tif", light)
     made.write_tiff(tmp_path / "big.tif", light, order=">")
@@ -141,23 +141,23 @@ GAMMA18 = made.icc_profile(made.curv(round(1.8 * 256)), made.SRGB_D50)
         ([iccp(b"nonsense")], srgb),
         ([iccp(b"nonsense"), gama(100000)], lambda x: x),
         ([(b"cICP", b"\1\x08\0\1"), (b"sRGB", b"\0")], lambda x: x),
-        ([(b"cICP", b"\1\x10\0\1")], srgb),  # PQ is not known
+        ([(b"cICP", b"\1\x10\0\1")], srgb),  # the PQ curve is not supported
     ],
 )
-def test_what_a_png_says(tmp_path: Path, chunks, truth) -> None:
+def test_transfer_stated_by_png(tmp_path: Path, chunks, truth) -> None:
     made.write_png(tmp_path / "p.png", STRIP, chunks)
     light = read_photo(tmp_path / "p.png").radiance
     assert np.abs(light[0] - truth(CODES / 255)[:, None]).max() < 1e-4
 
 
-def test_what_exif_says(tmp_path: Path) -> None:
+def test_transfer_stated_by_exif(tmp_path: Path) -> None:
     path = tmp_path / "p.jpg"
     colours = np.zeros((16, 16, 3), np.uint8)
     colours[:] = (60, 200, 90)
     for space, index, adobe in ((1, "R98", False), (2, "R03", True), (0xFFFF, "R03", True)):
         exif = {0xA001: (3, [space])}
         tiff = made.tiff_bytes({}, exif=exif)
-        # the interoperability directory, put behind all else
+        # the interoperability directory, placed after everything else
         tiff = made.tiff_bytes({}, exif={**exif, 0xA005: (4, [len(tiff) + 12])})
         tiff += made.tiff_bytes({1: made.ascii_tag(index)})[8:]
         made.write_jpeg(path, colours, (made.app1_exif(tiff),))
@@ -172,7 +172,7 @@ def test_what_exif_says(tmp_path: Path) -> None:
         assert np.allclose(light, truth, atol=0.006), (space, index)
 
 
-def test_profile_curves() -> None:
+def test_icc_profile_curves() -> None:
     x = np.linspace(0, 1, 397)
     # the five function types of ICC.1, table 68, written out
     kinds = {
@@ -197,7 +197,7 @@ def test_profile_curves() -> None:
                 assert np.abs(curve(x) - truth).max() < 2e-4
 
 
-def test_profiles_that_are_no_plain_curves() -> None:
+def test_icc_profiles_without_simple_curves() -> None:
     good = made.icc_profile(made.curv(563), made.SRGB_D50)
     assert read_profile(good) is not None
     flat = made.icc_profile(made.curv(0), made.SRGB_D50)
@@ -210,7 +210,7 @@ def test_profiles_that_are_no_plain_curves() -> None:
 
 @settings(max_examples=150, deadline=None)
 @given(st.data())
-def test_damaged_profiles(data: st.DataObject) -> None:
+def test_damaged_icc_profiles(data: st.DataObject) -> None:
     whole = made.icc_profile(made.para(3, 2.4, 0.9, 0.1, 0.08, 0.04), made.ADOBE_D50)
     damaged = bytearray(whole[: data.draw(st.integers(0, len(whole)))])
     for _ in range(data.draw(st.integers(0, 4))):
@@ -226,12 +226,14 @@ def test_damaged_profiles(data: st.DataObject) -> None:
 @settings(max_examples=100, deadline=None)
 @given(st.binary(max_size=300))
 @example(b"\0" * 300)
-def test_any_bytes_as_a_profile(data: bytes) -> None:
+def test_arbitrary_bytes_as_icc_profile(data: bytes) -> None:
     read_profile(b"\0" * 36 + b"acsp" + data)
 
 
-def test_primaries_of_a_profile_are_converted(tmp_path: Path) -> None:
-    """A colour is what it is, whatever RGB it is written in: the truth goes through XYZ."""
+def test_primaries_of_icc_profile_are_converted(tmp_path: Path) -> None:
+    """A colour does not depend on the RGB space it is stored in: the expected value goes through
+    XYZ.
+    """
     profile = made.icc_profile(made.curv(563), made.ADOBE_D50)
     made.write_tiff(tmp_path / "p.tif", STRIP, {34675: (7, profile)})
     made.write_jpeg(tmp_path / "p.jpg", STRIP, (made.app2_icc(profile),))
@@ -247,7 +249,7 @@ def test_primaries_of_a_profile_are_converted(tmp_path: Path) -> None:
     assert np.allclose(made.SRGB_D50 @ light, xyz, atol=1e-3)
 
 
-def test_published_matrices() -> None:
+def test_matrices_match_published_values() -> None:
     prophoto = [[2.0343, -0.7275, -0.3068], [-0.2288, 1.2317, -0.0029], [-0.0086, -0.1533, 1.1618]]
     assert np.allclose(from_chromaticities(PROPHOTO), prophoto, atol=1e-3)
     assert from_chromaticities((0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)) is None
@@ -257,7 +259,7 @@ def test_published_matrices() -> None:
         from_chromaticities((0.64, 0.0, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329))
 
 
-def test_chromaticities_of_an_exr(tmp_path: Path) -> None:
+def test_exr_chromaticities_are_converted(tmp_path: Path) -> None:
     path = tmp_path / "p.exr"
     light = np.random.default_rng(0).random((6, 7, 3), np.float32)
     for chromaticities, matrix in ((None, np.eye(3)), (PROPHOTO, from_chromaticities(PROPHOTO))):
@@ -273,7 +275,7 @@ def test_chromaticities_of_an_exr(tmp_path: Path) -> None:
         assert ("converted" in photo.info.reason) == (chromaticities is not None)
 
 
-def test_raw_processing_is_told(shared: Path) -> None:
+def test_raw_processing_is_reported(shared: Path) -> None:
     path = shared / "data/real/rodin_bronze/colorchecker/231016_miaEURO_9505.jpg"
     photo = read_photo(path)
     assert photo.info.transfer.name == "srgb" and "colour profile" in photo.info.reason

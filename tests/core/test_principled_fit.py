@@ -1,4 +1,4 @@
-"""The Principled fit: finds what it is made of, beats a diffuse surface, and says how far off."""
+"""The Principled fit: it recovers its own model, beats a diffuse surface, and reports its error."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ OWN = [
 
 
 @pytest.mark.parametrize("truth", OWN, ids=["glossy", "metal", "matte"])
-def test_recovers_a_principled(truth):
+def test_principled_parameters_are_recovered(truth):
     fit = fit_principled(truth.evaluate)
     found = fit.principled
     assert fit.error < 1e-3
@@ -31,7 +31,7 @@ def test_recovers_a_principled(truth):
         assert found.specular_ior_level == pytest.approx(truth.specular_ior_level, abs=0.01)
 
 
-def test_recovers_a_coat():
+def test_coat_is_recovered():
     truth = Principled(
         base_color=np.array([0.2, 0.3, 0.6]), roughness=0.6, coat_weight=0.8, coat_roughness=0.08
     )
@@ -42,29 +42,29 @@ def test_recovers_a_coat():
     assert fit_principled(truth.evaluate, coat=False).principled.coat_weight == 0
 
 
-def test_the_mean_material_is_nearer_than_a_diffuse_one_and_quick(monkeypatch):
-    basis, asked = default_basis(), []
+def test_mean_material_fits_better_than_diffuse_with_few_evaluations(monkeypatch):
+    basis, evaluations = default_basis(), []
     once = Principled.at
 
     def counted(self, where):
-        asked.append(1)
+        evaluations.append(1)
         return once(self, where)
 
     monkeypatch.setattr(Principled, "at", counted)
     fit = fit_principled(PrincipalBRDF(basis, np.zeros((3, 5))).evaluate)
-    assert len(asked) < 3000  # a millisecond each
+    assert len(evaluations) < 3000  # a millisecond each
     assert fit.error < 0.5 * fit.diffuse_error
-    assert fit.error < 0.2  # its lobe is no GGX
+    assert fit.error < 0.2  # its lobe is not GGX
     assert set(fit.errors) >= {"diffuse", "glossy", "metal"}
 
 
-def test_the_rest_of_the_weight_is_beyond_the_horizon():
+def test_remaining_weight_lies_below_horizon():
     angles, weight = quadrature()
     assert 0.4 < weight.sum() < 1
     assert weight.min() > 0
-    assert angles.theta_h.min() < np.radians(0.05)  # sharp lobes are seen
+    assert angles.theta_h.min() < np.radians(0.05)  # sharp lobes are resolved
 
 
-def test_refuses_what_is_not_a_brdf():
+def test_invalid_brdf_is_rejected():
     with pytest.raises(FitError):
         fit_principled(lambda angles: np.full((angles.theta_h.size, 3), np.nan))

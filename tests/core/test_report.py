@@ -1,4 +1,4 @@
-"""Pictures and numbers of the report, on a capture with a known answer."""
+"""Figures and images of the report, on a capture with a known answer."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def result(job: FitJob) -> CaptureResult:
     return job.result
 
 
-def test_the_page_shows_every_picture_it_names(result: CaptureResult, tmp_path: Path) -> None:
+def test_page_contains_all_linked_images(result: CaptureResult, tmp_path: Path) -> None:
     fractions = list(write_report(tmp_path / "report", result))
     assert fractions == sorted(fractions) and len(fractions) == 4
     page = (tmp_path / "report" / "index.html").read_text()
@@ -47,7 +47,7 @@ def test_the_page_shows_every_picture_it_names(result: CaptureResult, tmp_path: 
     assert read_encoded(tmp_path / "report" / "photo_00_prediction.png").mean() > 0.05
 
 
-def test_result_json_says_what_was_measured(result: CaptureResult, job: FitJob) -> None:
+def test_result_json_describes_measurement(result: CaptureResult, job: FitJob) -> None:
     said = json.loads(json.dumps(result_json.describe(result, job.stages)))
     material = said["materials"][0]
     assert material["estimator"] == "measured" and "chosen" not in material
@@ -62,16 +62,16 @@ def test_result_json_says_what_was_measured(result: CaptureResult, job: FitJob) 
     assert 1 <= len(lobes["lobes"]) <= 3 and lobes["lobes"][0].keys() >= {"f0", "f90", "roughness"}
     assert not any(key.endswith(("_mid", "_edge")) for key in (*lobes, *lobes["lobes"][0]))
     assert 0 < turning["cube_root_error"] < 0.3
-    doubt = material["uncertainty"]
-    for key, value in doubt["interval_90"].items():
-        assert value == pytest.approx(np.exp(1.645 * doubt[key]) - 1, rel=1e-3) and value > 0
+    warnings = material["uncertainty"]
+    for key, value in warnings["interval_90"].items():
+        assert value == pytest.approx(np.exp(1.645 * warnings[key]) - 1, rel=1e-3) and value > 0
     assert {s["name"] for s in said["stages"]} >= {"reading the scan", "sampling the photos"}
     assert all(s["seconds"] >= 0 for s in said["stages"])
     assert said["basis"]["version"] == result.basis.version
     assert said["basis"]["components"] == result.basis.count
 
 
-def test_the_papers_result_says_which_pixels_it_chose(tmp_path: Path) -> None:
+def test_paper_result_lists_selected_pixels(tmp_path: Path) -> None:
     path = made.make_capture(
         tmp_path / "ball", photos=3, extra='[fit]\nmethod = "paper"\ntrials = 2'
     )
@@ -82,8 +82,8 @@ def test_the_papers_result_says_which_pixels_it_chose(tmp_path: Path) -> None:
     material = said["materials"][0]
     assert material["estimator"] == "paper" and np.array(material["coefficients"]).shape == (3, 6)
     assert len(material["chosen"]) == 6 and len(material["cosine_similarity"]) == 2
-    for chosen in material["chosen"]:
-        assert 0 <= chosen["pixel"][0] < made.WIDTH and 0 <= chosen["pixel"][1] < made.HEIGHT
+    for selected in material["chosen"]:
+        assert 0 <= selected["pixel"][0] < made.WIDTH and 0 <= selected["pixel"][1] < made.HEIGHT
     assert "interval_90" not in material["uncertainty"] and "gains" not in material
     list(write_report(tmp_path / "report", job.result))
     page = (tmp_path / "report" / "index.html").read_text()
@@ -91,50 +91,50 @@ def test_the_papers_result_says_which_pixels_it_chose(tmp_path: Path) -> None:
     assert "Rings: the pixels" in page and "too curved" in page
 
 
-def test_the_page_says_where_samples_came_from(result: CaptureResult, tmp_path: Path) -> None:
-    """A legend of what was met, and what part of each photo's surface that is."""
+def test_page_shows_sources_of_samples(result: CaptureResult, tmp_path: Path) -> None:
+    """A legend of the pixel criteria, and their share of the surface in each photo."""
     list(write_report(tmp_path / "report", result))
     page = (tmp_path / "report" / "index.html").read_text()
     counts = re.findall(r"<ul class='counts'>(.*?)</ul>", page)
     assert len(counts) == 3 and "Rings" not in page
-    for place, told in enumerate(counts):
-        percent = int(re.search(r"(\d+) % reliable", told).group(1))
+    for place, entry in enumerate(counts):
+        percent = int(re.search(r"(\d+) % reliable", entry).group(1))
         assert 20 < percent < 100
-        sure = result.materials[0].per_photo[place]
-        others = sum(int(n) for n in re.findall(r"(\d+) %", told)) - percent
-        assert sure > 500 and percent + others == pytest.approx(100, abs=5)
+        reliable = result.materials[0].per_photo[place]
+        others = sum(int(n) for n in re.findall(r"(\d+) %", entry)) - percent
+        assert reliable > 500 and percent + others == pytest.approx(100, abs=5)
     head = page[page.index("<details>") : page.index("</details>")]
     assert "in shadow: turned away" in head and "too curved" not in head and "clipped" not in head
     legend = set(re.findall(r"rgb\(\d+,\d+,\d+\)", head))
     assert legend == set(re.findall(r"rgb\(\d+,\d+,\d+\)", "".join(counts)))
 
 
-def test_wide_intervals_are_told_as_factors() -> None:
+def test_wide_intervals_are_written_as_factors() -> None:
     assert figures.either_side(0.05) == "± 9 %"  # exp(1.645 · 0.05) = 1.086
     assert figures.either_side(0.5) == "a factor of 2.3 either way"  # exp(1.645 · 0.5) = 2.28
 
 
-def test_samples_left_out_are_told(result: CaptureResult) -> None:
+def test_unused_samples_are_reported(result: CaptureResult) -> None:
     material = replace(result.materials[0], samples=2_500_000, used=400_001)
     said = dict(figures.figures(material, ["a"] * 3))["Samples"]
     assert said.startswith("2,500,000 lit pixels; 400,001 of them are used, as a representative")
 
 
-def test_the_page_says_how_sure_it_is(result: CaptureResult, tmp_path: Path) -> None:
+def test_page_shows_uncertainty(result: CaptureResult, tmp_path: Path) -> None:
     list(write_report(tmp_path / "report", result))
     page = (tmp_path / "report" / "index.html").read_text()
     assert page.count("<polygon") == 12  # four charts, three channels
     assert "90 % interval" in page and "all of them used" in page
 
 
-def test_difference_picture_has_the_sign_of_the_difference() -> None:
+def test_difference_image_has_sign_of_difference() -> None:
     measured = np.ones((1, 3, 3))
     predicted = np.array([[[0.0] * 3, [1.0] * 3, [2.0] * 3]])
     dark, right, bright = display.difference_picture(predicted, measured, 1.0)[0].astype(int)
     assert dark[2] > dark[0] and bright[0] > bright[2] and abs(right[0] - right[2]) < 3
 
 
-def test_white_sphere_has_the_radiance_of_lambert() -> None:
+def test_white_sphere_has_lambertian_radiance() -> None:
     radiance, coverage = lit_sphere(lambda a: np.full((len(a.theta_h), 3), 1 / np.pi), 101)
     assert radiance.max() == pytest.approx(1.0, abs=0.02)
     assert coverage[50, 50] == 1 and coverage[0, 0] == 0
@@ -150,8 +150,8 @@ def test_metrics_of_known_differences() -> None:
     assert same.relative_l2 == same.log_relative_rms == same.cube_root_rms == 0
 
 
-def test_a_photo_of_another_camera_is_named(tmp_path: Path) -> None:
-    """The most natural mistake: two photos swapped."""
+def test_swapped_photos_are_named_in_warning(tmp_path: Path) -> None:
+    """The most common mistake: two photos are swapped."""
     path = made.make_capture(tmp_path / "ball", photos=6)
     text = path.read_text().replace("view_02", "swap").replace("view_05", "view_02")
     path.write_text(text.replace("swap", "view_05"))
@@ -159,6 +159,6 @@ def test_a_photo_of_another_camera_is_named(tmp_path: Path) -> None:
     assert "lit_2.exr" in said or "lit_5.exr" in said, said
 
 
-def test_a_good_capture_has_no_such_warning(result: CaptureResult) -> None:
+def test_good_capture_has_no_swap_warning(result: CaptureResult) -> None:
     said = " ".join(result.materials[0].warnings)
     assert "black" not in said and "times the median" not in said

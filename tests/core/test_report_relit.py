@@ -1,4 +1,4 @@
-"""Pictures under other light, on a page of their own and in the report."""
+"""Renderings under other illumination, on their own page and in the report."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ SPHERE = Picture(Path("sphere_a b_forest.png"), "forest", "a <b>")
 TURNS = [Picture(Path(f"turntable_forest/{i:03d}.png"), "forest", "object", i) for i in range(12)]
 
 
-def test_the_page_names_files_as_they_are_and_subjects_escaped(tmp_path):
+def test_page_links_files_unchanged_and_escapes_subjects(tmp_path):
     text = write_page(tmp_path, [SPHERE, *TURNS]).read_text("utf-8")
     assert "sphere_a%20b_forest.png" in text and "a &lt;b&gt;" in text and "<b>" not in text
     assert text.endswith("</html>")
 
 
-def test_a_turn_is_shown_in_few_pictures():
+def test_turntable_is_shown_with_few_images():
     text = section(TURNS)
     assert 4 <= text.count("<img") <= 8 and "turntable_forest/000.png" in text
 
 
-def test_the_report_gets_them_once_at_its_end(tmp_path):
+def test_report_gets_renderings_once_at_end(tmp_path):
     page = tmp_path / "index.html"
     page.write_text("<h1>x</h1></html>", "utf-8")
     add_to_report(page, [SPHERE], "relit")
@@ -30,7 +30,7 @@ def test_the_report_gets_them_once_at_its_end(tmp_path):
     assert "relit/sphere_a%20b_forest.png" in text
 
 
-def test_without_pictures_a_report_stays_as_it_is(tmp_path):
+def test_report_without_renderings_is_unchanged(tmp_path):
     page = tmp_path / "index.html"
     page.write_text("<h1>x</h1></html>", "utf-8")
     add_to_report(page, [], "relit")

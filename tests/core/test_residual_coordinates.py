@@ -1,4 +1,4 @@
-"""What a residual is drawn against, and whether a trend along it is what was put there."""
+"""Coordinates against which residuals are plotted, and recovery of known trends along them."""
 
 from __future__ import annotations
 
@@ -10,18 +10,20 @@ import pytest
 from patina.core.diagnose.selection.residual_trends import coordinates, half_vector_turns, trend
 from tests.make_lit_ball import lit_ball
 
-BETRAY = (
+DIAGNOSTIC_COORDINATES = (
     "half angle", "difference angle", "incidence", "view", "photo's centre", "photo", "brightness",
     "curvature", "shadow's edge", "surroundings", "lamp", "position on the object",
     "tangent direction",
 )  # fmt: skip
 
 
-def test_all_that_betrays_a_cause_is_there():
+def test_all_diagnostic_coordinates_are_present():
     context = lit_ball()
     names = [c.name for c in coordinates(context)]
     assert len(set(names)) == len(names)
-    assert [each for each in BETRAY if not any(each in name for name in names)] == []
+    assert [
+        each for each in DIAGNOSTIC_COORDINATES if not any(each in name for name in names)
+    ] == []
     assert all(c.values.shape == (len(context.pixels),) for c in coordinates(context))
 
 
@@ -29,8 +31,9 @@ def test_all_that_betrays_a_cause_is_there():
     ((1, 0), (0, 90)), ((0, -1), (90, 0)), ((1, 1), (45, 45)), ((-1, 1), (45, 45)),
 ])  # fmt: skip
 def test_tangent_directions_are_those_of_the_half_vector(tilt, expected):
-    """A surface that looks up, seen from above, the lamp tilted: off x and off y by so much; the
-    scan's z stands upright there."""
+    """A horizontal surface seen from above under a tilted lamp: the half vector is off along x and
+    y by known amounts; the scan's z axis is vertical.
+    """
     pixels = lit_ball().pixels.select(np.arange(1))
     light = np.array([*tilt, 2.0]) / np.linalg.norm([*tilt, 2.0])
     up = np.array([[0, 0, 1]], np.float32)
@@ -41,7 +44,7 @@ def test_tangent_directions_are_those_of_the_half_vector(tilt, expected):
     assert np.isnan(half_vector_turns(below)).all()
 
 
-def test_what_is_flat_has_no_tangent_direction_off_its_own_axis():
+def test_untilted_half_vector_has_no_tangent_component():
     context = lit_ball()
     up = np.broadcast_to(np.float32([0, 0, 1]), context.pixels.normal.shape)
     flat = replace(context, pixels=replace(context.pixels, normal=up))
@@ -50,8 +53,8 @@ def test_what_is_flat_has_no_tangent_direction_off_its_own_axis():
     assert not len(trend(upright, 0 * shown, shown, 0.01 * shown, context.pixels.block).at)
 
 
-def test_a_trend_is_what_was_put_there():
-    """3 % more light for each half diagonal, in photos of 1 % noise."""
+def test_known_trend_is_recovered():
+    """3 % more light for each half diagonal, in photos with 1 % noise."""
     context = lit_ball(3)
     pixels = context.pixels
     (away,) = [c for c in coordinates(context) if "centre" in c.name]

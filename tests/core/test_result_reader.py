@@ -1,4 +1,4 @@
-"""result.json read back, and every way in which it may be wrong."""
+"""result.json read back, and all ways in which it can be invalid."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def one(folder: Path, **changes) -> Path:
     return made.write_result(folder, told)
 
 
-def test_what_a_fit_wrote_is_read_back(tmp_path: Path) -> None:
+def test_written_result_is_read_back(tmp_path: Path) -> None:
     folder = made.two_materials(tmp_path / "r")
     for path in (folder, folder / "result.json"):
         result = read_result(path)
@@ -34,13 +34,13 @@ def test_what_a_fit_wrote_is_read_back(tmp_path: Path) -> None:
         assert bronze.warnings == ("one", "two") and bronze.scale_known
 
 
-def test_the_scene_is_found_beside_it(tmp_path: Path) -> None:
+def test_scene_is_found_next_to_result(tmp_path: Path) -> None:
     folder = one(tmp_path)
     (folder / "scene.blend").write_bytes(b"")
     assert read_result(folder).scene == folder / "scene.blend"
 
 
-def test_a_basis_of_the_users_own_is_found_by_its_version(tmp_path: Path) -> None:
+def test_user_basis_is_found_by_its_version(tmp_path: Path) -> None:
     default = default_basis()
     own = Basis(
         default.grid, default.mean, default.log_reference, default.components[:5],
@@ -85,14 +85,14 @@ WRONG = [
 @pytest.mark.parametrize(
     ("change", "key"), WRONG, ids=[f"{i}-{k}" for i, (_, k) in enumerate(WRONG)]
 )
-def test_a_wrong_entry_is_named(tmp_path: Path, change: dict, key: str) -> None:
+def test_invalid_entry_is_named(tmp_path: Path, change: dict, key: str) -> None:
     with pytest.raises(InputError) as caught:
         read_result(one(tmp_path, **change))
     assert f"materials[0].{key}" in str(caught.value)
     assert "result.json" in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_whole_files_that_are_wrong(tmp_path: Path) -> None:
+def test_invalid_files_are_rejected(tmp_path: Path) -> None:
     file = tmp_path / "result.json"
     cases = {
         b"": "not valid JSON",
@@ -117,14 +117,14 @@ def test_whole_files_that_are_wrong(tmp_path: Path) -> None:
         read_result(tmp_path)
 
 
-def test_a_huge_file_is_refused_unread(tmp_path: Path) -> None:
+def test_huge_file_is_rejected_without_reading(tmp_path: Path) -> None:
     with open(tmp_path / "result.json", "wb") as file:
-        file.truncate(1 << 33)  # sparse
+        file.truncate(1 << 33)  # a sparse file
     with pytest.raises(InputError, match="too large"):
         read_result(tmp_path)
 
 
-def test_two_of_one_name_are_refused(tmp_path: Path) -> None:
+def test_duplicate_names_are_rejected(tmp_path: Path) -> None:
     told = made.description(made.material("Gold", 0), made.material("gold", 1))
     with pytest.raises(InputError, match="twice"):
         read_result(made.write_result(tmp_path, told))
@@ -160,7 +160,7 @@ VALUES = st.recursive(
 @settings(
     max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
-def test_any_value_anywhere_is_read_or_refused_in_one_line(tmp_path: Path, place, value) -> None:
+def test_any_value_is_read_or_rejected_in_one_line(tmp_path: Path, place, value) -> None:
     told = made.description(made.material("a", 0, coefficients=[[0.1, 0.2]] * 3))
     told = json.loads(json.dumps(told))
     holder = told
@@ -180,7 +180,7 @@ def test_any_value_anywhere_is_read_or_refused_in_one_line(tmp_path: Path, place
 @settings(
     max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
-def test_damaged_bytes_are_read_or_refused(tmp_path: Path, cut: int, byte: int) -> None:
+def test_damaged_bytes_are_read_or_rejected(tmp_path: Path, cut: int, byte: int) -> None:
     told = made.description(made.material("a", 0, coefficients=[[0.1, 0.2]] * 3))
     content = bytearray(json.dumps(told).encode())
     cut %= len(content)

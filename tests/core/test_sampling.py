@@ -1,4 +1,4 @@
-"""Geometry and samples against a sphere traced by the quadratic formula."""
+"""Geometry and samples, against a sphere traced analytically by the quadratic formula."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ def tables(ball: Path) -> tuple[SampleTable, list]:
     return sampled(ball)
 
 
-def test_samples_read_the_true_reflectance(tables: tuple[SampleTable, list]) -> None:
+def test_samples_have_true_reflectance(tables: tuple[SampleTable, list]) -> None:
     table, _ = tables
     light = table.light.astype(float)
     truth = made.blinn(table.normal, light, table.view)
     ratio = table.rho / truth
     assert len(table) > 5000
     assert abs(np.median(ratio) - 1) < 1e-3
-    assert np.percentile(np.abs(ratio - 1), 95) < 0.02  # the mesh has facets, the sphere has not
+    assert np.percentile(np.abs(ratio - 1), 95) < 0.02  # the mesh has facets, the sphere does not
 
 
-def test_points_and_normals_are_those_of_the_sphere(tables: tuple[SampleTable, list]) -> None:
+def test_points_and_normals_lie_on_sphere(tables: tuple[SampleTable, list]) -> None:
     for view in tables[1]:
         radius = np.linalg.norm(view.point - made.CENTRE, axis=1)
         assert np.abs(radius - 1).max() < 2e-3
@@ -51,7 +51,7 @@ def test_points_and_normals_are_those_of_the_sphere(tables: tuple[SampleTable, l
         assert np.percentile(away, 99) < 0.2
 
 
-def test_angles_in_the_table_belong_to_its_vectors(tables: tuple[SampleTable, list]) -> None:
+def test_table_angles_agree_with_its_vectors(tables: tuple[SampleTable, list]) -> None:
     table, _ = tables
     again = half_difference(
         table.normal.astype(float), table.light.astype(float), table.view.astype(float)
@@ -60,7 +60,7 @@ def test_angles_in_the_table_belong_to_its_vectors(tables: tuple[SampleTable, li
     assert np.allclose(again.theta_d, table.theta_d, atol=1e-5)
 
 
-def test_curvature_of_a_sphere_is_its_radius_in_pixels(tables: tuple[SampleTable, list]) -> None:
+def test_curvature_of_sphere_is_inverse_radius_in_pixels(tables: tuple[SampleTable, list]) -> None:
     """Where the sphere faces the camera, 1/curvature is its radius in pixels."""
     view = tables[1][0]
     facing = np.einsum("ij,ij->i", view.normal, view.view) > 0.995
@@ -68,7 +68,7 @@ def test_curvature_of_a_sphere_is_its_radius_in_pixels(tables: tuple[SampleTable
     assert np.median(np.abs(view.curvature[facing])) == pytest.approx(1 / pixels, rel=0.06)
 
 
-def test_curvature_of_a_plane_is_zero_and_of_a_wave_known() -> None:
+def test_curvature_of_plane_and_sine_wave() -> None:
     x = np.arange(60)[None, :] * np.ones((40, 1))
     slope = 0.3 * np.cos(x / 5)  # depth 1.5 sin(x/5)
     normal = np.dstack([-slope, np.zeros_like(slope), np.ones_like(slope)])
@@ -80,8 +80,8 @@ def test_curvature_of_a_plane_is_zero_and_of_a_wave_known() -> None:
     assert np.nanmax(np.abs(mean_curvature(np.full((9, 9, 3), 1 / np.sqrt(3))))) < 1e-6
 
 
-def test_a_ball_shades_the_floor_where_geometry_says() -> None:
-    """A sphere over a plane, light from 45°: the shadow's centre is one height away."""
+def test_cast_shadow_lies_where_geometry_predicts() -> None:
+    """A sphere over a plane, light from 45°: the shadow's centre is one sphere height away."""
     vertices, faces = made.sphere_mesh(4)
     vertices = 0.3 * (vertices - made.CENTRE) + [0, 0, 1.0]
     floor = np.array([[-3, -3, 0], [3, -3, 0], [3, 3, 0], [-3, 3, 0]], float)
@@ -98,9 +98,9 @@ def test_a_ball_shades_the_floor_where_geometry_says() -> None:
     assert x[dark].max() == pytest.approx(-1 + half, abs=0.02)
 
 
-def test_silhouettes_are_jumps_not_slopes() -> None:
+def test_silhouettes_are_depth_jumps_not_steep_slopes() -> None:
     depth = np.full((20, 30), np.nan)
-    depth[4:16, 4:26] = 3.0 + 0.02 * np.arange(22)  # steep, but one surface
+    depth[4:16, 4:26] = 3.0 + 0.02 * np.arange(22)  # steep, but one continuous surface
     depth[4:16, 15:26] += 1.0
     found = edges.silhouette(depth, np.full(depth.shape, 0.01))
     assert found[10, 14] and found[10, 15] and found[4, 10] and found[3, 10]
@@ -108,16 +108,20 @@ def test_silhouettes_are_jumps_not_slopes() -> None:
     assert edges.widen(found, 2)[10, 12] and not edges.widen(found, 2)[10, 10]
 
 
-def test_faces_take_the_material_most_pixels_saw() -> None:
+def test_faces_get_material_by_majority_of_pixels() -> None:
     vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [5, 0, 0], [5, 1, 0]], float)
     mesh = Mesh(vertices, np.array([[0, 1, 2], [0, 2, 3], [1, 4, 5]], np.int32))
     votes = FaceVotes.empty(3, 2)
     votes.add(0, np.array([0, 0, 0, 1]))
     votes.add(1, np.array([0, 1, 1]))
-    assert votes.winners(mesh).tolist() == [0, 1, 0]  # the last saw none: its neighbour's
+    assert votes.winners(mesh).tolist() == [
+        0,
+        1,
+        0,
+    ]  # no pixel shows the last face: it takes its neighbour's material
 
 
-def test_margins_leave_out_what_they_say(ball: Path) -> None:
+def test_margins_exclude_outlines_shadow_edges_and_grazing_angles(ball: Path) -> None:
     """With margins no sample lies at an outline, a shadow edge or a grazing angle."""
     capture = read_capture(ball)
     scan = capture_data.open_scan(capture)
@@ -138,11 +142,11 @@ def test_margins_leave_out_what_they_say(ball: Path) -> None:
     assert none.sum() > wide.sum() > 0.5 * none.sum()
 
 
-def test_borders_of_masks_are_left_out() -> None:
+def test_mask_borders_are_excluded() -> None:
     part = np.zeros((9, 12), bool)
     seen = np.ones((9, 12), bool)
     seen[:, 10:] = False
     part[:, 5:10] = True
     inner = edges.inside(part, seen, 1)
-    assert not inner[:, 5].any() and inner[:, 6:10].all()  # an outline is no border of a mask
+    assert not inner[:, 5].any() and inner[:, 6:10].all()  # an outline is not a mask border
     assert np.array_equal(edges.inside(part, seen, 0), part)

@@ -149,7 +149,7 @@ def validator(root: Path, name: str) -> Draft202012Validator:
 
 
 def as_json(toml: str) -> Any:
-    """TOML as JSON has it: a date and time becomes a text."""
+    """Convert TOML values to JSON: a date and time becomes a string."""
     return json.loads(json.dumps(tomllib.loads(toml), default=lambda moment: moment.isoformat()))
 
 
@@ -189,7 +189,7 @@ def fitted(capture: Path) -> dict[str, Any]:
 
 @pytest.mark.parametrize("name", ["capture", "result", "diagnosis"])
 def test_schemas_are_valid_and_closed(root: Path, name: str) -> None:
-    """Every object either lists its keys or states what all of its values are."""
+    """Every object either lists its keys or states the type of all its values."""
     schema = validator(root, name).schema
     assert schema["$schema"].endswith("2020-12/schema")
     for path in tables(schema):
@@ -198,17 +198,17 @@ def test_schemas_are_valid_and_closed(root: Path, name: str) -> None:
             assert "additionalProperties" in one and one.get("description"), path
 
 
-def test_the_demo_capture_and_made_captures_are_valid(root: Path, ball: Path) -> None:
+def test_demo_and_synthetic_captures_are_valid(root: Path, ball: Path) -> None:
     check = validator(root, "capture")
     for file in (root / "assets" / "demo" / "demo.capture.toml", ball):
         check.validate(as_json(file.read_text("utf-8")))
     check.validate(as_json(EVERY_KEY))
 
 
-def test_the_capture_schema_has_the_keys_of_the_reader(
+def test_capture_schema_has_keys_of_reader(
     root: Path, ball: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The reader's list of known keys, as it stands when a table is closed."""
+    """The reader's list of known keys, recorded when a table is closed."""
     known: dict[tuple[str, ...], set[str]] = defaultdict(set)
     close = Section.close
 
@@ -240,7 +240,7 @@ def properties(
             yield from properties(child, (*path, key), top)
 
 
-def test_a_wrong_key_is_rejected_in_every_table(root: Path) -> None:
+def test_unknown_key_is_rejected_in_every_table(root: Path) -> None:
     check = validator(root, "capture")
     whole = as_json(EVERY_KEY)
     places = [path for path in tables(whole) if path[-1:] != ("masks",)]
@@ -263,11 +263,11 @@ def test_reader_and_schema_reject_the_same(root: Path, ball: Path, mistake: str)
         read_capture(file)
 
 
-def test_a_result_is_valid(root: Path, measured: dict[str, Any]) -> None:
+def test_result_is_valid(root: Path, measured: dict[str, Any]) -> None:
     validator(root, "result").validate(measured)
 
 
-def test_a_result_of_the_papers_method_is_valid(root: Path, tmp_path: Path) -> None:
+def test_result_of_paper_method_is_valid(root: Path, tmp_path: Path) -> None:
     extra = '[fit]\nmethod = "paper"\ntrials = 2'
     written = fitted(made.make_capture(tmp_path / "ball", photos=3, extra=extra))
     validator(root, "result").validate(written)
@@ -286,7 +286,7 @@ WRONG: dict[str, Callable[[dict[str, Any]], Any]] = {
 
 
 @pytest.mark.parametrize("mistake", WRONG)
-def test_a_wrong_result_is_rejected(root: Path, measured: dict[str, Any], mistake: str) -> None:
+def test_invalid_result_is_rejected(root: Path, measured: dict[str, Any], mistake: str) -> None:
     wrong = copy.deepcopy(measured)
     WRONG[mistake](wrong)
     assert not validator(root, "result").is_valid(wrong)
@@ -296,8 +296,8 @@ TRIED = {"light_intensity", "light_direction", "near_light", "camera_response", 
 
 
 @pytest.mark.slow
-def test_a_diagnosis_is_valid(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a capture in which one lamp was 30 % brighter than stated; five causes are tried."""
+def test_diagnosis_is_valid(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a capture in which one lamp was 30 % brighter than stated; five causes are tested."""
     tried = tuple(kind for kind in effects.EFFECTS if kind.cause in TRIED)
     monkeypatch.setattr(effects, "EFFECTS", tried)
     capture = made.make_capture(tmp_path / "ball", photos=4)

@@ -1,4 +1,4 @@
-"""The search for well-conditioned rows: bounds hold, no set is worse than the plain search's."""
+"""The search for well-conditioned rows: its bounds hold, and a plain search is never better."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def real_angles(m: int, seed: int = 0) -> Angles:
 
 @settings(max_examples=60, deadline=None)
 @given(**CASES)
-def test_no_condition_number_is_below_its_bound(k, n, m, spread, seed) -> None:
+def test_condition_numbers_are_not_below_bound(k, n, m, spread, seed) -> None:
     rows = random_rows(k, m, spread, seed)
     bound = ConditionBound.of(rows[:n])
     exact = condition_numbers(rows[:n], rows)
@@ -46,35 +46,37 @@ def test_no_condition_number_is_below_its_bound(k, n, m, spread, seed) -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(**CASES)
-def test_a_cells_bound_holds_for_all_of_it(k, n, m, spread, seed) -> None:
+def test_cell_bound_holds_for_whole_cell(k, n, m, spread, seed) -> None:
     rows = random_rows(k, m, spread, seed)
     rng = np.random.default_rng(seed + 1)
     extent = np.abs(rng.normal(size=rows.shape)) * rng.choice([0.01, 0.3, 2.0])
     largest, smallest = ConditionBound.of(rows[:n]).extremes(rows, extent)
     for _ in range(5):
         moved = rows + rng.uniform(-1, 1, rows.shape) * extent
-        chosen = np.broadcast_to(rows[:n], (m, min(n, m), k))
-        values = np.linalg.svd(np.concatenate([chosen, moved[:, None]], axis=1), compute_uv=False)
+        selected = np.broadcast_to(rows[:n], (m, min(n, m), k))
+        values = np.linalg.svd(np.concatenate([selected, moved[:, None]], axis=1), compute_uv=False)
         assert (largest <= values[:, 0] * (1 + 1e-6)).all()
         assert (smallest >= values[:, -1] * (1 - 1e-6) - 1e-7 * spread).all()
 
 
 @settings(max_examples=60, deadline=None)
 @given(**CASES)
-def test_never_worse_than_the_plain_search(k, n, m, spread, seed) -> None:
+def test_search_is_not_worse_than_plain_search(k, n, m, spread, seed) -> None:
     rows = random_rows(k, m, spread, seed)
-    plain = np.linalg.cond(rows[choose_plainly(rows, n, lambda chosen: np.ones(m, bool))])
+    plain = np.linalg.cond(rows[choose_plainly(rows, n, lambda selected: np.ones(m, bool))])
     quick = np.linalg.cond(rows[choose(rows, n)])
     many = np.linalg.cond(rows[choose_from_cells(rows, np.arange(m) // 5, n)])
-    if plain < 1e6:  # a worse one is no set at all, and whose rounding wins says nothing
+    if (
+        plain < 1e6
+    ):  # the only worse result would be no set at all; differences by rounding are irrelevant
         assert quick <= plain * (1 + 1e-6) and many <= plain * (1 + 1e-4)
 
 
 @pytest.mark.parametrize("count", [6, 12])
-def test_never_worse_on_rows_of_the_basis(count: int) -> None:
+def test_search_is_not_worse_on_rows_of_basis(count: int) -> None:
     angles = real_angles(3000)
     rows = default_basis().rows(angles, count)[1]
-    plain = np.linalg.cond(rows[choose_plainly(rows, count, lambda chosen: np.ones(3000, bool))])
+    plain = np.linalg.cond(rows[choose_plainly(rows, count, lambda selected: np.ones(3000, bool))])
     assert np.linalg.cond(rows[choose(rows, count)]) <= plain * (1 + 1e-4)
     many = choose_from_cells(rows, angle_cells(angles), count)
     assert len(set(many.tolist())) == count
@@ -83,12 +85,12 @@ def test_never_worse_on_rows_of_the_basis(count: int) -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 1000))
-def test_constraints_and_the_fixed_row_are_kept_as_the_plain_search_keeps_them(seed: int) -> None:
+def test_constraints_and_fixed_row_are_kept_as_in_plain_search(seed: int) -> None:
     rows = random_rows(6, 200, 30.0, seed)
     order = np.random.default_rng(seed).random(200)
 
-    def apart(chosen: np.ndarray) -> np.ndarray:
-        return (np.abs(order[:, None] - order[chosen]) > 0.02).all(axis=1)
+    def apart(selected: np.ndarray) -> np.ndarray:
+        return (np.abs(order[:, None] - order[selected]) > 0.02).all(axis=1)
 
     plain, quick = choose_plainly(rows, 6, apart, fixed=5), choose(rows, 6, apart, fixed=5)
     assert (plain is None) == (quick is None)
@@ -97,8 +99,8 @@ def test_constraints_and_the_fixed_row_are_kept_as_the_plain_search_keeps_them(s
         assert np.linalg.cond(rows[quick]) <= np.linalg.cond(rows[plain]) * (1 + 1e-6)
 
 
-def test_cells_of_one_larger_cell_are_neighbours() -> None:
-    """Numbers rise with all three angles' leading bits together, and near angles share a cell."""
+def test_neighbouring_cells_share_larger_cell() -> None:
+    """Indices increase with the leading bits of all three angles; near angles share a cell."""
     angles = real_angles(20_000)
     cells = angle_cells(angles)
     assert cells.min() >= 0
@@ -110,7 +112,7 @@ def test_cells_of_one_larger_cell_are_neighbours() -> None:
             assert np.ptp(inside) < widest
 
 
-def test_equal_input_gives_equal_choice() -> None:
+def test_equal_input_gives_equal_selection() -> None:
     rows = random_rows(6, 5000, 30.0, 3)
     cells = np.arange(5000) // 7
     first = choose_from_cells(rows, cells, 6)

@@ -1,4 +1,4 @@
-"""Soft shadows against what geometry says: penumbrae of straight edges, and no size at all."""
+"""Soft shadows against analytic geometry: penumbrae of straight edges, and sources without size."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ HEIGHT = 0.5  # of the roof whose edge is x = 0
 
 
 def disc_beyond(t):
-    """Share of a unit disc on the far side of a chord at signed distance t of its centre."""
+    """Share of a unit disc on the far side of a chord at signed distance t from its centre."""
     t = np.clip(t, -1.0, 1.0)
     return (np.arccos(-t) + t * np.sqrt(1 - t**2)) / np.pi
 
 
 def roof() -> RayScene:
-    """A floor z = 0 and over its half x < 0 a roof at HEIGHT, its edge along y."""
+    """A floor z = 0 and, over its half x < 0, a roof at HEIGHT with its edge along y."""
     vertices = np.array(
         [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0),
          (-9, -9, HEIGHT), (0, -9, HEIGHT), (0, 9, HEIGHT), (-9, 9, HEIGHT)],
@@ -63,8 +63,8 @@ def floor_points(x) -> SurfaceView:
     )
 
 
-def lifted(rays: RayScene) -> float:
-    """Height of the roof above where shadow rays start."""
+def height_above_rays(rays: RayScene) -> float:
+    """Height of the roof above the origin of the shadow rays."""
     return HEIGHT - rays.lift
 
 
@@ -75,9 +75,9 @@ def test_penumbra_of_a_distant_source(tilt: float, radius: float) -> None:
     rays = roof()
     a = np.radians(tilt)
     sun = DistantLight("sun", np.array([np.sin(a), 0.0, np.cos(a)]), None, radius)
-    # angle by which the edge stands from the sun's middle, as a floor point at x sees it
+    # angle between the edge and the sun's centre, as a floor point at x sees it
     beyond = np.linspace(-1.6, 1.6, 400) * radius
-    x = -lifted(rays) * np.tan(a - beyond)
+    x = -height_above_rays(rays) * np.tan(a - beyond)
     seen = light_visibility(rays, floor_points(x), sun, camera(), 256, uncertainty=0.0)
     expected = disc_beyond(beyond / radius)
     assert np.abs(seen - expected).max() < 0.03
@@ -95,14 +95,14 @@ def test_penumbra_of_a_near_source() -> None:
     view = floor_points(x)
     view.point[:, 1] = 0.0
     seen = light_visibility(rays, view, lamp, camera(), 256, uncertainty=0.0)
-    # the edge's place in the lamp's plane, from similar triangles
-    start = high - lifted(rays) + HEIGHT - high  # height at which rays start
+    # the edge's position in the lamp's plane, from similar triangles
+    start = high - height_above_rays(rays) + HEIGHT - high  # height at which shadow rays start
     gap = (high - start) / (HEIGHT - start)
     expected = disc_beyond(-(x - x * gap) / radius)
     assert np.abs(seen - expected).max() < 0.03
 
 
-def test_a_lamp_below_the_roof_is_not_shadowed_by_it() -> None:
+def test_lamp_below_roof_is_not_shadowed() -> None:
     rays = roof()
     lamp = NearLight("lamp", np.array([-2.0, 0.0, 0.4]), None, 0.02)
     view = floor_points(np.full(5, -2.0))
@@ -110,19 +110,19 @@ def test_a_lamp_below_the_roof_is_not_shadowed_by_it() -> None:
 
 
 @pytest.mark.parametrize("tilt", [0.0, 35.0])
-def test_an_uncertain_mesh_blurs_by_as_much(tilt: float) -> None:
-    """Without any size of the source: a ramp of ± u across the light, at every height alike."""
+def test_mesh_uncertainty_blurs_shadow_edge(tilt: float) -> None:
+    """For a source without size: a ramp of ± u across the light, the same at every height."""
     rays, u = roof(), 0.03
     a = np.radians(tilt)
     sun = DistantLight("sun", np.array([np.sin(a), 0.0, np.cos(a)]))
     across = np.linspace(-1.5 * u, 1.5 * u, 300)
-    x = -lifted(rays) * np.tan(a) + across / np.cos(a)
+    x = -height_above_rays(rays) * np.tan(a) + across / np.cos(a)
     seen = light_visibility(rays, floor_points(x), sun, camera(), 256, uncertainty=u)
     assert np.abs(seen - disc_beyond(across / u)).max() < 0.06
 
 
-def test_the_horizon_cuts_the_source() -> None:
-    """An open floor under a sun half set sees half of it."""
+def test_horizon_cuts_source() -> None:
+    """An open floor under a half-set sun sees half of it."""
     vertices = np.array([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], float)
     rays = RayScene.build(Mesh(vertices, np.array([(0, 1, 2), (0, 2, 3)], np.int32)))
     for above in (-1.2, -0.5, 0.0, 0.4, 1.3):
@@ -133,12 +133,12 @@ def test_the_horizon_cuts_the_source() -> None:
         assert np.abs(seen - disc_beyond(above)).max() < 0.03
 
 
-def bowl() -> tuple[RayScene, Camera, SurfaceView]:
-    """A sphere beside a sphere: curved ground, curved occluder, seen by a real camera."""
+def two_spheres() -> tuple[RayScene, Camera, SurfaceView]:
+    """One sphere next to another: curved receiver, curved occluder, seen by a real camera."""
     vertices, faces = made.sphere_mesh(3)
-    beside = 0.4 * (vertices - made.CENTRE) + made.CENTRE + (0.9, -1.1, 0.5)
+    occluder = 0.4 * (vertices - made.CENTRE) + made.CENTRE + (0.9, -1.1, 0.5)
     both = Mesh(
-        np.concatenate([vertices, beside]),
+        np.concatenate([vertices, occluder]),
         np.concatenate([faces, faces + len(vertices)]).astype(np.int32),
     )
     rays = RayScene.build(both)
@@ -155,8 +155,8 @@ def bowl() -> tuple[RayScene, Camera, SurfaceView]:
         MountedLight("c", np.array([0.5, -0.2, 0.1])),
     ],
 )
-def test_no_size_is_the_hard_shadow(light) -> None:
-    rays, eye, view = bowl()
+def test_source_without_size_gives_hard_shadow(light) -> None:
+    rays, eye, view = two_spheres()
     seen = light_visibility(rays, view, light, eye, uncertainty=0.0)
     falls = light.incidence(view.point, eye)
     lit = np.einsum("ij,ij->i", view.normal, falls.towards) > 0
@@ -165,9 +165,9 @@ def test_no_size_is_the_hard_shadow(light) -> None:
     assert 0.1 < lit.mean() < 0.999
 
 
-def test_few_rays_find_what_many_find() -> None:
-    """Pixels that twelve rays call lit or dark hold no soft edge worth the name."""
-    rays, eye, view = bowl()
+def test_few_rays_agree_with_many_rays() -> None:
+    """Pixels that twelve rays call fully lit or dark have no significant penumbra."""
+    rays, eye, view = two_spheres()
     sun = DistantLight("sun", np.array([0.48, -0.6, 0.64]), None, 0.08)
     quick = light_visibility(rays, view, sun, eye, uncertainty=0.02)
     many = light_visibility(rays, view, sun, eye, 2048, uncertainty=0.02)
@@ -178,7 +178,7 @@ def test_few_rays_find_what_many_find() -> None:
     assert abs(quick[soft].mean() - many[soft].mean()) < 0.01
 
 
-def test_default_uncertainty_is_of_the_mesh() -> None:
+def test_default_uncertainty_follows_mesh_size_and_resolution() -> None:
     vertices, faces = made.sphere_mesh(3)
     coarse = Mesh(*made.sphere_mesh(2))
     fine = Mesh(vertices, faces)
@@ -189,8 +189,8 @@ def test_default_uncertainty_is_of_the_mesh() -> None:
 
 @given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 @settings(max_examples=200, deadline=None)
-def test_greys_keep_order_and_the_limit(one: float, two: float) -> None:
-    """Above one half exactly where more than the tolerance is missing; darker is more light."""
+def test_grey_values_are_monotone_and_keep_threshold(one: float, two: float) -> None:
+    """Above one half exactly where more than the tolerance is shadowed; darker means more light."""
     a, b = to_grey(np.array([one, two]))
     assert (a > 127.5) == (1 - one > TOLERANCE + 1e-6)
     if one <= two:
@@ -198,6 +198,6 @@ def test_greys_keep_order_and_the_limit(one: float, two: float) -> None:
     assert abs(from_grey(np.array([a], np.uint8))[0] - one) < 0.005
 
 
-def test_ends_of_the_greys() -> None:
+def test_extreme_grey_values() -> None:
     assert to_grey(np.array([1.0, 0.0])).tolist() == [0, 255]
     assert to_grey(np.float32(1 - TOLERANCE)) == 127

@@ -1,5 +1,6 @@
-"""The file of localised cameras: what is written is read back to the last bit; what is wrong in it
-is one line."""
+"""The file of localised cameras: what is written is read back to the last bit; errors take one
+line.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +38,7 @@ def write(path: Path, *entries, **top) -> Path:
     return path
 
 
-def test_a_point_lands_where_the_numbers_say(tmp_path: Path) -> None:
+def test_point_projects_as_computed_by_hand(tmp_path: Path) -> None:
     found = read_reconstruction(write(tmp_path / "localised.cameras.json", entry()))
     (camera,) = found.cameras
     # by hand: x_cam = (−y, x, z) + t; r² of (u, v) = (x/z, y/z); u' = u (1 + k r²)
@@ -50,7 +51,7 @@ def test_a_point_lands_where_the_numbers_say(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         ({"label": 7}, "cameras 1.label"),
         ({"width": 0}, "cameras 1.width"),
@@ -71,14 +72,14 @@ def test_a_point_lands_where_the_numbers_say(tmp_path: Path) -> None:
         ({"photo": 3}, "cameras 1.photo"),
     ],
 )
-def test_a_wrong_entry_is_named(tmp_path: Path, change: dict, said: str) -> None:
+def test_invalid_entry_is_named(tmp_path: Path, change: dict, message: str) -> None:
     path = write(tmp_path / "x.json", entry(**change))
-    with pytest.raises(InputError, match=said) as error:
+    with pytest.raises(InputError, match=message) as error:
         read_patina_cameras(path)
     assert "\n" not in str(error.value) and str(path) in str(error.value)
 
 
-def test_what_is_no_such_file_is_said(tmp_path: Path) -> None:
+def test_other_files_are_rejected_with_message(tmp_path: Path) -> None:
     path = tmp_path / "x.json"
     cases = (
         write(path, entry(), entry()).read_text(),
@@ -105,7 +106,7 @@ def test_what_is_no_such_file_is_said(tmp_path: Path) -> None:
 @example(200, b"[[[[[[")
 @example(300, b"1e999")
 def test_fuzz_read_patina_cameras(tmp_path: Path, place: int, bytes_: bytes) -> None:
-    """A few bytes anywhere in a good file: cameras, or one line."""
+    """A few bytes changed anywhere in a valid file: cameras, or a one-line error."""
     path = write(tmp_path / "x.json", entry(), entry(label="b"))
     good = path.read_bytes()
     place %= len(good)

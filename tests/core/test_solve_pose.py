@@ -1,4 +1,4 @@
-"""Poses from pixels and points against poses we chose: exact data, outliers, noise."""
+"""Camera poses from pixels and points, against known poses: exact data, outliers, noise."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def apart(pose, truth):
 
 
 @pytest.mark.parametrize(("model", "parameters"), LENSES)
-def test_exact_pixels_give_the_exact_pose_among_outliers(model, parameters) -> None:
+def test_exact_pixels_give_exact_pose_despite_outliers(model, parameters) -> None:
     camera, pixels, points = scene(model, parameters, 3)
     wrong = np.random.default_rng(4).permutation(len(points))[: 2 * len(points) // 3]
     pixels[wrong] = np.random.default_rng(5).uniform((0, 0), (800, 600), (len(wrong), 2))
@@ -56,18 +56,18 @@ def test_exact_pixels_give_the_exact_pose_among_outliers(model, parameters) -> N
     assert angle < 2e-5 and place < 1e-4
 
 
-def test_far_from_the_origin_nothing_is_lost() -> None:
+def test_no_precision_loss_far_from_origin() -> None:
     far = (4.1e6, 6.2e5, 4.8e6)
     camera, pixels, points = scene(*LENSES[1], 8, origin=far)
     found = find_pose(camera, pixels, points, 3.0)
     assert np.linalg.norm(found.pose.centre - camera.pose.centre) < 1e-4
 
 
-def test_the_stated_deviations_are_those_of_many_trials() -> None:
-    """Half a pixel of noise, 200 times: errors scatter as the covariance says, to a fifth."""
+def test_stated_standard_errors_match_repeated_trials() -> None:
+    """Half a pixel of noise, 200 trials: errors scatter as the covariance predicts, to a fifth."""
     camera, exact, points = scene(*LENSES[0], 11, count=150)
     rng = np.random.default_rng(12)
-    angles, places, said = [], [], []
+    angles, places, stated = [], [], []
     for _ in range(200):
         found = refine_pose(
             camera, camera.pose, exact + 0.5 * rng.normal(size=exact.shape), points, 10.0
@@ -75,15 +75,15 @@ def test_the_stated_deviations_are_those_of_many_trials() -> None:
         angle, place = apart(found.pose, camera.pose)
         angles.append(angle)
         places.append(place)
-        said.append((found.angle_deviation, found.place_deviation, found.pixel_deviation))
-    angle, place, pixel = np.mean(said, axis=0)
+        stated.append((found.angle_deviation, found.place_deviation, found.pixel_deviation))
+    angle, place, pixel = np.mean(stated, axis=0)
     assert np.sqrt(np.mean(np.square(angles))) == pytest.approx(angle, rel=0.2)
     assert np.sqrt(np.mean(np.square(places))) == pytest.approx(place, rel=0.2)
-    # six parameters from 300 numbers of σ = 0.5: the fitted points shift by σ·sqrt(6 / 150)
+    # six parameters from 300 values of σ = 0.5: the fitted points shift by σ·sqrt(6 / 150)
     assert pixel == pytest.approx(0.5 * np.sqrt(6 / 150), rel=0.1)
 
 
-def test_random_pairs_are_no_pose() -> None:
+def test_random_pairs_give_no_pose() -> None:
     rng = np.random.default_rng(1)
     camera, _, points = scene(*LENSES[0], 2)
     found = find_pose(camera, rng.uniform((0, 0), (800, 600), (300, 2)), points, 3.0)
@@ -92,16 +92,17 @@ def test_random_pairs_are_no_pose() -> None:
     assert find_pose(camera, np.full((50, 2), np.nan), points[:50], 3.0) is None
 
 
-def test_few_photos_are_all_compared_and_many_with_those_that_look_alike() -> None:
+def test_few_photos_are_all_matched_and_many_with_similar_ones() -> None:
     rng = np.random.default_rng(0)
     few = [rng.integers(0, 255, (5, 128), np.uint8) for _ in range(EXHAUSTIVE)]
     assert len(choose_pairs(few)) == EXHAUSTIVE * (EXHAUSTIVE - 1) // 2
-    # 90 photos in 2 rounds of 45 around an object: photo i and i + 45 show the same, in any order
+    # 90 photos in 2 rounds of 45 around an object: photos i and i + 45 show the same view, in any
+    # order
     round_ = [rng.integers(0, 255, (40, 128), np.uint8) for _ in range(45)]
     noisy = [
         np.clip(d + rng.normal(0, 8, d.shape), 0, 255).astype(np.uint8) for d in round_ + round_
     ]
     pairs = set(choose_pairs(noisy))
-    assert {(i, i + 45) for i in range(45)} <= pairs  # not neighbours by name, but alike
+    assert {(i, i + 45) for i in range(45)} <= pairs  # not neighbours by name, but similar
     assert {(i, i + 1) for i in range(89)} <= pairs
     assert len(pairs) < 90 * 89 / 2 / 3

@@ -1,5 +1,6 @@
-"""Photographs with an exact answer: solved without being told anything, then lit photos from new
-viewpoints localised in the result's place: the true cameras and mesh."""
+"""Photos with an exact answer: solved without prior information, then lit photos from new
+viewpoints localised, with the true cameras and mesh as reference.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +34,7 @@ def lit_views():
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """photos/ (one as 16-bit TIFF, one EXR, one on its side by EXIF), lit/, mesh.ply."""
+    """photos/ (one as 16-bit TIFF, one EXR, one rotated by EXIF), lit/, mesh.ply."""
     folder = tmp_path_factory.mktemp("scene")
     photos, lit = folder / "photos", folder / "lit"
     (photos / "second round").mkdir(parents=True)
@@ -66,7 +67,7 @@ def solved(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Solve
     while job.step():
         fractions.append(job.now.fraction)
         stages[job.now.stage] += 1
-    # the window goes on meanwhile: no step waits for a stage, nor for more than a few photos
+    # the window stays responsive: no step waits for a stage, nor for more than a few photos
     assert stages["finding features"] > VIEWS // 2
     assert stages["matching"] > 3 and stages["placing cameras"] > 3
     assert fractions == sorted(fractions) and min(fractions) >= 0 and max(fractions) <= 1
@@ -80,7 +81,7 @@ def number(name: str) -> int:
 
 
 @pytest.mark.slow
-def test_solve_finds_the_cameras(solved: tuple[SolveJob, Path]) -> None:
+def test_solve_recovers_cameras(solved: tuple[SolveJob, Path]) -> None:
     _, out = solved
     truth = list(made.ring(VIEWS))
     found = read_colmap(out / "sparse").cameras
@@ -100,11 +101,11 @@ def test_solve_finds_the_cameras(solved: tuple[SolveJob, Path]) -> None:
 
 
 @pytest.mark.slow
-def test_solve_says_what_it_found(solved: tuple[SolveJob, Path], scene: Path) -> None:
+def test_solve_reports_its_results(solved: tuple[SolveJob, Path], scene: Path) -> None:
     job, out = solved
-    said = (out / "report.txt").read_text("utf-8")
-    assert f"{VIEWS} of {VIEWS + 1} photos placed" in said
-    assert "torn.jpg" in said and "notes.txt" not in said
+    report = (out / "report.txt").read_text("utf-8")
+    assert f"{VIEWS} of {VIEWS + 1} photos placed" in report
+    assert "torn.jpg" in report and "notes.txt" not in report
     assert job.solution.error < 0.6
     (capture,) = out.glob("*.capture.toml")
     data = tomllib.loads(capture.read_text("utf-8"))
@@ -123,7 +124,7 @@ def test_lit_photos_are_localised(scene: Path, tmp_path: Path) -> None:
         for photo in find_photos(scene / "photos")
         if "view" in photo.name
     ]
-    other = tmp_path / "other.jpg"  # something that the scan does not show
+    other = tmp_path / "other.jpg"  # an object that the scan does not show
     noise = np.random.default_rng(0).uniform(size=(120, 160, 3)).repeat(4, axis=0).repeat(4, axis=1)
     made.write_picture(other, noise)
     photos = [*sorted((scene / "lit").glob("*.jpg")), other]
@@ -154,7 +155,7 @@ def angle(one, other):
 
 
 def similarity(a, b):
-    """scale, rotation, translation that bring points a onto b (Umeyama 1991)."""
+    """Scale, rotation and translation that map points a to b (Umeyama 1991)."""
     ca, cb = a - a.mean(axis=0), b - b.mean(axis=0)
     u, s, vt = np.linalg.svd(cb.T @ ca)
     sign = np.diag([1, 1, np.sign(np.linalg.det(u @ vt))])
@@ -163,7 +164,7 @@ def similarity(a, b):
     return scale, turn, b.mean(axis=0) - scale * turn @ a.mean(axis=0)
 
 
-def test_what_cannot_be_solved_is_said(tmp_path: Path) -> None:
+def test_unsolvable_photos_are_reported(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such folder"):
         SolveJob(tmp_path / "gone")
     with pytest.raises(InputError, match="no photos"):
@@ -182,7 +183,7 @@ def test_what_cannot_be_solved_is_said(tmp_path: Path) -> None:
         SolveJob(tmp_path, lens="FOV2")
 
 
-def test_a_dropped_job_ends_its_work(tmp_path: Path) -> None:
+def test_abandoned_job_stops_its_work(tmp_path: Path) -> None:
     import threading
 
     for i, view in enumerate(made.ring(3)):
@@ -198,7 +199,7 @@ def test_a_dropped_job_ends_its_work(tmp_path: Path) -> None:
     assert not job.step()
 
 
-def test_raw_files_beside_their_picture_are_left_out(tmp_path: Path) -> None:
+def test_raw_files_with_a_developed_picture_are_skipped(tmp_path: Path) -> None:
     for name in ("a.JPG", "a.CR2", "b.cr2", ".hidden.jpg", "c.txt", "deep/d.tif", ".x/e.jpg"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_bytes(b"")

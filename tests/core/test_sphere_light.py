@@ -1,4 +1,4 @@
-"""The sphere under worlds: what it adds up to where the answer is known."""
+"""The rendered sphere under environments for which the exact answer is known."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ GLOSSY = Principled(base_color=np.array([0.6, 0.1, 0.05]), roughness=0.3)
 
 
 def under(radiance: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> sphere_light.Lit:
-    """A disc under a made-up world (32, 64, 3)."""
+    """A disc under a synthetic environment (32, 64, 3)."""
     maps = [radiance.astype(np.float32)]
     monkeypatch.setattr(sphere_light, "pyramid", lambda name: sphere_light.Pyramid(tuple(maps)))
     sphere_light.lit.cache_clear()
@@ -28,12 +28,12 @@ def lambert(angles: Angles) -> np.ndarray:
     return np.full((len(angles.theta_h), 3), 1 / np.pi)
 
 
-def test_white_under_a_uniform_world_vanishes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_white_sphere_is_invisible_in_uniform_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     light = under(np.full((32, 64, 3), 0.7), monkeypatch)
     np.testing.assert_allclose(light.table(lambert), 0.7, rtol=0.01)
 
 
-def test_a_sky_above_lights_as_the_cosine_says(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_hemispherical_sky_gives_analytic_irradiance(monkeypatch: pytest.MonkeyPatch) -> None:
     """A uniform upper half and a black lower one: irradiance π(1 + n·up)/2."""
     world = np.zeros((64, 128, 3))
     world[:32] = 1.0
@@ -44,8 +44,8 @@ def test_a_sky_above_lights_as_the_cosine_says(monkeypatch: pytest.MonkeyPatch) 
     np.testing.assert_allclose(found, (1 + up) / 2, atol=0.04)
 
 
-def test_a_mirror_shows_the_world(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A sharp metal of reflectance 1 in the middle of the disc sees what is behind the camera."""
+def test_mirror_reflects_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sharp metal of reflectance 1 at the disc's centre reflects what is behind the camera."""
     rows, columns = np.mgrid[0:64, 0:128]
     direction_y = np.sin((rows + 0.5) / 64 * np.pi) * np.sin((columns + 0.5) / 128 * 2 * np.pi)
     world = np.repeat((2.0 + direction_y)[..., None], 3, axis=2)
@@ -55,8 +55,8 @@ def test_a_mirror_shows_the_world(monkeypatch: pytest.MonkeyPatch) -> None:
     assert light.model(metal.at)[0, middle] == pytest.approx(1.0, abs=0.1)  # y is -1 there
 
 
-def test_a_model_may_tell_light_from_view(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By angles half of the directions are swapped, which a layered model notices a little."""
+def test_model_without_reciprocity_changes_result_slightly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By angles half of the directions are swapped, which changes a layered model slightly."""
     light = under(np.ones((32, 64, 3)), monkeypatch)
     by_angles, by_cosines = light.table(GLOSSY.evaluate), light.model(GLOSSY.at)
     np.testing.assert_allclose(by_angles, by_cosines, rtol=0.2)

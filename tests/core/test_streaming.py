@@ -1,4 +1,4 @@
-"""Samples taken in bands are those of the whole photo, on any number of threads."""
+"""Samples taken in bands equal those of the whole photo, for any number of threads."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def same(a: np.ndarray, b: np.ndarray) -> bool:
 
 
 def rough_ball() -> Mesh:
-    """Hills that shade each other and hide each other."""
+    """Hills that shadow and hide each other."""
     vertices, faces = made.sphere_mesh(5)
     local = vertices - made.CENTRE
     hills = 1 + 0.12 * np.sin(local * [5.0, 4.0, 6.0]).sum(axis=1, keepdims=True)
@@ -61,8 +61,10 @@ def lens_with_distortion(size: int) -> Camera:
 @pytest.mark.parametrize(
     "margins", [Margins(), Margins(5, 7, 3), Margins(0, 0, 0), Margins(1, 9, 1)]
 )
-def test_bands_give_what_the_whole_frame_gives(ball: Path, margins: Margins) -> None:
-    """Cut at every few rows and at the mesh's columns, against one window of all: equal bits."""
+def test_bands_equal_whole_frame(ball: Path, margins: Margins) -> None:
+    """Cut at every few rows and at the mesh's columns, against one window of the whole frame: equal
+    bits.
+    """
     capture = read_capture(ball)
     scan = capture_data.open_scan(capture)
     rays = RayScene.build(rough_ball())
@@ -97,7 +99,7 @@ def test_bands_give_what_the_whole_frame_gives(ball: Path, margins: Margins) -> 
     assert len(one) > 60
 
 
-def test_the_whole_view_is_its_bands(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_view_of_frame_equals_its_bands(monkeypatch: pytest.MonkeyPatch) -> None:
     rays, camera = RayScene.build(rough_ball()), lens_with_distortion(160)
     one = view_window(rays, PixelRays.of(camera), whole(camera))
     monkeypatch.setattr(
@@ -110,7 +112,7 @@ def test_the_whole_view_is_its_bands(monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.array_equal(many.image(many.curvature), one.image(one.curvature), equal_nan=True)
 
 
-def test_interpolated_rays_are_the_lens_own() -> None:
+def test_interpolated_rays_match_lens() -> None:
     camera = lens_with_distortion(640)
     lines = PixelRays.of(camera)
     assert lines.lattice is not None
@@ -124,7 +126,7 @@ def test_interpolated_rays_are_the_lens_own() -> None:
     )
 
 
-def test_a_lens_that_no_cubic_follows_is_asked_everywhere() -> None:
+def test_lens_without_cubic_approximation_is_evaluated_at_every_pixel() -> None:
     camera = replace(
         lens_with_distortion(640), model="RADIAL", parameters=(200.0, 320.0, 240.0, 0.9, 30.0)
     )
@@ -132,8 +134,8 @@ def test_a_lens_that_no_cubic_follows_is_asked_everywhere() -> None:
 
 
 @pytest.mark.parametrize("away", [1.5, 2.5, 6.0])
-def test_no_ray_that_hits_is_left_out(away: float) -> None:
-    """Columns that are not looked at hold no hit, from near (beside the mesh) to far."""
+def test_skipped_columns_contain_no_hit(away: float) -> None:
+    """Columns that are skipped hold no hit, from near (next to the mesh) to far."""
     rays = RayScene.build(rough_ball())
     rotation, _ = next(iter(made.poses(6)))
     for turn in (0.0, 0.4):
@@ -148,7 +150,7 @@ def test_no_ray_that_hits_is_left_out(away: float) -> None:
         assert not (seen & ~may).any()
 
 
-def test_widening_is_repeated_dilation() -> None:
+def test_widening_equals_repeated_dilation() -> None:
     edge = np.random.default_rng(0).random((40, 50)) < 0.01
     for pixels in range(6):
         expected = edge
@@ -157,7 +159,7 @@ def test_widening_is_repeated_dilation() -> None:
         assert np.array_equal(edges.widen(edge, pixels), expected)
 
 
-def test_threads_and_bands_change_no_byte(ball: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_threads_and_bands_do_not_change_bytes(ball: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     capture = read_capture(ball)
     scan = capture_data.open_scan(capture)
     rays, photos = RayScene.build(scan.mesh), LitPhotos.open(capture)
@@ -177,10 +179,10 @@ def test_threads_and_bands_change_no_byte(ball: Path, monkeypatch: pytest.Monkey
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["measured", "paper"])
-def test_the_whole_job_gives_the_same_bytes_on_any_number_of_threads(
+def test_job_gives_same_bytes_for_any_thread_count(
     ball: Path, monkeypatch: pytest.MonkeyPatch, method: str
 ) -> None:
-    """Also where the reservoir has to thin."""
+    """Also where the reservoir has to drop samples."""
     few = partial(SampleReservoir, size=4000)
     monkeypatch.setattr(sampling, "SampleReservoir", few)
     monkeypatch.setattr(
@@ -199,7 +201,7 @@ def test_the_whole_job_gives_the_same_bytes_on_any_number_of_threads(
     assert found[0] == found[1]
 
 
-def test_a_sink_gets_every_sample_once_and_in_order(ball: Path) -> None:
+def test_sink_receives_each_sample_once_in_order(ball: Path) -> None:
     class Sink:
         def __init__(self) -> None:
             self.pieces: list[SampleTable] = []
@@ -220,8 +222,8 @@ def test_a_sink_gets_every_sample_once_and_in_order(ball: Path) -> None:
     assert same(joined.rho, table.rho) and same(joined.pixel, table.pixel)
 
 
-def made_up(photo: int, pixels: np.ndarray) -> SampleTable:
-    """Samples that can be told from each other."""
+def distinct_samples(photo: int, pixels: np.ndarray) -> SampleTable:
+    """Samples that can be distinguished from each other."""
     n = len(pixels)
     flat, vectors = np.full(n, 0.5, np.float32), np.ones((n, 3), np.float32)
     return replace(
@@ -239,12 +241,16 @@ def made_up(photo: int, pixels: np.ndarray) -> SampleTable:
     size=st.integers(1, 400),
     seed=st.integers(0, 1000),
 )
-def test_the_reservoir_does_not_depend_on_pieces_or_order(counts, size, seed) -> None:
+def test_reservoir_is_independent_of_pieces_and_order(counts, size, seed) -> None:
     rng = np.random.default_rng(seed)
     pieces = []
     for photo, count in enumerate(counts):
         pixels = rng.choice(5000, count, replace=False)
-        pieces += [made_up(photo, part) for part in np.array_split(np.sort(pixels), 3) if len(part)]
+        pieces += [
+            distinct_samples(photo, part)
+            for part in np.array_split(np.sort(pixels), 3)
+            if len(part)
+        ]
     kept = []
     for order in (range(len(pieces)), rng.permutation(len(pieces))):
         reservoir = SampleReservoir(len(counts), size)
@@ -256,7 +262,7 @@ def test_the_reservoir_does_not_depend_on_pieces_or_order(counts, size, seed) ->
     if not pieces:
         assert len(kept[0]) == 0
         return
-    # by its definition, from all samples at once; the brightest is kept beyond it
+    # by its definition, from all samples at once; the brightest samples are kept in addition
     everything = SampleTable.concatenate(pieces)
     place = everything.photo.astype(np.int64) << 32 | everything.pixel
     number = sample_hash(everything.photo, everything.pixel)
@@ -272,17 +278,19 @@ def test_the_reservoir_does_not_depend_on_pieces_or_order(counts, size, seed) ->
     bright = everything.radiance[:, 0].max()
     expected.add(int(place[everything.radiance[:, 0] == bright].min()))
     assert set(kept[0].tolist()) == expected
-    # every sample is stood for
+    # every sample is represented
     assert len(place) - 1e-3 <= table.weight.sum() <= len(place) + 1 + 1e-3
 
 
-def test_the_reservoir_is_a_fair_sample() -> None:
-    """Kept pixels are spread evenly: a tenth of a photo's from each tenth of its rows. A photo that
-    shows little keeps all of it, and weights say what every row stands for."""
+def test_reservoir_is_representative_sample() -> None:
+    """Kept pixels are spread evenly: each tenth of a photo's rows keeps a tenth of its pixels.
+
+    A photo with few pixels keeps all of them, and weights say how many rows each stands for.
+    """
     reservoir = SampleReservoir(3, 4000)
     for photo, count in ((0, 50_000), (1, 500), (2, 20_000)):
         for part in np.array_split(np.arange(count), 7):
-            reservoir.add(photo, made_up(photo, part))
+            reservoir.add(photo, distinct_samples(photo, part))
     table = reservoir.table()
     assert 3998 <= len(table) <= 4001
     assert np.bincount(table.photo)[1] == 500
@@ -296,7 +304,7 @@ def test_the_reservoir_is_a_fair_sample() -> None:
 
 @settings(max_examples=100, deadline=None)
 @given(counts=st.lists(st.integers(0, 50), min_size=1, max_size=9), size=st.integers(0, 300))
-def test_the_water_level_is_the_highest_that_fits(counts: list[int], size: int) -> None:
+def test_quota_per_photo_is_largest_that_fits(counts: list[int], size: int) -> None:
     level, array = water_level(np.array(counts), size), np.array(counts)
     assert np.minimum(array, level).sum() <= size
     if level < array.max():
@@ -308,7 +316,7 @@ def test_the_water_level_is_the_highest_that_fits(counts: list[int], size: int) 
     values=st.lists(st.floats(-10, 10), min_size=1, max_size=20),
     times=st.lists(st.integers(1, 5), min_size=20, max_size=20),
 )
-def test_the_weighted_median_lies_in_the_middle_of_all(values, times) -> None:
+def test_weighted_median_splits_total_weight(values, times) -> None:
     numbers, weight = np.array(values), np.array(times[: len(values)], float)
     found = weighted.median(numbers, weight)
     everything = np.repeat(numbers, weight.astype(int))
@@ -318,12 +326,12 @@ def test_the_weighted_median_lies_in_the_middle_of_all(values, times) -> None:
         assert (everything < found).mean() <= 0.5 and (everything > found).mean() <= 0.5
 
 
-def test_hashes_of_all_places_differ() -> None:
+def test_hashes_of_all_positions_differ() -> None:
     photo, pixel = np.divmod(np.arange(200_000), 1000)
     assert len(np.unique(sample_hash(photo, pixel))) == 200_000
 
 
-def test_results_come_in_order_and_errors_come_out() -> None:
+def test_ordered_map_keeps_order_and_raises_errors() -> None:
     from concurrent.futures import ThreadPoolExecutor
 
     def work(i: int) -> int:
@@ -337,7 +345,7 @@ def test_results_come_in_order_and_errors_come_out() -> None:
             list(ordered_map(pool, work, range(9), ahead=2))
 
 
-def test_far_from_the_origin_is_as_good_as_near() -> None:
+def test_no_precision_loss_far_from_origin() -> None:
     """A georeferenced mesh: 500 km away the same pixels see the same surface."""
     mesh, camera = rough_ball(), lens_with_distortion(120)
     shift = np.array([500_000.0, 4_000_000.0, 100.0])

@@ -1,4 +1,4 @@
-"""Strokes are told by their colour, over any picture and through soft brushes."""
+"""Brush strokes are recognised by their colour, over any image and with soft brushes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PALETTE = np.array(
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.7, 1.0))
-def test_a_stroke_is_known_by_its_colour(seed: int, strength: float) -> None:
+def test_stroke_is_recognised_by_its_colour(seed: int, strength: float) -> None:
     rng = np.random.default_rng(seed)
     picture = rng.integers(0, 200, (12, 16, 3)).astype(np.uint8)
     worn = rng.integers(-1, len(PALETTE), (12, 16))
@@ -23,20 +23,22 @@ def test_a_stroke_is_known_by_its_colour(seed: int, strength: float) -> None:
     painted = overlaid(picture, worn, PALETTE, strength)
     found = strokes(picture, painted, PALETTE)
     assert (found[worn < 0] == -1).all()
-    told = (worn >= 0) & far
-    assert (found[told] == worn[told]).mean() > 0.9  # two colours may lie on one line
+    recognised = (worn >= 0) & far
+    assert (
+        found[recognised] == worn[recognised]
+    ).mean() > 0.9  # two colours may lie on one line in colour space
     solid = strokes(picture, overlaid(picture, worn, PALETTE, 1.0), PALETTE)
     changed = (worn >= 0) & (np.abs(picture.astype(int) - PALETTE[worn]).max(axis=2) >= 2)
     assert (solid[changed] == worn[changed]).all()
 
 
-def test_the_rim_of_a_soft_brush_is_not_paint() -> None:
+def test_rim_of_soft_brush_is_not_paint() -> None:
     picture = np.full((1, 10, 3), 120, np.uint8)
     share = np.linspace(0.05, 0.95, 10)[None, :, None]
     after = np.round((1 - share) * picture + share * PALETTE[1]).astype(np.uint8)
     assert (strokes(picture, after, PALETTE)[0] == [-1] * 5 + [1] * 5).all()
 
 
-def test_an_untouched_picture_has_no_strokes() -> None:
+def test_unpainted_image_has_no_strokes() -> None:
     picture = np.random.default_rng(0).integers(0, 255, (20, 20, 3)).astype(np.uint8)
     assert (strokes(picture, picture, PALETTE) == -1).all()

@@ -1,4 +1,4 @@
-"""Moved components: linear in the logarithm, exact at 0, honest about what cannot be."""
+"""Trait shifts: linear in the logarithm, exact at 0, with physically impossible shifts reported."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _shifts(seed: int) -> np.ndarray:
     return np.random.default_rng(seed).normal(0, 1.0, (3, 8))
 
 
-def test_a_shift_is_so_many_deviations_of_the_training_coefficients(brdf) -> None:
+def test_shift_is_in_standard_deviations_of_training_coefficients(brdf) -> None:
     basis, shifts = brdf.basis, _shifts(2)
     spread = basis.training.std(axis=0)[:8]
     np.testing.assert_allclose(traits.shift_unit(basis), spread, rtol=2e-3)
@@ -43,46 +43,48 @@ def test_a_shift_is_so_many_deviations_of_the_training_coefficients(brdf) -> Non
         there[:, :8] - brdf.coefficients[:, :8], traits.shift_unit(basis) * shifts, atol=1e-12
     )
     np.testing.assert_array_equal(there[:, 8:], brdf.coefficients[:, 8:])
-    few = PrincipalBRDF(basis, brdf.coefficients[:, :5])  # the paper's method has no more
+    few = PrincipalBRDF(
+        basis, brdf.coefficients[:, :5]
+    )  # the paper's method has no more components
     assert traits.shifted(few, shifts).coefficients.shape == (3, 5)
 
 
-def test_no_shift_is_the_measured_brdf_to_the_bit(brdf, angles) -> None:
+def test_zero_shift_is_measured_brdf_bit_for_bit(brdf, angles) -> None:
     none = np.zeros((3, 8))
     assert traits.shifted(brdf, none) is brdf
     there_and_back = traits.shifted(traits.shifted(brdf, _shifts(3)), none)
     assert there_and_back.coefficients is not brdf.coefficients
-    movable = traits.ShiftableBRDF.of(brdf, traits.ComponentLookup.of(brdf.basis, angles))
-    np.testing.assert_array_equal(movable.at(none), brdf.evaluate(angles))
+    shiftable = traits.ShiftableBRDF.of(brdf, traits.ComponentLookup.of(brdf.basis, angles))
+    np.testing.assert_array_equal(shiftable.at(none), brdf.evaluate(angles))
 
 
-def test_moving_is_linear_in_the_logarithm(brdf, angles) -> None:
-    movable = traits.ShiftableBRDF.of(brdf, traits.ComponentLookup.of(brdf.basis, angles))
+def test_shift_is_linear_in_logarithm(brdf, angles) -> None:
+    shiftable = traits.ShiftableBRDF.of(brdf, traits.ComponentLookup.of(brdf.basis, angles))
     weight = mapping.cos_map(angles)
     first, second = 0.3 * _shifts(4), 0.3 * _shifts(5)
 
     def log(shifts: np.ndarray) -> np.ndarray:
-        return mapping.log_weighted(movable.at(shifts), weight)
+        return mapping.log_weighted(shiftable.at(shifts), weight)
 
     none = np.zeros((3, 8))
     both = log(first) + log(second) - log(none)
-    floor = np.log(mapping.EPSILON) + 0.01  # below it there is no reflectance to have
+    floor = np.log(mapping.EPSILON) + 0.01  # the mapping allows no reflectance below it
     kept = np.min([log(s) for s in (none, first, second, first + second)], axis=0) > floor
     assert kept.mean() > 0.5
     np.testing.assert_allclose(log(first + second)[kept], both[kept], atol=2e-3)
 
 
-def test_what_is_looked_up_once_says_what_the_moved_brdf_says(brdf, angles) -> None:
-    movable = traits.ShiftableBRDF.of(brdf, traits.ComponentLookup.of(brdf.basis, angles))
+def test_precomputed_lookup_matches_shifted_brdf(brdf, angles) -> None:
+    shiftable = traits.ShiftableBRDF.of(brdf, traits.ComponentLookup.of(brdf.basis, angles))
     shifts = _shifts(6)
     expected = traits.shifted(brdf, shifts).evaluate(angles)
-    np.testing.assert_allclose(movable.at(shifts), expected, rtol=2e-4, atol=1e-6)
+    np.testing.assert_allclose(shiftable.at(shifts), expected, rtol=2e-4, atol=1e-6)
     red = np.zeros((3, 8))
     red[0] = shifts[0]
-    np.testing.assert_array_equal(movable.at(red)[:, 1:], movable.at(np.zeros((3, 8)))[:, 1:])
+    np.testing.assert_array_equal(shiftable.at(red)[:, 1:], shiftable.at(np.zeros((3, 8)))[:, 1:])
 
 
-def test_the_moved_sphere_is_the_sphere_of_the_moved_brdf(brdf) -> None:
+def test_shifted_sphere_matches_sphere_of_shifted_brdf(brdf) -> None:
     sphere, shifts = LitSphere.of(48), _shifts(7)
     parts = [
         traits.ShiftableBRDF.of(brdf, traits.ComponentLookup.of(brdf.basis, p.angles))
@@ -92,35 +94,37 @@ def test_the_moved_sphere_is_the_sphere_of_the_moved_brdf(brdf) -> None:
     expected, inside = lit_sphere(traits.shifted(brdf, shifts).evaluate, 48)
     np.testing.assert_allclose(seen, expected, rtol=1e-3, atol=1e-4 * expected.max())
     np.testing.assert_array_equal(coverage, inside)
-    unmoved, _ = sphere.picture([part.at(np.zeros((3, 8))) for part in parts])
-    np.testing.assert_array_equal(unmoved, lit_sphere(brdf.evaluate, 48)[0])
+    unshifted, _ = sphere.picture([part.at(np.zeros((3, 8))) for part in parts])
+    np.testing.assert_array_equal(unshifted, lit_sphere(brdf.evaluate, 48)[0])
 
 
-def test_the_albedo_is_that_of_the_moved_brdf(brdf) -> None:
+def test_albedo_is_that_of_shifted_brdf(brdf) -> None:
     albedo, shifts = traits.ShiftableAlbedo.of(brdf), _shifts(8)
-    moved = traits.shifted(brdf, shifts)
-    expected = directional_albedo(moved.evaluate, np.array(traits.VIEWS))
+    shifted = traits.shifted(brdf, shifts)
+    expected = directional_albedo(shifted.evaluate, np.array(traits.VIEWS))
     np.testing.assert_allclose(albedo.at(shifts), expected, rtol=1e-3)
     by_hand = []
     for theta in traits.VIEWS:
         sphere = Hemisphere.of(theta, 96, 24)
-        by_hand.append((sphere.cos_i * sphere.solid) @ moved.evaluate(sphere.angles).astype(float))
+        by_hand.append(
+            (sphere.cos_i * sphere.solid) @ shifted.evaluate(sphere.angles).astype(float)
+        )
     np.testing.assert_allclose(expected, by_hand, rtol=1e-12)
 
 
-def test_more_light_out_than_in_is_told(brdf) -> None:
+def test_albedo_above_one_is_reported(brdf) -> None:
     albedo = traits.ShiftableAlbedo.of(brdf)
     assert traits.excess(albedo.at(np.zeros((3, 8)))) is None
     shifts = np.zeros((3, 8))
-    shifts[1, 1] = -5.0  # green alone: a much brighter body
+    shifts[1, 1] = -5.0  # green alone: a much brighter diffuse colour
     found = albedo.at(shifts)
-    told = traits.excess(found)
-    assert told is not None and told[0] == pytest.approx(found[:, 1].max())
-    assert told[1] == traits.VIEWS[int(np.argmax(found[:, 1]))]
+    messages = traits.excess(found)
+    assert messages is not None and messages[0] == pytest.approx(found[:, 1].max())
+    assert messages[1] == traits.VIEWS[int(np.argmax(found[:, 1]))]
     assert traits.excess(np.full((7, 3), 1.005)) is None
 
 
-def test_what_no_material_is_like_is_told(brdf) -> None:
+def test_shift_beyond_measured_materials_is_reported(brdf) -> None:
     shifts = np.zeros((3, 8))
     assert traits.beyond_measured(brdf, shifts) == []
     shifts[2, 4], shifts[0, 1] = 9.0, 0.1
@@ -129,7 +133,7 @@ def test_what_no_material_is_like_is_told(brdf) -> None:
     assert traits.beyond_measured(unknown, shifts) == []
 
 
-def test_words_follow_from_what_is_measured() -> None:
+def test_trait_words_follow_from_measured_change() -> None:
     found = [
         Effect(0.0, 2.0, -0.3, 0.0),
         Effect(-1.0, -0.2, 0.0, 0.05),
@@ -146,8 +150,8 @@ def test_words_follow_from_what_is_measured() -> None:
     ]
 
 
-def test_a_component_does_what_its_words_say() -> None:
-    """On a material that none of the words was measured on, by another way."""
+def test_component_changes_material_as_its_words_say() -> None:
+    """On a material that none of the words was measured on, computed in another way."""
     basis = default_basis()
     words = trait_words.words(trait_words.effects(basis))
     plain = PrincipalBRDF(basis, np.zeros((3, 8)))
@@ -155,12 +159,12 @@ def test_a_component_does_what_its_words_say() -> None:
     profile = Angles(theta, np.full(241, 0.3), np.full(241, np.pi / 2))
     facing = np.radians([0.0])
 
-    def moved(component: int) -> PrincipalBRDF:
+    def shifted(component: int) -> PrincipalBRDF:
         shifts = np.zeros((3, 8))
         shifts[:, component] = 1.0
         return traits.shifted(plain, shifts)
 
-    first, second, fourth = moved(0), moved(1), moved(3)
+    first, second, fourth = shifted(0), shifted(1), shifted(3)
     assert "stronger" in words[0] and "sharper" in words[0]
     seen, before = (b.evaluate(profile)[:, 0] for b in (first, plain))
     assert seen[0] > 5 * before[0] and seen[160] / seen[0] < 0.2 * before[160] / before[0]
@@ -175,7 +179,7 @@ def test_a_component_does_what_its_words_say() -> None:
     assert rise[0] > 2 * rise[1]
 
 
-def test_the_table_of_the_documents_is_the_basis_own(root: Path) -> None:
+def test_documented_table_matches_basis(root: Path) -> None:
     """docs/guide/traits.md, written by `run.py bench traits`."""
     from tools.bench_traits import table
 

@@ -1,5 +1,6 @@
-"""Photos beside predictions, and which pixels became samples: on a ball with a hole in the light,
-painted masks of every kind, two materials, clipped pixels and a narrow beam."""
+"""Photos next to predictions, and which pixels became samples: on a ball with a cast shadow,
+painted masks of every kind, two materials, clipped pixels and a narrow beam.
+"""
 
 from __future__ import annotations
 
@@ -41,8 +42,9 @@ def mask(**box: tuple[int, int, int, int]) -> dict[str, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def painted(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The ball under a moon that shades it; two materials that overlap and leave a gap; what is
-    left out; a clipped corner in the first photo; a narrow beam in the last."""
+    """The ball under a second ball that shadows it; two materials whose masks overlap and leave a
+    gap; an ignore mask; a clipped corner in the first photo; a narrow beam in the last.
+    """
     folder = tmp_path_factory.mktemp("painted")
     path = made.make_capture(folder, PHOTOS, extra=MATERIALS)
     vertices, faces = made.sphere_mesh(3)
@@ -72,7 +74,7 @@ def painted(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Opened:
-    """A capture with everything a view wants."""
+    """A capture with everything that a view needs."""
 
     def __init__(self, capture: Capture) -> None:
         self.capture = capture
@@ -89,8 +91,8 @@ class Opened:
         )
 
 
-class Kept:
-    """A sink that keeps everything."""
+class KeepAll:
+    """A sink that keeps every sample."""
 
     def __init__(self) -> None:
         self.tables: list[tuple[int, SampleTable]] = []
@@ -121,7 +123,7 @@ def views(opened: Opened) -> list[PhotoView]:
 
 
 def flat_brdf(level: float) -> PrincipalBRDF:
-    """Some BRDF of the basis."""
+    """An arbitrary BRDF of the basis."""
     return PrincipalBRDF(default_basis(), np.full((3, 5), level))
 
 
@@ -133,10 +135,10 @@ def pixels_of(view: PhotoView, *criteria: Criterion) -> set[int]:
 
 @pytest.mark.parametrize("method", ["measured", "paper"])
 def test_reliable_pixels_are_exactly_the_samples(painted: Path, method: str) -> None:
-    """Of both materials, and for the paper's method those of them that its fit believes."""
+    """Of both materials; for the paper's method, those of them that its fit uses."""
     found = Opened(with_method(painted, method))
     capture = found.capture
-    sinks = {m.name: [Kept()] for m in capture.materials}
+    sinks = {m.name: [KeepAll()] for m in capture.materials}
     drained(take_samples(capture, found.scan, found.rays, found.photos, found.lights, sinks, 1))
     for place in range(PHOTOS):
         view = found.look(place)
@@ -156,29 +158,33 @@ def test_reliable_pixels_are_exactly_the_samples(painted: Path, method: str) -> 
         assert (len(taken) > len(believed) > 0) == (method == "paper")
 
 
-def test_every_criterion_is_met(opened: Opened, views: list[PhotoView], painted: Path) -> None:
-    """The capture above leaves none of them untested."""
+def test_every_criterion_occurs(opened: Opened, views: list[PhotoView], painted: Path) -> None:
+    """The capture above exercises every criterion."""
     curved = Opened(with_method(painted, "paper")).look(0)
     met = {c for view in (*views, curved) for c in np.unique(view.criteria)}
     assert met == set(Criterion)
 
 
-def test_the_first_that_speaks_against_a_pixel_decides(views: list[PhotoView]) -> None:
+def test_first_violated_criterion_is_reported(views: list[PhotoView]) -> None:
     view = views[0]
 
     def at(row: int, column: int) -> Criterion:
         inside = row - view.box[0].start, column - view.box[1].start
         return Criterion(view.criteria[inside])
 
-    assert at(40, 44) == Criterion.SHADOW_MASK  # the highlight's mask is white here too
+    assert at(40, 44) == Criterion.SHADOW_MASK  # the highlight mask is white here too
     assert at(45, 52) == Criterion.HIGHLIGHT_MASK
     assert at(55, 70) == Criterion.IGNORE_MASK
     assert at(85, 70) == Criterion.NO_MATERIAL
     assert at(2, 2) == Criterion.NO_SURFACE
 
 
-def test_shadows_are_told_apart_by_geometry(opened: Opened, views: list[PhotoView]) -> None:
-    """Turned away is what the ball's own shape says; the moon's shadow lies on what faces it."""
+def test_attached_and_cast_shadows_are_distinguished(
+    opened: Opened, views: list[PhotoView]
+) -> None:
+    """A back-facing pixel follows from the ball's own shape; the second ball's shadow falls on
+    pixels that face the light.
+    """
     camera = capture_data.camera_of(opened.capture, opened.scan, 0)
     seen = view_surface(opened.rays, camera)
     light = np.array(next(made.light_directions(PHOTOS)))
@@ -188,7 +194,7 @@ def test_shadows_are_told_apart_by_geometry(opened: Opened, views: list[PhotoVie
         assert rows.sum() > 20 and (sign * facing[rows] > -1e-6).all()
 
 
-def test_counts_and_materials_are_of_the_surface(opened: Opened, views: list[PhotoView]) -> None:
+def test_counts_and_materials_refer_to_surface(opened: Opened, views: list[PhotoView]) -> None:
     for place, view in enumerate(views):
         seen = view_surface(opened.rays, capture_data.camera_of(opened.capture, opened.scan, place))
         assert view.surface == len(seen.pixel) and sum(view.shares.values()) == pytest.approx(1)
@@ -206,7 +212,7 @@ def test_counts_and_materials_are_of_the_surface(opened: Opened, views: list[Pho
         assert np.array_equal(nothing, ~some)
 
 
-def test_a_photo_is_looked_at_in_bands_of_any_size(
+def test_result_is_independent_of_band_size(
     opened: Opened, views: list[PhotoView], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     brdf = flat_brdf(0.1)
@@ -229,8 +235,10 @@ def test_a_photo_is_looked_at_in_bands_of_any_size(
     assert np.array_equal(parts.counts, whole.counts)
 
 
-def test_the_prediction_is_the_brdf_it_is_given(opened: Opened) -> None:
-    """A BRDF of any fit, of some of the materials; its scale is what it is too large by."""
+def test_prediction_uses_given_brdf(opened: Opened) -> None:
+    """Works for a BRDF of any fit and for some of the materials; its scale is the factor by which
+    it is too large.
+    """
     one = opened.look(1, [("red", flat_brdf(0.1), 1.0), ("of another fit", flat_brdf(0.1), 1.0)])
     half = opened.look(1, [("red", flat_brdf(0.1), 2.0)])
     known = np.isfinite(one.predicted[..., 0])
@@ -245,7 +253,7 @@ def test_the_prediction_is_the_brdf_it_is_given(opened: Opened) -> None:
     )
 
 
-def test_nothing_of_the_mesh_in_a_photo_is_no_error(opened: Opened) -> None:
+def test_photo_without_mesh_is_no_error(opened: Opened) -> None:
     """A camera that looks the other way."""
     found = Opened(opened.capture)
     away = found.scan.mesh.vertices + 1e3
@@ -256,7 +264,7 @@ def test_nothing_of_the_mesh_in_a_photo_is_no_error(opened: Opened) -> None:
     assert criteria_picture(view, 60).shape == (made.HEIGHT // 2, made.WIDTH // 2, 3)
 
 
-def test_chosen_pixels_are_ringed_or_others_paler(opened: Opened, views: list[PhotoView]) -> None:
+def test_selected_pixels_are_ringed_or_others_paler(opened: Opened, views: list[PhotoView]) -> None:
     plain = criteria_picture(views[0], 500)
     middle = np.argwhere(views[0].criteria == Criterion.RELIABLE)[50]
     row, column = middle + np.array([part.start for part in views[0].box])
@@ -275,7 +283,7 @@ def test_chosen_pixels_are_ringed_or_others_paler(opened: Opened, views: list[Ph
     assert len(opened.look(0, used=np.array([made.HEIGHT * made.WIDTH])).chosen) == 0
 
 
-def test_the_pictures_have_the_size_asked_for(opened: Opened) -> None:
+def test_pictures_have_requested_size(opened: Opened) -> None:
     view = opened.look(1, [("red", flat_brdf(0.1), 1.0), ("blue", flat_brdf(0.1), 1.0)])
     rows, columns = view.criteria.shape
     full = comparison_picture(view, 500)
@@ -285,7 +293,7 @@ def test_the_pictures_have_the_size_asked_for(opened: Opened) -> None:
     assert criteria_picture(view, 40).shape[0] == small.shape[0]
 
 
-def test_a_stop_more_is_twice_the_light(opened: Opened) -> None:
+def test_one_stop_doubles_the_light(opened: Opened) -> None:
     view = opened.look(1, [("red", flat_brdf(0.1), 1.0)])
     columns = view.criteria.shape[1]
     brighter = comparison_picture(view, 500, exposure=1.0)
@@ -296,7 +304,7 @@ def test_a_stop_more_is_twice_the_light(opened: Opened) -> None:
     assert np.array_equal(comparison_picture(doubled, 500), brighter)
 
 
-def test_the_papers_choice_is_found_again(opened: Opened) -> None:
+def test_paper_selection_is_reproduced(opened: Opened) -> None:
     from patina.core.fit import PaperFit
 
     table = replace(
@@ -310,8 +318,8 @@ def test_the_papers_choice_is_found_again(opened: Opened) -> None:
     assert chosen_pixels([], 2) is None
 
 
-def test_colours_are_told_apart_by_all_eyes() -> None:
-    """Without red, or without green cones (Machado et al. 2009), and with all three."""
+def test_criterion_colours_are_distinguishable_with_colour_blindness() -> None:
+    """Without red or without green cones (Machado et al. 2009), and with all three."""
     assert set(LOOKS) == set(Criterion) and len({look.key for look in LOOKS.values()}) == 15
     shown = np.concatenate([PALETTE[1:], [UNSELECTED]]).astype(np.uint8)
     deuteranope = [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]]

@@ -1,4 +1,4 @@
-"""Lights back into a capture file's text: only the lines concerned change."""
+"""Lights written back into a capture file's text: only the lines concerned change."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def _captured(folder: Path, lights: str = LIGHTS) -> Path:
 AXIS = np.array([0.36, 0.48, 0.8])
 
 
-def test_changed_lights_are_read_back_and_all_else_is_kept(tmp_path: Path) -> None:
+def test_changed_lights_are_read_back_and_rest_is_kept(tmp_path: Path) -> None:
     path = _captured(tmp_path)
     capture = read_capture(path)
     one, two, three, four, five, six = capture.lights
@@ -86,9 +86,12 @@ def test_changed_lights_are_read_back_and_all_else_is_kept(tmp_path: Path) -> No
     back = read_capture(tmp_path / "new.capture.toml")
     for light, there in zip(lights, back.lights, strict=True):
         for key in ("direction", "position", "mounted", "strength", "angle", "radius", "beam"):
-            told, found = getattr(light, key), getattr(there, key)
-            assert (told is None) == (found is None), (light.name, key)
-            assert told is None or np.allclose(told, found, rtol=1e-14, atol=0), (light.name, key)
+            written, found = getattr(light, key), getattr(there, key)
+            assert (written is None) == (found is None), (light.name, key)
+            assert written is None or np.allclose(written, found, rtol=1e-14, atol=0), (
+                light.name,
+                key,
+            )
         assert there.sphere is there.sun is there.white is None
     old, new = path.read_text().splitlines(), (tmp_path / "new.capture.toml").read_text()
     lines = list(difflib.ndiff(old, new.splitlines()))
@@ -110,7 +113,7 @@ def test_changed_lights_are_read_back_and_all_else_is_kept(tmp_path: Path) -> No
     ]
 
 
-def test_nothing_changed_is_the_same_file(tmp_path: Path) -> None:
+def test_unchanged_lights_give_identical_file(tmp_path: Path) -> None:
     path = _captured(tmp_path)
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
     before, capture = path.read_bytes(), read_capture(path)
@@ -123,7 +126,7 @@ def test_nothing_changed_is_the_same_file(tmp_path: Path) -> None:
     assert np.allclose(read_capture(path).lights[0].direction, AXIS)
 
 
-def test_the_last_line_without_a_break(tmp_path: Path) -> None:
+def test_last_line_without_line_break(tmp_path: Path) -> None:
     path = _captured(tmp_path)
     head, lights = path.read_text().replace("\n# the end", "").split("[[light]]  # the first")
     lights, photos = lights.split("[[photo]]", 1)
@@ -137,9 +140,9 @@ def test_the_last_line_without_a_break(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("other", [True, False])
-def test_elsewhere_its_files_would_not_be_found(tmp_path: Path, other: bool) -> None:
+def test_saving_to_another_folder_is_rejected(tmp_path: Path, other: bool) -> None:
     path = _captured(tmp_path / "a")
-    if other:  # files of the same names, but other ones
+    if other:  # other files of the same names
         _captured(tmp_path / "b")
     else:
         (tmp_path / "b").mkdir()
@@ -152,7 +155,7 @@ def test_elsewhere_its_files_would_not_be_found(tmp_path: Path, other: bool) -> 
         write_lights(capture, capture.lights, tmp_path / "c" / "new.capture.toml")
 
 
-def test_lights_within_a_value_are_refused(tmp_path: Path) -> None:
+def test_lights_in_inline_value_are_rejected(tmp_path: Path) -> None:
     names = ", ".join(
         f'{{name = "lamp{i}", direction = [0, 0, 1], irradiance = [1, 1, 1]}}' for i in range(1, 7)
     )

@@ -1,4 +1,6 @@
-"""A unit sphere in Cycles, seen by an orthographic camera from +z, every pixel's normal known."""
+"""A unit sphere in Cycles, seen by an orthographic camera from +z, with the normal of every pixel
+known.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ import numpy as np
 
 from patina.core.appearance.principled import Configuration
 
-HALF_WIDTH = 1.05  # of the picture, in radii
+HALF_WIDTH = 1.05  # half width of the image, in radii
 
 
 def new_scene(size: int = 64, samples: int = 1, osl: bool = False) -> bpy.types.Object:
@@ -40,7 +42,7 @@ def new_scene(size: int = 64, samples: int = 1, osl: bool = False) -> bpy.types.
 
 
 def _sphere_mesh(segments: int, rings: int) -> bpy.types.Mesh:
-    """Smooth unit sphere with its poles on the y axis, out of the camera's sight."""
+    """Smooth unit sphere with its poles on the y axis, where the camera does not see them."""
     u = np.arange(segments) / segments * 2 * np.pi
     v = np.linspace(0, np.pi, rings + 1)
     around, down = np.meshgrid(u, v)
@@ -52,7 +54,7 @@ def _sphere_mesh(segments: int, rings: int) -> bpy.types.Mesh:
     corners = [row * segments + column, (row + 1) * segments + column,
                (row + 1) * segments + after, row * segments + after]  # fmt: skip
     faces = np.stack(corners, axis=-1).reshape(-1, 4)
-    # the poles' quads have an edge of length 0: smooth normals still come out right
+    # the poles' quads have an edge of length 0: smooth normals are still right
     mesh = bpy.data.meshes.new("sphere")
     mesh.from_pydata(points.reshape(-1, 3).tolist(), [], faces.tolist())
     mesh.shade_smooth()
@@ -60,7 +62,7 @@ def _sphere_mesh(segments: int, rings: int) -> bpy.types.Mesh:
 
 
 def sky(strength: float) -> None:
-    """Uniform radiance from everywhere."""
+    """Uniform radiance from all directions."""
     world = bpy.context.scene.world
     world.use_nodes = True
     nodes = world.node_tree.nodes
@@ -74,7 +76,7 @@ def sky(strength: float) -> None:
 
 
 def sun(direction: np.ndarray, irradiance: float = 1.0) -> bpy.types.Object:
-    """A sun without width; direction: surface → light."""
+    """A sun without angular size; direction: surface → light."""
     from mathutils import Vector
 
     lamp = bpy.data.lights.new("sun", "SUN")
@@ -109,9 +111,10 @@ def diffuse(albedo: float) -> bpy.types.Material:
     return material
 
 
-def assert_is(image: np.ndarray, model, light: np.ndarray, irradiance: float) -> None:
-    """A picture under one sun shows a layered model, but for the sphere's tessellation, which
-    grows with the lobe's sharpness."""
+def assert_matches_model(image: np.ndarray, model, light: np.ndarray, irradiance: float) -> None:
+    """Check that a rendering under one sun matches a layered model, up to the sphere's tessellation
+    error, which grows with the lobe's sharpness.
+    """
     normal, inside = normals()
     view = np.array([0.0, 0.0, 1.0])
     half = (light + view) / np.linalg.norm(light + view)

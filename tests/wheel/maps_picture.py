@@ -23,7 +23,7 @@ from tests.wheel import maps_scene  # noqa: E402
 from tests.wheel import test_maps_truth as truth  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
-SHOWN = 0  # photo: a highlight, and the shadow of the ball
+SHOWN = 0  # index of a photo with a highlight and the ball's shadow
 SIZE = 512
 
 
@@ -39,7 +39,7 @@ def coordinates(mesh, face, point):
 
 
 def panels(folder, result):
-    """(h, 3 w, 3) sRGB: a photo, what was found and what was painted, from its viewpoint."""
+    """(h, 3 w, 3) sRGB: a photo, the recovered map and the painted map, from its viewpoint."""
     camera = capture_data.camera_of(result.capture, result.scan, SHOWN)
     view = view_surface(RayScene.build(result.scan.mesh), camera)
     uv = coordinates(result.scan.mesh, view.face, view.point)
@@ -53,7 +53,7 @@ def panels(folder, result):
 
 
 def figures(folder, result):
-    """What docs/guide/maps.md says."""
+    """The figures in docs/guide/maps.md."""
     expected, found = truth.truth(result.texels), base_color(result, 0)
     cosine, shaded, points = truth.looked_at(result.scan, result.texels)
     plain = truth.plain_way(folder, points, cosine)

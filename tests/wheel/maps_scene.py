@@ -1,5 +1,6 @@
-"""A painted, bumpy body and a ball that shades it, photographed by Cycles: each texel's base colour
-is known. The mesh that a fit is given is coarser than the one that was photographed."""
+"""A painted, bumpy body and a ball that shadows it, photographed by Cycles: each texel's base
+colour is known. The mesh given to the fit is coarser than the photographed one.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +33,7 @@ def base_color(u, v):
 
 
 def surface(columns, rows):
-    """(points (n, 3), faces (f, 3), uv (f, 3, 2)) of body and ball, outwards."""
+    """(points (n, 3), faces (f, 3), uv (f, 3, 2)) of body and ball, oriented outwards."""
     body = _grid(columns, rows, 0.02, BODY_TOP)
     ball = _grid(columns // 2, rows // 2, BALL_LOW, BALL_HIGH)
     points = np.concatenate([_body(*body[0]), _ball(*ball[0])])
@@ -54,7 +55,7 @@ def _unit(turn, down):
 
 
 def _grid(columns, rows, low, high):
-    """((turn, down) of the points, faces, uv): the seam's points are there twice."""
+    """((turn, down) of the points, faces, uv): the seam's points occur twice."""
     u, t = np.meshgrid(np.arange(columns + 1) / columns, np.linspace(0.001, 0.999, rows + 1))
     uv = np.stack([0.02 + 0.96 * u, high + (low - high) * t], axis=-1).reshape(-1, 2)
     row, column = (a.ravel() for a in np.indices((rows, columns)))
@@ -84,7 +85,8 @@ def shots(count=PHOTOS):
 
 def photograph(folder: Path, roughness=ROUGHNESS, metallic=0.0, samples=12):
     """Render all photos into ``folder`` as lit_NN.exr: direct light only. roughness: a number, or
-    an image of (size, size) over the texture."""
+    an image of (size, size) over the texture.
+    """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
@@ -169,7 +171,7 @@ def centres(size):
 
 
 def write_scan(folder: Path, columns=150, rows=75, uv=True, extra="") -> Path:
-    """The coarser mesh, the cameras and the capture file; returns the latter."""
+    """Write the coarser mesh, the cameras and the capture file; return the path of the latter."""
     points, faces, places = surface(columns, rows)
     lines = [f"v {x:.8g} {y:.8g} {z:.8g}" for x, y, z in points]
     if uv:

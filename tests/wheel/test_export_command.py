@@ -1,4 +1,4 @@
-"""`material RESULT --to …`: what is left, exit codes, one line for a mistake, no half files."""
+"""`material RESULT --to …`: output files, exit codes, one-line errors, no partial files."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from tests import make_result as made
 pytestmark = pytest.mark.blender
 
 
-def headless(root: Path, *words: object) -> subprocess.CompletedProcess[str]:
+def headless(root: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, root / "headless.py", "material", *map(str, words)],
+        [sys.executable, root / "headless.py", "material", *map(str, arguments)],
         capture_output=True,
         text=True,
         timeout=300,
@@ -47,9 +47,9 @@ def test_several_formats_at_once(root: Path, result: Path, tmp_path: Path) -> No
         "old_rug.bsdf", "old_rug.xml", "old_rug_spectral.xml", "old_rug_mitsuba.npz",
         "patina_bsdf.py", "render.py",
     }  # fmt: skip
-    told = json.loads((out / "losses.json").read_text("utf-8"))["losses"]
-    assert [loss["format"] for loss in told] == ["binary", "mtlx", "pbrt", "mitsuba"]
-    for loss in told:
+    output = json.loads((out / "losses.json").read_text("utf-8"))["losses"]
+    assert [loss["format"] for loss in output] == ["binary", "mtlx", "pbrt", "mitsuba"]
+    for loss in output:
         assert loss["material"] == "old rug" and loss["errors"]
         assert all((out / file).is_file() for file in loss["files"])
         for what, error in loss["errors"].items():
@@ -58,17 +58,17 @@ def test_several_formats_at_once(root: Path, result: Path, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("arguments", "message"),
     [(["--to", "png"], "invalid choice"), (["--to", "exr", "--material", "gold"], "old rug")],
 )
-def test_wrong_words_are_one_line(root, result, tmp_path, words, message) -> None:
-    done = headless(root, result, *words, "--out", tmp_path / "out")
+def test_invalid_arguments_give_one_line_error(root, result, tmp_path, arguments, message) -> None:
+    done = headless(root, result, *arguments, "--out", tmp_path / "out")
     assert done.returncode == 2
     assert message in done.stderr and len(done.stderr.splitlines()) == 1
     assert not (tmp_path / "out").exists()
 
 
-def test_wrong_places_are_refused_before_any_work(result: Path, tmp_path: Path) -> None:
+def test_invalid_destinations_are_rejected_before_any_work(result: Path, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x")
     for source, out in (
         (tmp_path / "nothing", tmp_path / "out"),
@@ -76,29 +76,29 @@ def test_wrong_places_are_refused_before_any_work(result: Path, tmp_path: Path) 
         (result, tmp_path / "file"),
         (result, result),
     ):
-        told = argparse.Namespace(result=source, to=["binary"], out=out, material=None)
+        output = argparse.Namespace(result=source, to=["binary"], out=out, material=None)
         with pytest.raises(InputError) as caught:
-            material.run(told)
+            material.run(output)
         assert "\n" not in str(caught.value)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file"]
     assert [p.name for p in result.iterdir()] == ["result.json"]
 
 
-def test_a_run_that_dies_leaves_nothing(result: Path, tmp_path: Path, monkeypatch) -> None:
+def test_failed_run_leaves_no_files(result: Path, tmp_path: Path, monkeypatch) -> None:
     def fails(folder: Path, subjects: object) -> None:
         (folder / "half.bsdf").write_bytes(b"half")
         raise OSError("no space left")
 
     monkeypatch.setitem(material_formats.PLAIN, "pbrt", fails)
-    told = argparse.Namespace(
+    output = argparse.Namespace(
         result=result, to=["binary", "pbrt"], out=tmp_path / "out", material=["bronze"]
     )
     with pytest.raises(InputError, match="no space left"):
-        material.run(told)
+        material.run(output)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_blend_holds_assets_that_render(root: Path, result: Path, tmp_path: Path) -> None:
+def test_blend_contains_assets_that_render(root: Path, result: Path, tmp_path: Path) -> None:
     done = headless(root, result, "--to", "blend", "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     import bpy

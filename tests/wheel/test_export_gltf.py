@@ -1,4 +1,4 @@
-"""GLB: valid by the Khronos validator, with the fitted numbers in it."""
+"""GLB export: valid by the Khronos validator, with the fitted parameters in it."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ validator.validateBytes(new Uint8Array(fs.readFileSync(process.argv[1])))
 
 
 def node_modules() -> Path | None:
-    """Where npm put gltf-validator: PATINA_NODE_MODULES, or node/ in the tools' cache."""
-    told = os.environ.get("PATINA_NODE_MODULES")
-    folders = [Path(told)] if told else [cache_dir() / "node" / "node_modules"]
+    """Where npm installed gltf-validator: PATINA_NODE_MODULES, or node/ in the tools' cache."""
+    output = os.environ.get("PATINA_NODE_MODULES")
+    folders = [Path(output)] if output else [cache_dir() / "node" / "node_modules"]
     return next((f for f in folders if (f / "gltf-validator").is_dir()), None)
 
 
@@ -52,7 +52,7 @@ def glb(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out" / "materials.glb"
 
 
-def test_the_khronos_validator_finds_nothing(glb: Path) -> None:
+def test_khronos_validator_reports_no_issues(glb: Path) -> None:
     node, modules = shutil.which("node"), node_modules()
     if node is None or modules is None:
         pytest.skip("node, or the npm package gltf-validator, is not here (PATINA_NODE_MODULES)")
@@ -65,9 +65,9 @@ def test_the_khronos_validator_finds_nothing(glb: Path) -> None:
     assert issues["numErrors"] == issues["numWarnings"] == 0, issues["messages"]
 
 
-def test_the_fitted_numbers_are_in_it(glb: Path) -> None:
-    told = read_glb(glb)
-    materials = {m["name"]: m for m in told["materials"]}
+def test_glb_contains_fitted_parameters(glb: Path) -> None:
+    output = read_glb(glb)
+    materials = {m["name"]: m for m in output["materials"]}
     assert set(materials) == {"bronze", "old rug"}
     bronze = materials["bronze"]["pbrMetallicRoughness"]
     assert bronze["baseColorFactor"][:3] == pytest.approx([0.7, 0.5, 0.3], abs=1e-5)
@@ -80,7 +80,7 @@ def test_the_fitted_numbers_are_in_it(glb: Path) -> None:
     assert coat["clearcoatRoughnessFactor"] == pytest.approx(0.1, abs=1e-5)
     specular = rug["extensions"]["KHR_materials_specular"]
     assert specular["specularFactor"] == pytest.approx(0.8, abs=1e-5)
-    assert len(told["meshes"]) == 2 and not told.get("cameras")
-    worn = {p["material"] for mesh in told["meshes"] for p in mesh["primitives"]}
+    assert len(output["meshes"]) == 2 and not output.get("cameras")
+    worn = {p["material"] for mesh in output["meshes"] for p in mesh["primitives"]}
     assert worn == {0, 1}
-    assert "TEXCOORD_0" in told["meshes"][0]["primitives"][0]["attributes"]
+    assert "TEXCOORD_0" in output["meshes"][0]["primitives"][0]["attributes"]

@@ -1,4 +1,4 @@
-"""Mitsuba 3 renders what we exported, and it is what numpy predicts."""
+"""Exported materials rendered by Mitsuba 3, compared with the prediction by numpy."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Subje
 
 @pytest.fixture(scope="module")
 def llvm(exported: tuple[Path, list[Subject]]) -> bool:
-    """Whether Mitsuba finds an LLVM that it can compile with: with others it aborts."""
+    """Whether Mitsuba finds an LLVM that it can compile with; with other versions it aborts."""
     folder, subjects = exported
     return start(folder, f"{subjects[0].id}.xml", "llvm_ad_rgb", "key", 4, 1).returncode == 0
 
@@ -112,27 +112,27 @@ def check_under_key(exported, variant: str, suffix: str, size: int, spp: int, mo
         expected = within_pixels(subject, size, 0.9)
         found = picture[inside]
         assert np.linalg.norm(found - expected) / np.linalg.norm(expected) < most
-        # light from −x, above: left is left and up is up
+        # light from −x, above: checks left against right and up against down
         assert abs(found.mean() / expected.mean() - 1) < most
 
 
-def test_the_plugin_renders_what_we_predict(exported) -> None:
-    """Within 2 %, all pixels together, under a distant light; the variant that runs anywhere."""
+def test_plugin_rendering_matches_prediction(exported) -> None:
+    """Within 2 % over all pixels, under a distant light; the variant that runs everywhere."""
     check_under_key(exported, "scalar_rgb", "", 16, 100, 0.02)
 
 
-def test_the_fast_variant_agrees(exported, llvm: bool) -> None:
+def test_fast_variant_matches_prediction(exported, llvm: bool) -> None:
     if not llvm:
         pytest.skip("no LLVM that Mitsuba's fast CPU variant can use")
     check_under_key(exported, "llvm_ad_rgb", "", 64, 256, 0.01)
 
 
-def test_mitsubas_own_measured_does_too(exported) -> None:
-    """The tensor file, through wavelengths and back."""
+def test_mitsuba_measured_plugin_matches_prediction(exported) -> None:
+    """The tensor file, converted to wavelengths and back."""
     check_under_key(exported, "scalar_spectral", "_spectral", 32, 256, 0.02)
 
 
-def test_in_a_white_room_the_sampling_agrees(exported, llvm: bool) -> None:
+def test_furnace_albedo_matches_quadrature(exported, llvm: bool) -> None:
     """Directional albedo by Mitsuba's path tracer against a quadrature of the BRDF."""
     folder, subjects = exported
     inside, normal = pixels(8, 0.6)

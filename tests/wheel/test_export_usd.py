@@ -1,4 +1,4 @@
-"""USD: found compliant by USD's own checker, with both kinds of material in it."""
+"""USD export: compliant by USD's own checker, with both kinds of material in it."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from tests import make_result as made
 pytestmark = pytest.mark.blender
 
 # In a process of its own: usd-core and the USD inside bpy are two libraries of one name. Earlier
-# usd-core has the checker that usdchecker was made of, later the validators that it is made of.
-# usd-core knows no MaterialX nodes: those are looked up in MaterialX's own library instead.
+# usd-core versions have the checker behind usdchecker, later ones the validators that it uses.
+# usd-core has no MaterialX nodes: those are looked up in MaterialX's own library instead.
 CHECK = """
 import json, sys
 from pxr import Usd, UsdShade, UsdUtils
@@ -66,7 +66,7 @@ print(json.dumps([checked, said, undefined, found, str(stage.GetDefaultPrim().Ge
 
 
 @pytest.fixture(scope="module")
-def told(root: Path, tmp_path_factory: pytest.TempPathFactory) -> list:
+def check_output(root: Path, tmp_path_factory: pytest.TempPathFactory) -> list:
     if importlib.util.find_spec("pxr") is None:
         pytest.skip("the usd-core package is not installed")
     folder = tmp_path_factory.mktemp("usd")
@@ -84,16 +84,16 @@ def told(root: Path, tmp_path_factory: pytest.TempPathFactory) -> list:
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def test_usdchecker_finds_nothing(told: list) -> None:
-    checked, said, undefined, _, default = told
+def test_usdchecker_reports_no_issues(check_output: list) -> None:
+    checked, expected, undefined, _, default = check_output
     assert checked > 0 and default == "/root"
-    ours = [x for x in said if not (x[0] == "MissingShaderIdInRegistry" and "'ND_" in x[1])]
+    ours = [x for x in expected if not (x[0] == "MissingShaderIdInRegistry" and "'ND_" in x[1])]
     assert ours == []
-    assert not undefined  # None where the MaterialX package is not at hand
+    assert not undefined  # None if the MaterialX package is not installed
 
 
-def test_both_materials_are_in_it(told: list) -> None:
-    found = told[3]
+def test_usd_contains_both_materials(check_output: list) -> None:
+    found = check_output[3]
     assert set(found) == {"bronze", "old_rug"}
     kind, inputs = found["old_rug"][""]
     assert kind == "UsdPreviewSurface"

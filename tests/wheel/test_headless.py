@@ -1,4 +1,4 @@
-"""The command line: results, exit codes, one line for a mistake, nothing half-written."""
+"""The command line: results, exit codes, one-line errors, no partial files."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from tests import make_capture as made
 pytestmark = pytest.mark.blender
 
 
-def headless(root: Path, *words: object) -> subprocess.CompletedProcess[str]:
+def headless(root: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, root / "headless.py", *map(str, words)],
+        [sys.executable, root / "headless.py", *map(str, arguments)],
         capture_output=True,
         text=True,
         timeout=300,
@@ -46,7 +46,7 @@ def fitted(root: Path, ball: Path) -> Path:
     return out
 
 
-def test_fit_leaves_what_design_lists_and_nothing_else(fitted: Path) -> None:
+def test_fit_writes_exactly_the_documented_files(fitted: Path) -> None:
     names = {p.name for p in fitted.iterdir()}
     exr = {
         name
@@ -59,7 +59,7 @@ def test_fit_leaves_what_design_lists_and_nothing_else(fitted: Path) -> None:
     assert (fitted / "report" / "notes.txt").read_text() == "kept"
 
 
-def test_the_binary_is_the_coefficients(fitted: Path) -> None:
+def test_binary_file_holds_brdf_of_coefficients(fitted: Path) -> None:
     said = json.loads((fitted / "result.json").read_text())
     coefficients = np.array(said["materials"][0]["coefficients"])
     assert said["basis"]["version"] == default_basis().version
@@ -75,7 +75,7 @@ def test_the_binary_is_the_coefficients(fitted: Path) -> None:
     assert np.allclose(table.values[:, ih, idx, ip], expected, rtol=1e-4)
 
 
-def test_the_blend_opens_with_everything_in_place(fitted: Path) -> None:
+def test_blend_opens_with_complete_scene(fitted: Path) -> None:
     import bpy
 
     bpy.ops.wm.open_mainfile(filepath=str(fitted / "scene.blend"))
@@ -90,7 +90,9 @@ def test_the_blend_opens_with_everything_in_place(fitted: Path) -> None:
     assert "Patina result" in bpy.data.texts
 
 
-def test_same_input_same_coefficients(root: Path, ball: Path, fitted: Path, tmp_path: Path) -> None:
+def test_same_input_gives_same_coefficients(
+    root: Path, ball: Path, fitted: Path, tmp_path: Path
+) -> None:
     done = headless(root, "fit", ball, "--out", tmp_path / "again")
     assert done.returncode == 0
     assert (tmp_path / "again" / "surface.binary").read_bytes() == (
@@ -106,7 +108,7 @@ def test_same_input_same_coefficients(root: Path, ball: Path, fitted: Path, tmp_
         (('name = "lamp1"', 'nme = "lamp1"'), r"\[light 1\.name\].*missing"),
     ],
 )
-def test_a_mistake_is_one_line_and_leaves_nothing(
+def test_user_error_is_one_line_and_leaves_no_files(
     root: Path, ball: Path, tmp_path: Path, change: tuple[str, str], message: str
 ) -> None:
     broken = ball.with_name("broken.capture.toml")
@@ -121,7 +123,9 @@ def test_a_mistake_is_one_line_and_leaves_nothing(
     assert sorted(p.name for p in ball.parent.iterdir()) == before
 
 
-def test_truncated_binary_and_wrong_usage(root: Path, fitted: Path, tmp_path: Path) -> None:
+def test_truncated_binary_and_wrong_usage_are_rejected(
+    root: Path, fitted: Path, tmp_path: Path
+) -> None:
     short = tmp_path / "short.binary"
     short.write_bytes((fitted / "surface.binary").read_bytes()[:-9])
     done = headless(root, "compare", short, fitted / "surface.binary")
@@ -132,7 +136,7 @@ def test_truncated_binary_and_wrong_usage(root: Path, fitted: Path, tmp_path: Pa
     assert wrong.returncode == 2
 
 
-def test_compare_of_equals_is_zero(root: Path, fitted: Path) -> None:
+def test_compare_of_equal_files_is_zero(root: Path, fitted: Path) -> None:
     done = headless(root, "compare", fitted / "surface.binary", fitted / "surface.binary")
     assert done.returncode == 0 and done.stdout.count("0.0000") == 3
 
@@ -151,7 +155,7 @@ def test_import_of_genuine_models_without_a_mesh(root: Path, shared: Path, tmp_p
         assert f"{count} cameras" in done.stdout
 
 
-def test_a_distorted_scan_takes_its_photos_along(root: Path, tmp_path: Path) -> None:
+def test_distorted_scan_imports_rectified_photos(root: Path, tmp_path: Path) -> None:
     path = made.make_capture(tmp_path / "ball", photos=2)
     lens = [made.FOCAL, *made.PRINCIPAL, -0.05]
     made.write_colmap(path.parent / "sparse", 2, model="SIMPLE_RADIAL", params=lens)
@@ -162,7 +166,7 @@ def test_a_distorted_scan_takes_its_photos_along(root: Path, tmp_path: Path) -> 
     assert [name[:16] for name in found] == ["lit_1_rectified_", "lit_2_rectified_"]
 
 
-def test_unsolved_mask_error_names_the_material(root: Path, ball: Path, tmp_path: Path) -> None:
+def test_mask_error_names_material(root: Path, ball: Path, tmp_path: Path) -> None:
     text = ball.read_text().replace(
         'light = "lamp1"\n', 'light = "lamp1"\nmasks = {tin = "m.png"}\n', 1
     )
@@ -174,7 +178,7 @@ def test_unsolved_mask_error_names_the_material(root: Path, ball: Path, tmp_path
     assert not (tmp_path / "out").exists()
 
 
-def test_a_flat_table_compares_as_known(root: Path, tmp_path: Path) -> None:
+def test_compare_of_constant_table_gives_known_error(root: Path, tmp_path: Path) -> None:
     for name, value in (("a", 0.4), ("b", 0.5)):
         flat = TabulatedBRDF.from_function(lambda x, v=value: np.full((len(x.theta_h), 3), v))
         merl_file.write(tmp_path / f"{name}.binary", flat)

@@ -1,5 +1,6 @@
-"""The capture's lights as lamps: Cycles gives a white matte sphere the radiance E·cos θ/π that
-core predicts, and where a lamp stands is where the light was."""
+"""The capture's lights as Blender lamps: Cycles gives a white diffuse sphere the radiance E·cos θ/π
+that core predicts, and each lamp stands at the light's position.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ EYE = np.array([0.9, -0.7, 2.1])
 
 
 def _camera(eye: np.ndarray = EYE) -> Camera:
-    """Looks past the sphere's middle: a beam's axis is not the line to the centre."""
+    """Looks past the sphere's centre: a beam's axis is not the line to the centre."""
     rotation, translation = look_at(eye + ORIGIN, np.array([0.3, 0.2, 0.1]) + ORIGIN)
     return Camera(
         "a", 400, 300, "SIMPLE_PINHOLE", (500.0, 200.0, 150.0), Pose(rotation, translation)
@@ -35,7 +36,7 @@ def _camera(eye: np.ndarray = EYE) -> Camera:
 
 
 def _rendered(light: Light, folder: Path, samples: int = 1) -> np.ndarray:
-    """The unit sphere, white and matte, under a light's lamp; (h, w, 3) radiance."""
+    """The white diffuse unit sphere under a light's lamp; (h, w, 3) radiance."""
     sphere = cycles_sphere.new_scene(size=48, samples=samples)
     scene = bpy.context.scene
     scene.cycles.max_bounces = 0
@@ -78,11 +79,11 @@ LIGHTS = [
 
 
 @pytest.mark.parametrize("light", LIGHTS, ids=lambda light: light.name)
-def test_cycles_gives_the_irradiance_that_core_predicts(light: Light, tmp_path: Path) -> None:
+def test_cycles_irradiance_matches_core(light: Light, tmp_path: Path) -> None:
     image = _rendered(light, tmp_path)
     radiance, lit = _predicted(light)
     assert lit.sum() > 300
-    assert radiance[lit].max() > 1.5 * radiance[lit].min()  # or any constant would pass
+    assert radiance[lit].max() > 1.5 * radiance[lit].min()  # otherwise any constant would pass
     error = np.abs(image[lit] / radiance[lit] - 1)
     print(f"{light.name}: largest {error.max():.5f}, median {np.median(error):.6f}")
     assert error.max() < 0.01
@@ -97,13 +98,15 @@ SOFT = [
 
 
 @pytest.mark.parametrize("light", SOFT, ids=lambda light: light.name)
-def test_a_source_with_a_size_gives_the_same_where_all_of_it_is_seen(
+def test_extended_source_gives_same_irradiance_where_fully_visible(
     light: Light, tmp_path: Path
 ) -> None:
-    """A ball that shines alike all over gives I/d² whatever its radius."""
+    """A ball of uniform radiance gives I/d² whatever its radius."""
     image = _rendered(light, tmp_path, samples=64)
     radiance, lit = _predicted(light)
-    lit &= cycles_sphere.normals()[0][..., 2] > 0.5  # several rays a pixel: none over the edge
+    lit &= (
+        cycles_sphere.normals()[0][..., 2] > 0.5
+    )  # several rays per pixel: exclude pixels at the edge
     ratio = image[lit].sum() / radiance[lit].sum()
     print(f"{light.name}: {ratio:.5f}")
     assert abs(ratio - 1) < 0.002
@@ -115,8 +118,8 @@ def test_a_source_with_a_size_gives_the_same_where_all_of_it_is_seen(
 
 
 @pytest.mark.parametrize("far", [0.0, 4_000_000.0])
-def test_a_flash_stands_where_its_camera_had_it(far: float) -> None:
-    """On every camera, also of a georeferenced scan, also after the artist took it off."""
+def test_flash_lamp_is_at_its_camera_offset(far: float) -> None:
+    """On every camera, also of a georeferenced scan, also after the user unparented it."""
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     scene, origin = bpy.context.scene, np.array([far, -far / 8, 40.0])
     light = MountedLight("flash", np.array([0.31, -0.17, 0.05]), COLOUR, beam=0.6)

@@ -53,7 +53,7 @@ def node():
 
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("light", [(0.6, 0.2, 0.77), (-0.9, 0.3, 0.25)], ids=["front", "side"])
-def test_the_group_is_what_cycles_renders(node, case, light, tmp_path):
+def test_node_group_matches_cycles_rendering(node, case, light, tmp_path):
     light = np.array(light) / np.linalg.norm(light)
     lamp = cycles_sphere.sun(light, 2.0)
     stack = CASES[case]
@@ -63,7 +63,7 @@ def test_the_group_is_what_cycles_renders(node, case, light, tmp_path):
     cycles_sphere.assert_is(image, stack, light, 2.0)
 
 
-def test_the_group_is_made_once(node):
+def test_node_group_is_created_once(node):
     tree = bpy.data.materials.new("second").node_tree
     if tree is None:
         pytest.skip("materials without nodes")
@@ -72,7 +72,7 @@ def test_the_group_is_made_once(node):
     assert sum(group.name.startswith(NAME) for group in bpy.data.node_groups) == 1
 
 
-def test_a_material_has_the_stack_for_eevee_and_the_principled_for_exports():
+def test_material_has_lobe_stack_for_eevee_and_principled_for_export():
     evaluate = CASES["glossy"].evaluate
     fit, lobes = fit_principled(evaluate), fit_lobe_stack(evaluate, most=1)
     brdf = PrincipalBRDF(default_basis(), np.zeros((3, 5)))

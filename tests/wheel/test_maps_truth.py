@@ -1,4 +1,4 @@
-"""Maps of a painted surface photographed by Cycles, against the paint."""
+"""Maps of a painted surface photographed by Cycles, compared with the painted values."""
 
 from __future__ import annotations
 
@@ -27,16 +27,18 @@ from tests.wheel import maps_scene  # noqa: E402
 SIZE = 256
 
 
-def headless(root: Path, *words: object) -> subprocess.CompletedProcess[str]:
+def headless(root: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, root / "headless.py", *map(str, words)],
+        [sys.executable, root / "headless.py", *map(str, arguments)],
         capture_output=True, text=True, timeout=600,
     )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def painted(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the capture and its photos, the result of its fit in "fit", maps in "maps"."""
+    """A folder with the capture and its photos, the result of its fit in "fit", and the maps in
+    "maps".
+    """
     folder = tmp_path_factory.mktemp("painted")
     maps_scene.photograph(folder)
     capture = maps_scene.write_scan(folder)
@@ -51,7 +53,7 @@ def painted(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def made(folder: Path, capture: str = "painted.capture.toml", size: int = SIZE, **more):
-    """Maps by the fit without paint that the command left."""
+    """Maps by the fit on paint-corrected samples that the command saved."""
     fitted = read_result(folder / "maps")
     job = MapsJob(read_capture(folder / capture), fitted, MapsSettings(size, refits=0), **more)
     job.drain()
@@ -65,7 +67,7 @@ def result(painted: Path):
 
 
 def resolved(texels) -> np.ndarray:
-    """(n,) texels away from the poles, where the paint is finer than any photo's pixels."""
+    """(n,) texels away from the poles, where the paint is finer than the pixels of any photo."""
     _, v = maps_scene.centres(texels.size)
     v = v.ravel()[texels.place]
     ball = v > maps_scene.BALL_LOW
@@ -83,9 +85,10 @@ def relative_rms(found, expected) -> float:
     return float(np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2)))
 
 
-def looked_at(scan, texels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """((photos, n) cos θi where the camera sees the texel, else 0; (photos, n) whether something
-    else shades it; (n, 3) points), without the code under test."""
+def visibility(scan, texels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """((photos, n) cos θi where the camera sees the texel, else 0; (photos, n) whether another part
+    shadows it; (n, 3) points), computed without the code under test.
+    """
     rays = RayScene.build(scan.mesh)
     points, normals = texels.points(scan.mesh, slice(None)), texels.normals(scan.mesh, slice(None))
     start = points + 2e-3 * normals
@@ -103,8 +106,8 @@ def looked_at(scan, texels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.array(cosine), np.array(shaded), points
 
 
-def plain_way(folder: Path, points, cosine) -> np.ndarray:
-    """(n, 3) mean of π L / (E cos θi) over the photos that see a texel turned to the light."""
+def naive_albedo(folder: Path, points, cosine) -> np.ndarray:
+    """(n, 3) mean of π L / (E cos θi) over the photos that see a texel facing the light."""
     total, count = np.zeros((len(points), 3)), np.zeros(len(points))
     for i, (rotation, translation, _) in enumerate(maps_scene.shots()):
         here = points @ rotation.T + translation
@@ -119,19 +122,19 @@ def plain_way(folder: Path, points, cosine) -> np.ndarray:
     return total / np.maximum(count, 1)[:, None]
 
 
-def test_the_base_colour_is_the_paint(painted, result):
+def test_base_colour_matches_painted_colour(painted, result):
     expected, found = truth(result.texels), base_color(result, 0)
     well = (result.maps.photos >= 3) & resolved(result.texels)
     assert well.mean() > 0.25
     error = relative_rms(found[well], expected[well])
-    cosine, _, points = looked_at(result.scan, result.texels)
-    plain = relative_rms(plain_way(painted, points, cosine)[well], expected[well])
+    cosine, _, points = visibility(result.scan, result.texels)
+    plain = relative_rms(naive_albedo(painted, points, cosine)[well], expected[well])
     print(f"base colour {error:.4f}, plain way {plain:.4f}, well-seen {well.mean():.2f}")
     assert error < 0.05
     assert plain > 3 * error
 
 
-def test_the_fit_without_paint_predicts_what_the_first_could_not(painted):
+def test_fit_on_paint_corrected_samples_predicts_better(painted):
     first, again = (
         json.loads((painted / name / "result.json").read_text())["materials"][0]["held_out"]
         for name in ("fit", "maps")
@@ -139,28 +142,28 @@ def test_the_fit_without_paint_predicts_what_the_first_could_not(painted):
     assert first["typical"] > 0.2 > 4 * again["typical"]
 
 
-def test_the_error_told_is_the_error_made(result):
+def test_stated_error_matches_actual_error(result):
     expected, found = truth(result.texels), base_color(result, 0)
     level = expected.mean(axis=1)
     off = np.abs(found.mean(axis=1) - level) / level
     well = (result.maps.photos >= 2) & resolved(result.texels)
-    # nine of ten within twice what is told, and what is told is no mere caution
+    # nine of ten errors within twice the stated one, and the stated error is not overcautious
     assert np.quantile(off[well] / result.maps.error[well], 0.9) < 2.0
     assert np.median(result.maps.error[well]) < 4 * np.median(off[well])
-    unseen = result.maps.photos == 0
-    assert np.median(result.maps.error[unseen]) > 2 * np.median(result.maps.error[well])
+    unobserved = result.maps.photos == 0
+    assert np.median(result.maps.error[unobserved]) > 2 * np.median(result.maps.error[well])
 
 
-def test_shadows_of_another_part_are_not_baked_in(painted, result):
-    cosine, shaded, points = looked_at(result.scan, result.texels)
+def test_cast_shadows_are_not_baked_in(painted, result):
+    cosine, shaded, points = visibility(result.scan, result.texels)
     facing = cosine > 0.2
     cast = (facing & shaded).sum(axis=0) >= 1
     still = (facing & ~shaded).sum(axis=0) >= 2
     some = cast & still & (result.maps.photos >= 2) & resolved(result.texels)
     assert some.sum() > 300
     expected, found = truth(result.texels)[some], base_color(result, 0)[some]
-    plain = plain_way(painted, points, cosine)[some]
-    # a baked shadow is a bias to the dark; the paint's own average is kept
+    plain = naive_albedo(painted, points, cosine)[some]
+    # a baked shadow is a dark bias; the mean of the paint is kept
     assert abs(found.mean() / expected.mean() - 1) < 0.03
     assert plain.mean() / expected.mean() < 0.93
     assert relative_rms(found, expected) < 0.07
@@ -182,7 +185,7 @@ def test_highlights_are_not_baked_in(painted, result):
     assert abs(found.mean() / expected.mean() - 1) < 0.04
 
 
-def test_every_size_says_the_same(painted, result):
+def test_texture_sizes_agree(painted, result):
     fine = made(painted, size=2 * SIZE)
     image = fine.texels.image(base_color(fine, 0))
     seen = fine.texels.image(fine.maps.photos >= 3)
@@ -192,14 +195,14 @@ def test_every_size_says_the_same(painted, result):
     assert relative_rms(own[whole], coarse[whole]) < 0.03
 
 
-def test_the_command_leaves_maps_and_a_scene_that_wears_them(painted):
+def test_command_writes_maps_and_scene_that_uses_them(painted):
     out = painted / "maps"
-    told = json.loads((out / "maps.json").read_text())
-    for file in told["files"]:
+    stated = json.loads((out / "maps.json").read_text())
+    for file in stated["files"]:
         assert (out / file["file"]).is_file()
-    names = {f["file"] for f in told["files"]}
+    names = {f["file"] for f in stated["files"]}
     assert {"surface_base_color.png", "surface_roughness.png", "coverage.png"} <= names
-    assert 0.4 < told["seen"] <= 1 and told["materials"][0]["varies"] == "its diffuse part"
+    assert 0.4 < stated["seen"] <= 1 and stated["materials"][0]["varies"] == "its diffuse part"
     bpy.ops.wm.open_mainfile(filepath=str(out / "scene.blend"))
     material = bpy.data.materials["surface"]
     shader = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
@@ -217,7 +220,7 @@ def test_the_command_leaves_maps_and_a_scene_that_wears_them(painted):
     assert np.abs(uv - wanted).max() < 1e-4
 
 
-def test_a_mesh_without_coordinates_is_unwrapped(painted):
+def test_mesh_without_texture_coordinates_is_unwrapped(painted):
     from patina.scene.scan.unwrap import unwrapped
 
     text = (painted / "painted.capture.toml").read_text()
@@ -229,7 +232,8 @@ def test_a_mesh_without_coordinates_is_unwrapped(painted):
         made(painted, "bare.capture.toml")
     found = made(painted, "bare.capture.toml", size=512, unwrap=unwrapped)
     assert found.unwrapped and found.texels.overlapped < 0.01 * len(found.texels)
-    # the paint at the same surface points, by the nearest texel of the mesh's own coordinates
+    # the painted colour at the same surface points, by the nearest texel of the mesh's own
+    # coordinates
     own = capture_data.open_scan(read_capture(painted / "painted.capture.toml"))
     texels = rasterise(own.mesh, 1024)
     from scipy.spatial import cKDTree
@@ -240,7 +244,7 @@ def test_a_mesh_without_coordinates_is_unwrapped(painted):
     assert relative_rms(base_color(found, 0)[well], truth(texels)[near]) < 0.06
 
 
-def test_a_result_of_another_capture_is_refused(painted):
+def test_result_of_another_capture_is_rejected(painted):
     text = (painted / "painted.capture.toml").read_text()
     other = painted / "other.capture.toml"
     other.write_text(text + '\n[[material]]\nname = "gold"\n')
@@ -248,7 +252,7 @@ def test_a_result_of_another_capture_is_refused(painted):
         made(painted, "other.capture.toml")
 
 
-def test_what_is_written_is_what_was_found(result, tmp_path):
+def test_written_images_match_estimates(result, tmp_path):
     import OpenImageIO as oiio
 
     files = write_maps(tmp_path, result, "exr")

@@ -1,4 +1,4 @@
-"""Proposed materials and shadow masks as the artist meets them, and a fit that heeds both."""
+"""Proposed materials and shadow masks as a user meets them in Blender, and a fit that uses both."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def truth(mesh) -> np.ndarray:
     return halves(away / np.linalg.norm(away, axis=1, keepdims=True))
 
 
-def test_proposed_materials_are_slots_and_the_fit_takes_them(scene) -> None:
+def test_proposed_materials_become_slots_used_by_fit(scene) -> None:
     mesh = scene.patina.mesh
     assert bpy.ops.patina.propose_materials() == {"FINISHED"}
     found, true = slots(mesh), truth(mesh)
@@ -71,12 +71,12 @@ def test_proposed_materials_are_slots_and_the_fit_takes_them(scene) -> None:
     attribute.data.foreach_get("value", stored)
     assert attribute.domain == "FACE" and np.array_equal(stored, found)
 
-    # again: the same slots, no second set of stand-ins
+    # again: the same slots, no second set of placeholder materials
     before = len(bpy.data.materials)
     assert bpy.ops.patina.propose_materials(count=2) == {"FINISHED"}
     assert len(bpy.data.materials) == before
 
-    # repaint: every face to what it really is, in Edit Mode, and give a slot another name
+    # repaint: assign every face its true material in Edit Mode, and rename a slot
     mesh.data.polygons.foreach_set("material_index", true.astype(np.int32))
     mesh.data.materials[0].name = "red/gold"
     scene.patina.use_slots = True
@@ -87,19 +87,19 @@ def test_proposed_materials_are_slots_and_the_fit_takes_them(scene) -> None:
     assert np.array_equal(slots(mesh), true)
     from patina.scene.session.scene_properties import capture_path, stored_result
 
-    said = stored_result(capture_path(scene))
-    assert [m["name"] for m in said["materials"]] == ["red_gold", "material_2"]
+    message = stored_result(capture_path(scene))
+    assert [m["name"] for m in message["materials"]] == ["red_gold", "material_2"]
 
-    # a second fit keeps the names, though the slots wear measured materials now
+    # a second fit keeps the names, although the slots now have measured materials
     assert bpy.ops.patina.fit() == {"FINISHED"}
     again = stored_result(capture_path(scene))
     assert [m["name"] for m in again["materials"]] == ["red_gold", "material_2"]
     assert json.dumps(again["materials"][0]["coefficients"]) == json.dumps(
-        said["materials"][0]["coefficients"]
+        message["materials"][0]["coefficients"]
     )
 
 
-def test_without_consent_slots_are_not_fitted(scene) -> None:
+def test_slots_are_not_fitted_without_consent(scene) -> None:
     from patina.core.capture import read_capture
     from patina.scene.scan.face_slots import with_painted_slots
 
@@ -110,7 +110,7 @@ def test_without_consent_slots_are_not_fitted(scene) -> None:
         bpy.ops.patina.fit()
 
 
-def test_a_mesh_that_was_cut_is_refused(scene) -> None:
+def test_edited_mesh_is_rejected(scene) -> None:
     import bmesh
 
     mesh = scene.patina.mesh
@@ -127,7 +127,7 @@ def test_a_mesh_that_was_cut_is_refused(scene) -> None:
         bpy.ops.patina.fit()
 
 
-def test_painted_shadow_masks_reach_the_fit(scene) -> None:
+def test_painted_shadow_masks_are_used_by_fit(scene) -> None:
     from patina.core.capture import read_capture
     from patina.core.photo import read_mask
     from patina.scene.paint.mask_images import shadow_images, with_mask_images
@@ -141,7 +141,7 @@ def test_painted_shadow_masks_reach_the_fit(scene) -> None:
     pixels = np.empty(image.size[0] * image.size[1] * image.channels, np.float32)
     image.pixels.foreach_get(pixels)
     assert pixels.max() > 0.99 and (pixels == 0).any()
-    pixels[:] = 1.0  # the artist paints all of it
+    pixels[:] = 1.0  # the user paints all of it
     image.pixels.foreach_set(pixels)
     image.update()
     with pytest.raises(RuntimeError, match="already"):
@@ -155,7 +155,7 @@ def test_painted_shadow_masks_reach_the_fit(scene) -> None:
     assert bpy.ops.patina.shadow_masks(replace=True) == {"FINISHED"}
     assert not read_mask(file).all()
     assert len(shadow_images(str(Path(path).resolve()))) == 5
-    file.unlink()  # the .blend holds it
+    file.unlink()  # the .blend contains it
     again = with_mask_images(read_capture(Path(path)))
     assert not read_mask(again.photos[0].masks["shadow"]).all()
     bpy.data.images.remove(images[1])
@@ -163,11 +163,11 @@ def test_painted_shadow_masks_reach_the_fit(scene) -> None:
 
 
 def test_headless_masks_then_import(root: Path, two_coloured: Path, tmp_path: Path) -> None:
-    """One line for a mistake, masks and a capture file else."""
+    """A one-line message for a mistake; otherwise masks and a capture file."""
 
-    def headless(*words: object) -> subprocess.CompletedProcess[str]:
+    def headless(*arguments: object) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
-            [sys.executable, root / "headless.py", *map(str, words)],
+            [sys.executable, root / "headless.py", *map(str, arguments)],
             capture_output=True, text=True, timeout=300,
         )  # fmt: skip
 

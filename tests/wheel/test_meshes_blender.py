@@ -1,4 +1,4 @@
-"""A scan's mesh in Blender: texture coordinates, colours and face attributes come with it."""
+"""A scan's mesh in Blender keeps its texture coordinates, colours and face attributes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def column(items, name: str, width: int, kind=np.float32) -> np.ndarray:
     return values.reshape(len(items), width)
 
 
-def test_everything_a_file_holds_arrives(tmp_path: Path) -> None:
+def test_all_mesh_data_is_imported(tmp_path: Path) -> None:
     vertices, faces = sphere_mesh(2)
     rng = np.random.default_rng(3)
     colours = rng.integers(0, 256, (len(vertices), 3))
@@ -59,15 +59,15 @@ def test_everything_a_file_holds_arrives(tmp_path: Path) -> None:
     assert (column(data.polygons, "material_index", 1, np.int32) == 0).all()
 
 
-def test_a_bare_mesh_stays_bare() -> None:
+def test_mesh_without_attributes_gets_none() -> None:
     vertices, faces = sphere_mesh(1)
     data = in_blender(Mesh(vertices, faces.astype(np.int32)), np.zeros(3))
     assert not data.uv_layers and not data.color_attributes
     assert len(data.polygons) == len(faces)
 
 
-def test_names_that_are_blenders_own() -> None:
-    """An attribute of a file must not turn into one that Blender gives a meaning."""
+def test_attribute_names_reserved_by_blender() -> None:
+    """A file's attribute must not become one to which Blender gives a meaning."""
     vertices, faces = sphere_mesh(1)
     mesh = Mesh(vertices, faces.astype(np.int32))
     values = np.arange(len(faces), dtype=np.int32)
@@ -87,7 +87,7 @@ def test_names_that_are_blenders_own() -> None:
 
 
 def test_shading_is_smooth_across_seams(tmp_path: Path) -> None:
-    """A GLB repeats vertices along seams; in Blender the surface has none."""
+    """A GLB repeats vertices along seams; the surface in Blender has none."""
     vertices, faces = sphere_mesh(3)
     split = vertices[faces].reshape(-1, 3)
     path = tmp_path / "m.glb"

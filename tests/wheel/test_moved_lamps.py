@@ -1,4 +1,4 @@
-"""What an artist does to the lamps, and which light the next fit then takes."""
+"""Edits of lamps by the user, and which light the next fit uses."""
 
 from __future__ import annotations
 
@@ -67,7 +67,9 @@ class Built:
 
 
 def _build(folder: Path, far: np.ndarray, known: bool = True) -> Built:
-    """Four photos, each under a light of another kind; the scan ``far`` away."""
+    """Four photos, each under a light of another kind; the scan at distance ``far`` from the
+    origin.
+    """
     path = made.make_capture(folder, photos=4)
     made.write_png(folder / "white.png", np.full((made.HEIGHT, made.WIDTH), 255))
     head, tail = path.read_text().split("[[light]]", 1)
@@ -77,7 +79,9 @@ def _build(folder: Path, far: np.ndarray, known: bool = True) -> Built:
     body = TEXT % tuple(float(x) for x in AT + far)
     path.write_text(f"{head}{body}\n\n{photos}")
     capture = read_capture(path)
-    if not known:  # a file may not mix near and distant lights so, for want of a common scale
+    if (
+        not known
+    ):  # a file may not mix near and distant lights in this way, because they have no common scale
         bare = (replace(light, strength=None, white=None) for light in capture.lights)
         capture = replace(capture, lights=tuple(bare))
     scan = capture_data.open_scan(capture)
@@ -102,8 +106,8 @@ def _build(folder: Path, far: np.ndarray, known: bool = True) -> Built:
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     scene = bpy.context.scene
     built = create_scan_collection(scene, capture, scan, found, folder / "rectified")
-    stood = [built.cameras[photo.camera] for photo in capture.photos]
-    return Built(capture, scene, built.lamps, stood, built.mesh, scan)
+    position = [built.cameras[photo.camera] for photo in capture.photos]
+    return Built(capture, scene, built.lamps, position, built.mesh, scan)
 
 
 @pytest.fixture(params=FAR, ids=["here", "far"])
@@ -113,7 +117,7 @@ def built(request, tmp_path: Path) -> Built:
 
 @pytest.fixture(autouse=True, scope="module")
 def listed_photos() -> Iterator[None]:
-    """A scan's collection fills the scene's list of photos, which the add-on brings along."""
+    """A scan's collection fills the scene's list of photos, which the add-on registers."""
     photo_list.register()
     yield
     photo_list.unregister()
@@ -125,8 +129,8 @@ def _step_through(built: Built) -> None:
         bpy.context.view_layer.update()
 
 
-def test_nobody_touched_them(built: Built, tmp_path: Path) -> None:
-    """Rounding is no drag: not by stepping through the photos, not by a saved file."""
+def test_untouched_lamps_keep_their_lights(built: Built, tmp_path: Path) -> None:
+    """Rounding is not an edit: neither after stepping through the photos, nor in a saved file."""
     assert built.now()[1] == []
     _step_through(built)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "x.blend"))
@@ -136,7 +140,7 @@ def test_nobody_touched_them(built: Built, tmp_path: Path) -> None:
     assert all(a is b for a, b in zip(entries.lights, built.capture.lights, strict=True))
 
 
-def test_a_lamp_is_where_the_light_was(built: Built) -> None:
+def test_lamp_is_at_light_position(built: Built) -> None:
     _step_through(built)
     origin = _origin(built)
     assert np.allclose(np.array(built.lamps["lamp"].matrix_world.translation) + origin,
@@ -156,13 +160,13 @@ def _origin(built: Built) -> np.ndarray:
 
 
 @pytest.mark.parametrize("update", [True, False])
-def test_what_is_dragged_is_taken(built: Built, update: bool) -> None:
+def test_dragged_lamp_is_used(built: Built, update: bool) -> None:
     """update: as in the window, where Blender has evaluated the drag, or at once in a script."""
     lamps = built.lamps
     towards = np.array([0.1, -0.7, 0.5]) / np.linalg.norm([0.1, -0.7, 0.5])
-    lamps["sun"].rotation_mode = "XYZ"  # artists do
+    lamps["sun"].rotation_mode = "XYZ"  # users do this
     lamps["sun"].rotation_euler = Vector(towards).to_track_quat("Z", "Y").to_euler()
-    lamps["sun"].location = (9, 9, 9)  # means nothing
+    lamps["sun"].location = (9, 9, 9)  # has no meaning
     lamps["lamp"].location = lamps["lamp"].location + Vector((0.5, 0, 0.25))
     lamps["flash"].location = (0.1, 0.2, -0.3)
     if update:
@@ -173,7 +177,7 @@ def test_what_is_dragged_is_taken(built: Built, update: bool) -> None:
     assert np.allclose(now["sun"].direction, towards, atol=1e-6)
     assert now["sun"].sun is None and now["sun"].sphere is None
     assert now["sun"].white is old["sun"].white and now["sun"].strength is None
-    assert np.isclose(now["sun"].angle, 2 * 0.00465, rtol=1e-5)  # still as wide as the sun
+    assert np.isclose(now["sun"].angle, 2 * 0.00465, rtol=1e-5)  # still has the sun's angular size
     moved = now["lamp"].position - old["lamp"].position
     assert np.allclose(moved, (0.5, 0, 0.25), atol=1e-6, rtol=0)
     assert now["lamp"].strength is old["lamp"].strength and now["lamp"].radius == 0.1
@@ -181,14 +185,14 @@ def test_what_is_dragged_is_taken(built: Built, update: bool) -> None:
     assert now["ball"] is old["ball"]
 
 
-def test_a_flash_dragged_on_one_camera_goes_with_all(built: Built) -> None:
+def test_flash_dragged_on_one_camera_moves_on_all(built: Built) -> None:
     lamps.shine_only(built.scene, built.cameras[3])
     built.lamps["flash"].location = (0.1, 0.2, -0.3)
     _step_through(built)
     assert np.allclose(built.now()[0]["flash"].mounted, (0.1, -0.2, 0.3), atol=1e-6)
 
 
-def test_strength_and_size_by_hand(built: Built) -> None:
+def test_edited_strength_and_size_are_used(built: Built) -> None:
     lamps = built.lamps
     lamps["sun"].data.energy *= 2
     lamps["lamp"].data.color = (1.0, 0.5, 0.25)
@@ -206,15 +210,15 @@ def test_strength_and_size_by_hand(built: Built) -> None:
         built.now()
 
 
-def test_an_unknown_strength_stays_unknown(tmp_path: Path) -> None:
+def test_unknown_strength_stays_unknown(tmp_path: Path) -> None:
     built = _build(tmp_path, FAR[0], known=False)
     for lamp in built.lamps.values():
         lamp.data.energy *= 3
     assert built.now()[1] == []
 
 
-def test_the_whole_scan_set_upright_moves_no_lamp(built: Built) -> None:
-    """Mesh, cameras and lamps turned and scaled together, by a parent or each; then a drag."""
+def test_transform_of_whole_scan_changes_no_light(built: Built) -> None:
+    """Mesh, cameras and lamps transformed together, by a parent or one by one; then a drag."""
     _step_through(built)
     turn = Matrix.Translation((1, 2, 3)) @ Matrix.Rotation(1.1, 4, "X") @ Matrix.Scale(0.5, 4)
     for thing in [*built.cameras, built.mesh, *built.lamps.values()]:
@@ -230,12 +234,12 @@ def test_the_whole_scan_set_upright_moves_no_lamp(built: Built) -> None:
     assert np.allclose(moved, (0.5, 0, 0), atol=1e-5)
 
 
-def test_the_mesh_put_aside_moves_no_lamp(built: Built) -> None:
+def test_moved_mesh_changes_no_light(built: Built) -> None:
     built.mesh.matrix_world = Matrix.Translation((5, 0, 0)) @ Matrix.Rotation(0.3, 4, "Z")
     assert built.now()[1] == []
 
 
-def test_odd_things_do_not_crash(built: Built) -> None:
+def test_unusual_edits_do_not_crash(built: Built) -> None:
     lamps, scene = built.lamps, built.scene
     copy = lamps["lamp"].copy()
     copy.data = copy.data.copy()
@@ -243,7 +247,7 @@ def test_odd_things_do_not_crash(built: Built) -> None:
     lamps["lamp"].users_collection[0].objects.link(copy)
     assert built.now()[1] == []  # the copy is not the light
     bpy.data.objects.remove(lamps["lamp"])
-    assert built.now()[1] == ["lamp"]  # now it is
+    assert built.now()[1] == ["lamp"]  # now it is the light
     _step_through(built)
     lamps["sun"].data.type = "AREA"
     lamps["ball"].scale = (0, 0, 0)
@@ -267,7 +271,7 @@ def test_odd_things_do_not_crash(built: Built) -> None:
     assert built.now()[1] == []
 
 
-def test_what_was_saved_counts_as_made(built: Built) -> None:
+def test_saved_lights_are_the_new_reference(built: Built) -> None:
     lamps = built.lamps
     lamps["lamp"].location = (1, 2, 3)
     lamps["flash"].location = (0.1, 0.2, -0.3)

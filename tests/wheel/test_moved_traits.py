@@ -1,4 +1,4 @@
-"""A measured material whose traits an artist has moved, in Cycles."""
+"""A measured material whose trait sliders were changed, rendered in Cycles."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if material_nodes.osl_missing():
 
 @pytest.fixture(autouse=True)
 def sliders(monkeypatch) -> Iterator[None]:
-    """Registered, with portable fits that cost little: Cycles does not show them."""
+    """Registers the sliders, with cheap fits of the portable models: Cycles does not show those."""
 
     def quick(evaluate):
         return fit_principled(evaluate, coat=False, nodes=(10, 4, 3))
@@ -58,7 +58,7 @@ def _material(sphere: bpy.types.Object) -> bpy.types.Material:
     return made
 
 
-def test_cycles_shows_the_moved_brdf_before_and_after_the_rest_has_followed(tmp_path):
+def test_cycles_shows_shifted_brdf_before_and_after_other_models_update(tmp_path):
     sphere = cycles_sphere.new_scene(size=80, osl=True)
     cycles_sphere.sun(LIGHT, 2.0)
     material = _material(sphere)
@@ -74,7 +74,7 @@ def test_cycles_shows_the_moved_brdf_before_and_after_the_rest_has_followed(tmp_
     rho = trait_offsets.edited_brdf(material).evaluate(half_difference(normal, light, view))
     expected = (2.0 * rho * (normal @ LIGHT)[..., None])[kept]
     scale = np.sqrt(np.mean(expected**2))
-    # the render would wait for the rest
+    # the render would wait for the other models
     bpy.app.handlers.render_pre.remove(trait_update._in_background)
     before = cycles_sphere.render(tmp_path)[kept]
     assert inputs["sampling"].default_value == table
@@ -85,7 +85,7 @@ def test_cycles_shows_the_moved_brdf_before_and_after_the_rest_has_followed(tmp_
         assert np.sqrt(np.mean((image - expected) ** 2)) / scale < 0.005
 
 
-def test_a_material_moved_beyond_what_can_be_is_held_to_the_light_it_gets(tmp_path):
+def test_impossible_shift_is_limited_to_incident_light(tmp_path):
     sphere = cycles_sphere.new_scene(size=48, samples=200, osl=True)
     cycles_sphere.sky(1.0)
     material = _material(sphere)

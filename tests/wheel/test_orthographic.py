@@ -1,4 +1,4 @@
-"""Orthographic cameras, and photos that are scaled copies of what was calibrated, in Blender."""
+"""Orthographic cameras, and photos that are scaled copies of calibrated ones, in Blender."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _camera(scale: float, cx: float, cy: float, width: int, height: int, y: floa
 
 
 @pytest.mark.parametrize("lens", LENSES)
-def test_every_pixel_is_where_core_projects_it(lens: tuple) -> None:
+def test_blender_pixels_match_core_projection(lens: tuple) -> None:
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     scene, camera = bpy.context.scene, _camera(*lens)
     stood = cameras.create_camera(camera, np.zeros(3), 3.0, scene.collection)
@@ -62,8 +62,8 @@ def test_every_pixel_is_where_core_projects_it(lens: tuple) -> None:
     assert np.allclose((view.x * size[0], (1 - view.y) * size[1]), pixels[7], atol=0.01)
 
 
-def test_oblong_pixels_become_square_ones() -> None:
-    """Its photo is resampled to the camera that stands there."""
+def test_non_square_pixels_become_square() -> None:
+    """The photo is resampled to Blender's camera."""
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     scene, camera = bpy.context.scene, _camera(310.0, 431.7, 388.2, 1000, 700, y=1.02)
     assert not camera.pinhole
@@ -73,8 +73,8 @@ def test_oblong_pixels_become_square_ones() -> None:
     assert np.isclose(stood.data.ortho_scale, 1000 / square.lens.focal_length_x)
 
 
-def test_cycles_shows_a_point_at_its_pixel(tmp_path: Path) -> None:
-    """A small ball, photographed off centre: the middle of its picture is where core says."""
+def test_cycles_renders_point_at_its_pixel(tmp_path: Path) -> None:
+    """A small ball, rendered off centre: the centre of its image is where core projects it."""
     ball = cycles_sphere.new_scene(size=64)
     scene = bpy.context.scene
     cycles_sphere.sky(1.0)
@@ -94,8 +94,8 @@ def test_cycles_shows_a_point_at_its_pixel(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("model", ["ORTHOGRAPHIC", "SIMPLE_PINHOLE"])
-def test_a_scaled_photo_fills_the_frame(model: str, tmp_path: Path) -> None:
-    """Behind a camera calibrated at four times the photo's size, each pixel at its own place."""
+def test_scaled_photo_fills_camera_frame(model: str, tmp_path: Path) -> None:
+    """For a camera calibrated at four times the photo's size, each pixel lies at its own place."""
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     scene = bpy.context.scene
     calibrated = _camera(400.0, 431.7, 388.2, 1000, 700)

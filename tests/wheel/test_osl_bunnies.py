@@ -1,5 +1,6 @@
-"""The measured material on a whole object: the bunny under pictures of the world, and two of them
-face to face."""
+"""The measured material on a whole object: the bunny under environment images, and two bunnies that
+face each other.
+"""
 
 from __future__ import annotations
 
@@ -21,10 +22,10 @@ from tests.projected import projected  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
 from tests.wheel.world_light import VIEW, directions, lambert, reflected, wear, world  # noqa: E402
 
-SIZE = 48  # of the pictures
+SIZE = 48  # of the environment images
 SEEDS = 4
-PIXELS = 20  # that are compared, in the ball's shadow and out of it
-BALL = (np.array([0.9, 0.9, 0.9]), 0.45)  # black: centre and radius
+PIXELS = 20  # that are compared, inside and outside the ball's shadow
+BALL = (np.array([0.9, 0.9, 0.9]), 0.45)  # black ball: centre and radius
 GLOSSY = Principled(base_color=np.array([0.4, 0.1, 0.05]), roughness=0.3)
 WORLDS = relight.shipped_worlds()
 
@@ -34,14 +35,14 @@ if material_nodes.osl_missing():
 
 @pytest.fixture
 def bunny(shared) -> Mesh:
-    """The exact surface, in a unit sphere around the origin."""
+    """The exact surface, scaled into a unit sphere around the origin."""
     mesh = read_mesh(shared / "data" / "scans" / "bunny_truth.ply")
     vertices = mesh.vertices - (mesh.vertices.max(axis=0) + mesh.vertices.min(axis=0)) / 2
     return Mesh(vertices / np.linalg.norm(vertices, axis=1).max(), mesh.faces)
 
 
 def put(mesh: Mesh, thing: bpy.types.Object | None = None) -> bpy.types.Object:
-    """The mesh as a smooth object of the scene: a new one, or instead of what another shows."""
+    """Add the mesh as a smooth object of the scene, or replace the mesh of another object."""
     data = bpy.data.meshes.new("bunny")
     data.from_pydata(mesh.vertices, [], mesh.faces)
     data.shade_smooth()
@@ -71,7 +72,7 @@ def seen_at_pixels(rays: RayScene, thing: bpy.types.Object) -> tuple[np.ndarray,
 
 
 def behind_ball(point: np.ndarray, towards: np.ndarray) -> np.ndarray:
-    """Whether rays from a point, or points, along unit directions (..., 3) meet the ball."""
+    """Whether rays from one or more points along unit directions (..., 3) hit the ball."""
     centre, radius = BALL
     along = np.sum(towards * (centre - point), axis=-1)
     nearest2 = np.sum((centre - point) ** 2, axis=-1) - along**2
@@ -87,7 +88,7 @@ CASES = {
 
 
 def hidden_by_itself(rays: RayScene, point: np.ndarray, normal: np.ndarray, towards: np.ndarray):
-    """Whether the mesh itself lies along directions (h, w, 3) above the surface."""
+    """Whether the mesh itself occludes directions (h, w, 3) above the surface."""
     up = towards @ normal > 0
     hidden = np.zeros(up.shape, bool)
     start = np.broadcast_to(point + 2e-4 * normal, (int(up.sum()), 3))
@@ -96,14 +97,15 @@ def hidden_by_itself(rays: RayScene, point: np.ndarray, normal: np.ndarray, towa
 
 
 @pytest.mark.parametrize("made, name", CASES.values(), ids=CASES.keys())
-def test_a_bunny_under_a_picture_of_the_world(made, name, bunny, tmp_path):
-    """Where it does not see itself, which only path tracing could follow; a black ball's shadow
-    falls on it."""
+def test_bunny_under_environment_image(made, name, bunny, tmp_path):
+    """Compared where it does not see itself, which would need path tracing; a black ball casts a
+    shadow on it.
+    """
     if name not in WORLDS:
         pytest.skip(f"this bpy has no world {name!r}")
     brdf = projected(made, 60)
     thing = put(bunny, cycles_sphere.new_scene(size=SIZE, samples=1024, osl=True))
-    # a box is as wide as the pixel, whatever the width says; the bunny is not smooth across one
+    # a box filter covers the pixel whatever its width; the bunny is not smooth across one
     bpy.context.scene.cycles.pixel_filter_type = "BLACKMAN_HARRIS"
     sky = world(WORLDS[name])
     wear(brdf, thing)
@@ -144,13 +146,13 @@ def test_a_bunny_under_a_picture_of_the_world(made, name, bunny, tmp_path):
     noise = np.sqrt(np.mean(found.var(axis=0, ddof=1)) / SEEDS)
     error, mean = found.mean(axis=0) - expected, np.mean(expected)
     assert noise < 0.03 * mean
-    # a pixel's three channels err alike: they are no three draws
+    # errors of a pixel's three channels are correlated: they are not three independent draws
     assert abs(error.mean()) < 0.003 * mean + 3 * noise / np.sqrt(PIXELS)
     assert np.sqrt(np.mean(error**2)) < 1.5 * noise + 0.003 * mean
 
 
-def test_two_bunnies_face_to_face(bunny, tmp_path):
-    """Light bounces between them as between two of Cycles' own Diffuse."""
+def test_interreflection_of_two_bunnies_matches_diffuse(bunny, tmp_path):
+    """Light is exchanged between them as between two objects with Cycles' own Diffuse."""
     albedo = 0.7
     brdf = projected(lambda angles: albedo * lambert(angles), 60)
     sphere = cycles_sphere.new_scene(size=SIZE, samples=1024, osl=True)
@@ -177,7 +179,8 @@ def test_two_bunnies_face_to_face(bunny, tmp_path):
         thing.data.materials.clear()
         thing.data.materials.append(own)
     direct = cycles_sphere.render(tmp_path)
-    # alone in a white world each would be `albedo`; bounced light lies between it and `direct`
+    # alone in a white environment each would be `albedo`; interreflection lies between it and
+    # `direct`
     on_it = (images[False] < 0.95).all(axis=-1)
     deep = on_it & (direct.mean(axis=-1) < 0.75 * albedo)
     assert deep.sum() > 20

@@ -1,4 +1,4 @@
-"""The OSL material in Cycles, against the numpy BRDF it was made from."""
+"""The OSL material in Cycles, against the numpy BRDF that it was made from."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ VIEW = np.array([0.0, 0.0, 1.0])
 LIGHT = np.array([0.6, 0.2, 0.77]) / np.linalg.norm([0.6, 0.2, 0.77])
 MATERIALS = [("analytic", 5), ("dark-red-paint", 5), ("alum-bronze", 10), ("pink-fabric", 20),
              ("gold-metallic-paint", 100)]  # fmt: skip
-MORE = [("chrome", 100), ("steel", 100), ("white-fabric", 100), ("fruitwood-241", 100),
+EXTRA_MATERIALS = [("chrome", 100), ("steel", 100), ("white-fabric", 100), ("fruitwood-241", 100),
         ("green-latex", 100), ("blue-acrylic", 100), ("black-phenolic", 100)]  # fmt: skip
 
 if material_nodes.osl_missing():
@@ -79,9 +79,9 @@ def _relative_rms(image: np.ndarray, expected: np.ndarray) -> float:
     return float(np.sqrt(np.sum((image - expected) ** 2) / np.sum(expected**2)))
 
 
-@pytest.mark.parametrize("named", [*MATERIALS, *MORE], ids=lambda m: f"{m[0]}-{m[1]}")
-def test_under_the_sun(named, request, tmp_path):
-    """From the highlight to grazing light and view, matte to mirror."""
+@pytest.mark.parametrize("named", [*MATERIALS, *EXTRA_MATERIALS], ids=lambda m: f"{m[0]}-{m[1]}")
+def test_rendering_under_sun(named, request, tmp_path):
+    """From the highlight to grazing light and view, from matte to mirror."""
     name, count = named
     brdf = _brdf(name, count, None if name == "analytic" else request.getfixturevalue("shared"))
     sphere = cycles_sphere.new_scene(size=120, osl=True)
@@ -97,8 +97,8 @@ def test_under_the_sun(named, request, tmp_path):
     assert np.all(image[inside & (normal @ LIGHT < -0.01)] == 0)
 
 
-def test_another_object_casts_its_shadow(tmp_path):
-    """Where Cycles' own diffuse surface is lit, and nowhere else."""
+def test_other_object_casts_shadow(tmp_path):
+    """Lit where Cycles' own diffuse surface is lit, and nowhere else."""
     sphere = cycles_sphere.new_scene(size=80, osl=True)
     cycles_sphere.sun(LIGHT, 2.0)
     bpy.ops.mesh.primitive_cube_add(size=0.5, location=tuple(1.6 * LIGHT))
@@ -113,20 +113,20 @@ def test_another_object_casts_its_shadow(tmp_path):
     lit = lambert[..., 0] > 0
     assert 0.05 < np.mean(~lit[kept]) < 0.6
     expected = 2.0 * _expected(brdf, LIGHT)
-    # rays may meet the edge of a shadow a pixel apart
+    # rays may hit a shadow's edge one pixel apart
     wrong = np.abs(image - np.where(lit[..., None], expected, 0)).max(axis=-1) > 0.01
     assert np.mean(wrong[kept]) < 0.01
     assert np.mean(image[kept & ~lit] == 0) > 0.97
 
 
-def test_under_a_uniform_sky(brdf, tmp_path):
+def test_rendering_under_uniform_sky(brdf, tmp_path):
     sphere = cycles_sphere.new_scene(size=48, samples=300, osl=True)
     bpy.context.scene.cycles.filter_width = 1.0
     cycles_sphere.sky(1.0)
     _material(brdf, sphere)
     image = cycles_sphere.render(tmp_path)
     normal, inside = cycles_sphere.normals()
-    # nearer the rim, the cosine changes too much inside a pixel
+    # nearer to the rim the cosine changes too much within a pixel
     kept = inside & (normal @ VIEW > 0.4)
     cosines = np.linspace(0.4, 1, 13)
     table = np.array([_albedo(brdf, mu) for mu in cosines])
@@ -135,7 +135,7 @@ def test_under_a_uniform_sky(brdf, tmp_path):
 
 
 def _albedo(brdf: PrincipalBRDF, mu: float) -> np.ndarray:
-    """∫ρ cosθi dωi (3,) seen from cosine mu, by quadrature over half vectors, fine near n."""
+    """∫ρ cosθi dωi (3,) for view cosine mu, by quadrature over half vectors, fine near n."""
     view = np.array([np.sqrt(1 - mu * mu), 0.0, mu])
     knee, n_t, n_p = 0.01, 160, 60
     span = np.log1p(np.pi / 2 / knee)
@@ -161,8 +161,8 @@ LAMPS = {
 
 
 @pytest.mark.parametrize("kind", LAMPS)
-def test_other_lamps_bring_what_they_bring_to_a_diffuse_surface(kind, tmp_path):
-    """Cycles' own diffuse BSDF tells the irradiance; no unit of ours is trusted."""
+def test_other_lamp_types_give_irradiance_of_diffuse_surface(kind, tmp_path):
+    """Cycles' own diffuse BSDF gives the irradiance, so that no unit of Patina is assumed."""
     lamp_type, settings = LAMPS[kind]
     sphere = cycles_sphere.new_scene(size=48, osl=True)
     lamp = bpy.data.lights.new(kind, lamp_type)
@@ -187,7 +187,7 @@ def test_other_lamps_bring_what_they_bring_to_a_diffuse_surface(kind, tmp_path):
     assert _relative_rms(image[kept], expected[kept]) < 0.01
 
 
-def test_two_outputs_and_the_inputs_an_artist_sees():
+def test_shader_outputs_and_visible_inputs():
     sphere = cycles_sphere.new_scene(osl=True)
     material = _material(_brdf("analytic", 5, None), sphere)
     outputs = {n.target: n for n in material.node_tree.nodes if n.type == "OUTPUT_MATERIAL"}
@@ -203,7 +203,7 @@ def test_two_outputs_and_the_inputs_an_artist_sees():
     assert not [s for s in shown if s.startswith("Lamp")]
 
 
-def test_the_files_come_back_when_the_blend_moves(tmp_path):
+def test_files_are_restored_when_blend_is_moved(tmp_path):
     sphere = cycles_sphere.new_scene(osl=True)
     brdf = _brdf("analytic", 5, None)
     first, second = tmp_path / "first", tmp_path / "second"
@@ -227,7 +227,7 @@ def test_the_files_come_back_when_the_blend_moves(tmp_path):
     assert not original
 
 
-def test_the_material_keeps_all_coefficients():
+def test_material_stores_all_coefficients():
     sphere = cycles_sphere.new_scene(osl=True)
     basis = default_basis()
     c = np.random.default_rng(0).normal(0, 0.03, (3, 100))
@@ -240,7 +240,7 @@ def test_the_material_keeps_all_coefficients():
     np.testing.assert_allclose([tuple(s.default_value) for s in shown], c[:, :8].T, rtol=1e-6)
 
 
-def test_a_moved_coefficient_shows_in_the_render(tmp_path):
+def test_changed_coefficient_changes_rendering(tmp_path):
     sphere = cycles_sphere.new_scene(size=80, osl=True)
     cycles_sphere.sun(LIGHT, 2.0)
     c = np.random.default_rng(1).normal(0, 0.03, (3, 30))
@@ -256,7 +256,7 @@ def test_a_moved_coefficient_shows_in_the_render(tmp_path):
     assert _relative_rms(image[kept], expected) < 0.003
 
 
-def test_a_replaced_material_leaves_no_picture_behind():
+def test_replaced_material_leaves_no_image():
     sphere = cycles_sphere.new_scene(osl=True)
     names = []
     for seed in range(2):
@@ -270,7 +270,7 @@ def test_a_replaced_material_leaves_no_picture_behind():
     assert names[1] in bpy.data.images and names[0] not in bpy.data.images
 
 
-def test_where_osl_is_off_cycles_gets_the_portable_material(tmp_path):
+def test_portable_material_is_used_where_osl_is_off(tmp_path):
     sphere = cycles_sphere.new_scene(osl=True)
     scene = bpy.context.scene
     cycles_sphere.sun(LIGHT, 2.0)
@@ -292,7 +292,7 @@ def test_where_osl_is_off_cycles_gets_the_portable_material(tmp_path):
     assert "another render engine" in fallback.osl_hindrance(scene)
 
 
-def test_handlers_come_and_go():
+def test_handlers_are_registered_and_removed():
     groups = ("load_post", "save_post", "depsgraph_update_post", "render_pre")
     before = {g: list(getattr(bpy.app.handlers, g)) for g in groups}
     modules = (osl_files, lamp_inputs, world_inputs, fallback)
@@ -306,7 +306,7 @@ def test_handlers_come_and_go():
     assert {g: list(getattr(bpy.app.handlers, g)) for g in groups} == before
 
 
-def test_without_osl_the_portable_material_is_made_and_says_so(monkeypatch):
+def test_without_osl_portable_material_is_made_and_reported(monkeypatch):
     sphere = cycles_sphere.new_scene(osl=True)
     monkeypatch.setattr(material_nodes, "osl_missing", lambda: "no OSL here")
     brdf = _brdf("analytic", 5, None)

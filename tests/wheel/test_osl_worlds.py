@@ -1,5 +1,6 @@
-"""The measured material under pictures of the world, in a furnace, and between objects: Cycles'
-path tracing of it against a numpy quadrature of the table and against Cycles' own closures."""
+"""The measured material under environment images, in a furnace, and between objects: Cycles' path
+tracing against a numpy quadrature of the table and against Cycles' own closures.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +24,7 @@ from tests.wheel import cycles_sphere  # noqa: E402
 from tests.wheel.world_light import VIEW, lambert, reflected, wear, world  # noqa: E402
 
 WORLDS = relight.shipped_worlds()
-PIXELS = 24  # that are compared, of every world
+PIXELS = 24  # that are compared, in every environment
 
 if material_nodes.osl_missing():
     pytest.skip(f"{material_nodes.osl_missing()}", allow_module_level=True)
@@ -38,7 +39,7 @@ GLOSSY = Principled(base_color=np.array([0.4, 0.1, 0.05]), roughness=0.3)
 
 @pytest.mark.parametrize("name", ["forest", "interior", "sunset"])
 @pytest.mark.parametrize("made", [GLOSSY.evaluate, lambert], ids=["glossy", "matte"])
-def test_a_sphere_under_a_picture_of_the_world(made, name, tmp_path):
+def test_sphere_under_environment_image(made, name, tmp_path):
     if name not in WORLDS:
         pytest.skip(f"this bpy has no world {name!r}")
     brdf = brdf_of(made)
@@ -63,8 +64,8 @@ def test_a_sphere_under_a_picture_of_the_world(made, name, tmp_path):
     assert np.sqrt(np.mean(error**2)) < 2.0 * noise / np.sqrt(2) + 0.003 * expected.mean()
 
 
-def test_a_white_furnace(tmp_path):
-    """What reflects all light is not to be seen in a uniform world."""
+def test_white_furnace(tmp_path):
+    """A surface that reflects all light is invisible in a uniform environment."""
     brdf = brdf_of(lambert)
     sphere = cycles_sphere.new_scene(size=40, samples=256, osl=True)
     bpy.context.scene.cycles.filter_width = 1.0
@@ -74,13 +75,13 @@ def test_a_white_furnace(tmp_path):
     normal, inside = cycles_sphere.normals()
     kept = inside & (normal @ VIEW > 0.1)
     albedo = directional_albedo(brdf.evaluate, np.arccos(np.linspace(0.2, 1, 9)))
-    far = np.abs(albedo - 1).max()  # the basis' white, not the render's
+    far = np.abs(albedo - 1).max()  # the white of the basis, not of the renderer
     assert far < 0.05
     assert abs(image[kept].mean() - 1) < far + 0.003
     assert np.abs(image[kept] - 1).max() < far + 0.05
 
 
-def test_it_never_gives_more_light_than_it_gets(tmp_path):
+def test_reflected_light_does_not_exceed_incident_light(tmp_path):
     brdf = brdf_of(lambda angles: 1.6 * lambert(angles))
     sphere = cycles_sphere.new_scene(size=40, samples=256, osl=True)
     bpy.context.scene.cycles.filter_width = 1.0
@@ -91,8 +92,8 @@ def test_it_never_gives_more_light_than_it_gets(tmp_path):
     assert image[inside & (normal @ VIEW > 0.2)].mean() == pytest.approx(1.0, abs=0.01)
 
 
-def test_light_bounces_between_objects_as_between_cycles_own(tmp_path):
-    """A sphere on a floor, both matte: measured against Diffuse of the same albedo."""
+def test_interreflection_matches_diffuse_of_same_albedo(tmp_path):
+    """A sphere on a floor, both matte: the measured material against Diffuse of the same albedo."""
     albedo = 0.7
     brdf = brdf_of(lambda angles: albedo * lambert(angles))
     sphere = cycles_sphere.new_scene(size=32, samples=1024, osl=True)
@@ -111,14 +112,14 @@ def test_light_bounces_between_objects_as_between_cycles_own(tmp_path):
                 thing.data.materials.append(own)
         images.append(cycles_sphere.render(tmp_path))
     normal, inside = cycles_sphere.normals()
-    low = inside & (normal @ VIEW > 0.3) & (normal[..., 1] < -0.2)  # sees the floor
+    low = inside & (normal @ VIEW > 0.3) & (normal[..., 1] < -0.2)  # faces the floor
     high = inside & (normal @ VIEW > 0.3) & (normal[..., 1] > 0.5)
-    assert images[0][low].mean() < 0.95 * images[0][high].mean()  # the floor takes some light
+    assert images[0][low].mean() < 0.95 * images[0][high].mean()  # the floor absorbs some light
     for part in (low, high):
         assert images[1][part].mean() == pytest.approx(images[0][part].mean(), rel=0.01)
 
 
-def test_paint_scales_the_body_alone(tmp_path):
+def test_paint_scales_diffuse_part_only(tmp_path):
     brdf = brdf_of(GLOSSY.evaluate)
     light = np.array([0.6, 0.2, 0.77]) / np.linalg.norm([0.6, 0.2, 0.77])
     sphere = cycles_sphere.new_scene(size=80, osl=True)

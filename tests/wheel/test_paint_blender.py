@@ -1,4 +1,6 @@
-"""Painted by hand: on photos, on the mesh, kept in the .blend, and heeded by a fit."""
+"""Masks and materials painted by hand: on photos, on the mesh, stored in the .blend, and used by a
+fit.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,7 @@ from tests.wheel.test_masks_blender import scene, slots, truth, two_coloured  # 
 
 
 def _paint(image: bpy.types.Image, where: np.ndarray, colour: tuple[int, int, int]) -> None:
-    """As an opaque brush does; where: (h, w), the first row on top."""
+    """Paint as an opaque brush does; where: (h, w), the first row on top."""
     width, height = image.size
     pixels = np.empty((height, width, image.channels), np.float32)
     image.pixels.foreach_get(pixels.ravel())
@@ -47,9 +49,10 @@ def _two_materials(scene) -> None:  # noqa: F811
     assert scene.patina.use_slots and (slots(scene.patina.mesh) == 0).all()
 
 
-def test_strokes_on_photos_reach_the_mesh_and_come_back(scene) -> None:  # noqa: F811
-    """The second half painted in every photo, where its faces are seen: the mesh wears it, and
-    every canvas shows it."""
+def test_strokes_on_photos_are_projected_to_mesh_and_back(scene) -> None:  # noqa: F811
+    """The second half is painted in every photo where its faces are visible: the mesh takes it
+    over, and every canvas shows it.
+    """
     from patina.scene.paint.canvas import canvases
     from patina.scene.paint.mask_images import read_pixels
     from patina.scene.scan.scan_rays import scan_rays
@@ -69,7 +72,7 @@ def test_strokes_on_photos_reach_the_mesh_and_come_back(scene) -> None:  # noqa:
     seen = np.zeros(len(true), bool)
     for place in range(5):
         seen[scan_rays(capture).faces_of(place).face] = True
-    assert seen.mean() > 0.7  # the poles are in no photo
+    assert seen.mean() > 0.7  # no photo shows the poles
     assert (found[seen] == true[seen]).mean() > 0.98
     image = canvases(capture)[0]
     shown = read_pixels(image).astype(int)
@@ -77,10 +80,10 @@ def test_strokes_on_photos_reach_the_mesh_and_come_back(scene) -> None:  # noqa:
     half = scene.patina_paint.opacity
     assert np.abs(shown[mine] - half * np.array(colour)).min(axis=0).max() < 40
     assert bpy.ops.patina.take_paint() == {"FINISHED"}
-    assert np.array_equal(slots(mesh), found)  # what was taken is not taken again
+    assert np.array_equal(slots(mesh), found)  # strokes that were taken are not taken again
 
 
-def test_what_is_left_out_is_a_mask_that_the_fit_heeds(scene, tmp_path: Path) -> None:  # noqa: F811
+def test_painted_ignore_mask_is_used_by_fit(scene, tmp_path: Path) -> None:  # noqa: F811
     from patina.core.capture import read_capture
     from patina.core.photo import read_mask
     from patina.scene.paint.mask_images import mask_images, with_mask_images
@@ -97,19 +100,19 @@ def test_what_is_left_out_is_a_mask_that_the_fit_heeds(scene, tmp_path: Path) ->
     assert bpy.ops.patina.take_paint() == {"FINISHED"}
     kinds = {kind for place, kind in mask_images(capture) if place == 1}
     assert kinds == {"ignore", "highlight"}
-    told = with_mask_images(read_capture(Path(capture)))
-    assert np.array_equal(read_mask(told.photos[1].masks["ignore"]), where)
-    assert np.array_equal(read_mask(told.photos[1].masks["highlight"]), bright)
-    assert not told.photos[0].masks
+    messages = with_mask_images(read_capture(Path(capture)))
+    assert np.array_equal(read_mask(messages.photos[1].masks["ignore"]), where)
+    assert np.array_equal(read_mask(messages.photos[1].masks["highlight"]), bright)
+    assert not messages.photos[0].masks
 
-    # the eraser takes a part of it back
+    # the eraser removes a part of it
     gone = np.zeros_like(where)
     gone[30:40] = True
     _paint(image, gone, _colour(scene, "Erase"))
-    # saving takes strokes, and packs; the files may go
+    # saving takes the strokes and packs them; the files may be deleted
     file = tmp_path / "painted.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
-    for folder in (Path(told.photos[1].masks["ignore"]).parent,):
+    for folder in (Path(messages.photos[1].masks["ignore"]).parent,):
         for mask in folder.iterdir():
             mask.unlink()
     bpy.ops.wm.open_mainfile(filepath=str(file))
@@ -118,7 +121,7 @@ def test_what_is_left_out_is_a_mask_that_the_fit_heeds(scene, tmp_path: Path) ->
     assert np.array_equal(read_mask(again.photos[1].masks["highlight"]), bright & ~gone)
 
 
-def test_a_canvas_that_lost_its_pixels_erases_nothing(scene) -> None:  # noqa: F811
+def test_canvas_without_pixels_erases_nothing(scene) -> None:  # noqa: F811
     from patina.scene.paint.mask_images import mask_images, read_mask_image
     from patina.scene.session.scene_properties import capture_path
 
@@ -133,13 +136,13 @@ def test_a_canvas_that_lost_its_pixels_erases_nothing(scene) -> None:  # noqa: F
     assert np.array_equal(read_mask_image(mask_images(capture_path(scene))[0, "ignore"]), where)
     image.pixels.foreach_get(pixels)
     assert pixels.max() > 0.5  # drawn anew
-    image.reload()  # as when Blender lets pixels go that nobody painted
+    image.reload()  # as when Blender frees pixels that were never painted
     assert bpy.ops.patina.take_paint() == {"FINISHED"}
     assert np.array_equal(read_mask_image(mask_images(capture_path(scene))[0, "ignore"]), where)
 
 
-def test_a_fit_leaves_out_what_is_ignored(scene) -> None:  # noqa: F811
-    """All of one photo painted out: none of its pixels is used, though nobody pressed Take."""
+def test_fit_ignores_painted_out_photo(scene) -> None:  # noqa: F811
+    """One photo is painted out entirely: none of its pixels is used, even without pressing Take."""
     from patina.scene.session.scene_properties import capture_path, stored_result
 
     assert bpy.ops.patina.fit() == {"FINISHED"}
@@ -151,7 +154,7 @@ def test_a_fit_leaves_out_what_is_ignored(scene) -> None:  # noqa: F811
     assert after < 0.9 * before
 
 
-def test_vertex_paint_reaches_the_slots(scene) -> None:  # noqa: F811
+def test_vertex_paint_is_converted_to_material_slots(scene) -> None:  # noqa: F811
     _two_materials(scene)
     mesh = scene.patina.mesh
     assert bpy.ops.patina.paint_mesh() == {"FINISHED"}
@@ -166,14 +169,14 @@ def test_vertex_paint_reaches_the_slots(scene) -> None:  # noqa: F811
     bpy.ops.object.mode_set(mode="OBJECT")
     assert bpy.ops.patina.take_paint() == {"FINISHED"}
     assert np.array_equal(slots(mesh), true)
-    # repainted elsewhere since its colours were shown: old paint does not come back
+    # repainted elsewhere since its colours were shown: old paint does not return
     mesh.data.polygons.foreach_set("material_index", np.zeros(len(true), np.int32))
     assert bpy.ops.patina.take_paint() == {"FINISHED"}
     assert (slots(mesh) == 0).all()
 
 
-def test_a_large_photo_is_painted_on_in_a_smaller_size(scene, monkeypatch) -> None:  # noqa: F811
-    """Three of its pixels a pixel of the canvas, sides that are no multiple of it."""
+def test_large_photo_is_painted_at_reduced_size(scene, monkeypatch) -> None:  # noqa: F811
+    """One canvas pixel covers three photo pixels; the sides are not multiples of three."""
     from patina.scene.paint import canvas
     from patina.scene.paint.mask_images import mask_images, read_mask_image
     from patina.scene.session.scene_properties import capture_path
@@ -222,7 +225,7 @@ def test_masks_are_exported(scene, tmp_path: Path) -> None:  # noqa: F811
     assert np.array_equal(read_mask(tmp_path / "masks" / "001_lit_1_shadow.png"), where)
 
 
-def test_nothing_is_lost_by_importing_anew(scene) -> None:  # noqa: F811
+def test_import_again_keeps_painted_masks(scene) -> None:  # noqa: F811
     from patina.scene.paint.mask_images import mask_images
     from patina.scene.session.scene_properties import capture_path
 
@@ -250,7 +253,7 @@ def test_nothing_is_lost_by_importing_anew(scene) -> None:  # noqa: F811
     assert len(mask_images(capture_path(scene))) == 5
 
 
-def test_reasons_are_said(scene) -> None:  # noqa: F811
+def test_reasons_for_rejection_are_reported(scene) -> None:  # noqa: F811
     with pytest.raises(RuntimeError, match="only one material"):
         bpy.ops.patina.paint_mesh()
     with pytest.raises(RuntimeError, match="only one face set"):

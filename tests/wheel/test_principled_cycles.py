@@ -1,4 +1,4 @@
-"""The numpy Principled against Cycles: a sphere under one sun, pixel by pixel."""
+"""The numpy Principled model against Cycles: a sphere under one sun, pixel by pixel."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def node():
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda c: "-".join(c) or "default")
-def test_principled_is_what_cycles_renders(node, case, tmp_path):
+def test_principled_matches_cycles(node, case, tmp_path):
     light = np.array([0.6, 0.2, 0.77]) / np.linalg.norm([0.6, 0.2, 0.77])
     lamp = cycles_sphere.sun(light, 2.0)
     node.distribution = "GGX"

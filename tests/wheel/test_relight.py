@@ -1,4 +1,4 @@
-"""``render``: fitted materials under pictures of the world."""
+"""``render``: fitted materials under environment images."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def picture(file: Path) -> np.ndarray:
     return np.array(oiio.ImageBuf(str(file)).get_pixels(oiio.FLOAT))[..., :3]
 
 
-def test_a_sphere_for_each_material_under_each_world(tmp_path):
+def test_one_sphere_for_each_material_and_environment(tmp_path):
     sky = np.full((32, 64, 3), 0.3, np.float32)
     write_exr(tmp_path / "even.exr", sky)
     sky[8:10, 20:22] = 300.0
     write_exr(tmp_path / "lamp.exr", sky)
     result = two_materials(tmp_path / "result")
-    told = [str(tmp_path / name) for name in ("even.exr", "lamp.exr")]
-    found = command.render_to_folder(result, tmp_path / "out", told, 40, 16, 2, denoise=False)
+    output = [str(tmp_path / name) for name in ("even.exr", "lamp.exr")]
+    found = command.render_to_folder(result, tmp_path / "out", output, 40, 16, 2, denoise=False)
     spheres = [p for p in found if p.turn is None]
     assert {p.world for p in spheres} == {"even", "lamp"}
     assert (tmp_path / "out" / "index.html").is_file()
@@ -42,10 +42,10 @@ def test_a_sphere_for_each_material_under_each_world(tmp_path):
     assert lamp.mean() > even.mean()
 
 
-def test_what_is_no_world_is_told_in_one_line(tmp_path):
-    with pytest.raises(InputError, match="neither a file nor an environment image") as told:
+def test_invalid_environment_gives_one_line_error(tmp_path):
+    with pytest.raises(InputError, match="neither a file nor an environment image") as output:
         relight.find_worlds([str(tmp_path / "none.hdr")])
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(output.value)
     (tmp_path / "text.hdr").write_text("not a picture")
     bpy.ops.wm.read_factory_settings(use_empty=True)
     with pytest.raises(InputError, match="picture"):

@@ -21,9 +21,9 @@ pytestmark = [pytest.mark.blender, pytest.mark.slow]
 VIEWS = 6
 
 
-def headless(root: Path, *words: object) -> subprocess.CompletedProcess[str]:
+def headless(root: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, root / "headless.py", *map(str, words)],
+        [sys.executable, root / "headless.py", *map(str, arguments)],
         capture_output=True,
         text=True,
         timeout=300,
@@ -50,7 +50,7 @@ def solved(root: Path, photos: Path) -> Path:
     return out
 
 
-def test_solve_leaves_a_model_and_a_capture_to_go_on_from(solved: Path, photos: Path) -> None:
+def test_solve_writes_model_and_capture(solved: Path, photos: Path) -> None:
     assert {p.name for p in solved.iterdir()} == {"sparse", "report.txt", "my photos.capture.toml"}
     found = read_colmap(solved / "sparse")
     assert [c.label for c in found.cameras] == [f"photo {i}.jpg" for i in range(VIEWS)]
@@ -59,10 +59,10 @@ def test_solve_leaves_a_model_and_a_capture_to_go_on_from(solved: Path, photos: 
     assert (solved / data["scan"]["cameras"]).is_dir()
 
 
-def test_a_photo_of_the_scan_is_localised_where_it_is(
+def test_photo_is_localised_at_true_viewpoint(
     root: Path, solved: Path, photos: Path, tmp_path: Path
 ) -> None:
-    """By the model's own points, without a mesh: another picture from photo 2's viewpoint."""
+    """By the model's own points, without a mesh: another image from photo 2's viewpoint."""
     view = list(islice(made.ring(30, heights=(0.5,)), VIEWS))[2]
     lit = tmp_path / "lit 2.jpg"
     made.write_picture(lit, made.photo(view, view.rotation.T @ (0.4, -0.4, -0.8), seed=9))
@@ -80,7 +80,7 @@ def test_a_photo_of_the_scan_is_localised_where_it_is(
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("arguments", "message"),
     [
         (("solve", "gone", "--out", "out"), "no such folder"),
         (("solve", ".", "--out", "out"), "no photos"),
@@ -88,30 +88,30 @@ def test_a_photo_of_the_scan_is_localised_where_it_is(
         (("localise", "gone", "--photos", "x.jpg", "--out", "out"), "x.jpg"),
     ],
 )
-def test_a_mistake_is_one_line(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple, said: str
+def test_user_error_is_one_line(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple, message: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    done = headless(root, *words)
-    assert done.returncode == 2 and said in done.stderr
+    done = headless(root, *arguments)
+    assert done.returncode == 2 and message in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
     assert not list(tmp_path.iterdir())
 
 
-def test_stopped_it_leaves_nothing(root: Path, photos: Path, tmp_path: Path) -> None:
-    words = [sys.executable, root / "headless.py", "solve", photos, "--out", tmp_path / "out"]
-    running = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+def test_interrupted_run_leaves_no_files(root: Path, photos: Path, tmp_path: Path) -> None:
+    arguments = [sys.executable, root / "headless.py", "solve", photos, "--out", tmp_path / "out"]
+    running = subprocess.Popen(arguments, stderr=subprocess.PIPE, text=True)
     assert running.stderr is not None
     assert any("features" in line for line in running.stderr)
     running.send_signal(signal.SIGTERM)
     begin = time.monotonic()
-    _, said = running.communicate(timeout=60)
-    assert running.returncode == 130 and "Interrupted" in said and "Traceback" not in said
+    _, message = running.communicate(timeout=60)
+    assert running.returncode == 130 and "Interrupted" in message and "Traceback" not in message
     assert time.monotonic() - begin < 30
     assert not list(tmp_path.iterdir())
 
 
-def test_the_operator_puts_cameras_and_points_in_the_scene(photos: Path, tmp_path: Path) -> None:
+def test_operator_adds_cameras_and_points_to_scene(photos: Path, tmp_path: Path) -> None:
     import bpy
 
     import patina

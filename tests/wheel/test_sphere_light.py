@@ -15,7 +15,7 @@ from patina.core.light.sphere import light_from_sphere  # noqa: E402
 from patina.core.light.sphere_outline import Circle  # noqa: E402
 from tests import make_spheres as made  # noqa: E402
 
-SOME = (8, 15)  # of the 20 directions
+TESTED_DIRECTIONS = (8, 15)  # of the 20 directions
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def pictures(tmp_path_factory):
     made.build()
     folder = tmp_path_factory.mktemp("spheres")
     directions = made.directions()
-    return [(directions[i], made.picture(directions[i], folder)) for i in SOME]
+    return [(directions[i], made.picture(directions[i], folder)) for i in TESTED_DIRECTIONS]
 
 
 def angle(a, b) -> float:
@@ -32,7 +32,7 @@ def angle(a, b) -> float:
 
 @pytest.mark.parametrize("which", range(len(made.SPHERES)))
 def test_direction_within_half_a_degree(pictures, which):
-    """From a circle drawn 4 % wrong, and from a mask."""
+    """From a circle drawn 4 % too large or small, and from a mask."""
     sphere = made.shown()[which]
     x, y, radius = sphere.circle
     rough = Circle((x + 0.03 * radius, y - 0.02 * radius), 1.04 * radius)
@@ -44,8 +44,8 @@ def test_direction_within_half_a_degree(pictures, which):
         assert angle(masked.direction, direction) < 0.25
 
 
-def test_the_sphere_s_irradiance_is_the_sun_s(pictures):
-    """Chrome of reflectance 0.6: 0.6 · 3 where it is not seen at grazing incidence."""
+def test_sphere_irradiance_is_that_of_sun(pictures):
+    """Chrome of reflectance 0.6: 0.6 · 3 away from grazing incidence."""
     _, pixels = pictures[1]
     chrome = [s for s in made.shown() if s.surface == "chrome"]
     for sphere in chrome:

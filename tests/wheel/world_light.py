@@ -1,5 +1,6 @@
-"""Objects that wear the measured material under a picture of the world, and what they should show:
-the sum over every pixel of that picture."""
+"""Objects with the measured material under an environment image, and their expected radiance: the
+sum over every pixel of that image.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +25,7 @@ def lambert(angles: Angles) -> np.ndarray:
 
 
 def wear(brdf: PrincipalBRDF, *things: bpy.types.Object) -> bpy.types.Node:
-    """Give objects the measured material; returns its script node."""
+    """Assign the measured material to objects; return its script node."""
     files = osl_files.ensure_files(brdf)
     fit = fit_principled(brdf.evaluate, coat=False, nodes=(12, 6, 4))
     material = material_nodes.create_material("measured", brdf, fit, files)
@@ -37,13 +38,13 @@ def wear(brdf: PrincipalBRDF, *things: bpy.types.Object) -> bpy.types.Node:
 
 
 def world(path: Path) -> np.ndarray:
-    """Light the scene by a picture; returns its (h, w, 3) radiance, the zenith in row 0."""
+    """Light the scene by an environment image; return its (h, w, 3) radiance, zenith in row 0."""
     relight.light_with(bpy.context.scene, path)
     return np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT), np.float64)[..., :3]
 
 
 def directions(sky: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(h, w, 3) towards each pixel of a world by Cycles' own mapping, and (h, w) sr of each."""
+    """(h, w, 3) towards each pixel of an environment by Cycles' mapping, and (h, w) sr of each."""
     h, w = sky.shape[:2]
     down = (np.arange(h) + 0.5) / h * np.pi
     around = (0.5 - (np.arange(w) + 0.5) / w) * 2 * np.pi
@@ -53,7 +54,7 @@ def directions(sky: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def reflected(brdf: PrincipalBRDF, sky: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """(3,) Σ ρ L cos θi dω over all pixels of the world, towards VIEW."""
+    """(3,) Σ ρ L cos θi dω over all pixels of the environment, towards VIEW."""
     towards, solid = directions(sky)
     cos_i = towards @ normal
     up = cos_i > 0
