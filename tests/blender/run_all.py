@@ -1,4 +1,4 @@
-"""Run every test_* function of the test_*.py files beside this one, inside Blender.
+"""Run every test_* function of the test_*.py files in this folder, inside Blender.
 
     blender -b --factory-startup --addons bl_ext.user_default.patina \
         --python-exit-code 1 -P tests/blender/run_all.py [-- WORD ...]
@@ -27,7 +27,7 @@ import support  # noqa: E402
 
 
 def collect(words: list[str]) -> Iterator[tuple[str, Callable[[], None]]]:
-    """Yield (name, function) of the tests asked for, in the order they are written in."""
+    """Yield (label, function) of the selected tests, in the order of their definition."""
     for path in sorted(FOLDER.glob("test_*.py")):
         module = importlib.import_module(path.stem)
         for name, function in list(vars(module).items()):

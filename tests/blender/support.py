@@ -42,13 +42,17 @@ def extension(inside: str = "") -> ModuleType:
 
 
 def without_window(operator: type, **properties: object):
-    """An operator's own generator, started without a window that called it. told: its reports."""
+    """Start an operator's generator without a window; its messages are in ``reports``."""
     import bpy
 
     plain = tuple(kind for kind in operator.__bases__ if not issubclass(kind, bpy.types.Operator))
     own = {key: value for key, value in vars(operator).items() if key != "__dict__"}
-    told: list[str] = []
-    own |= {"told": told, "report": lambda self, kind, text: told.append(text), **properties}
+    reports: list[str] = []
+    own |= {
+        "reports": reports,
+        "report": lambda self, kind, text: reports.append(text),
+        **properties,
+    }
     made = type("Ticked", plain, own)()
     made._start(bpy.context)
     return made

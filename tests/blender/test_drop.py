@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 from support import extension
-from test_workflow import counts, folder, made
+from test_workflow import counts, folder, make_capture_module
 
 
 def handlers() -> dict[str, type]:
@@ -25,7 +25,7 @@ def drop(*names: str) -> str:
 
 def a_scan(photos: int = 3):
     """A scan without a capture file; its lit photos are named like the scan's."""
-    path = made().make_capture(folder() / "ball", photos=photos)
+    path = make_capture_module().make_capture(folder() / "ball", photos=photos)
     path.unlink()
     lit = path.parent / "lit"
     lit.mkdir()
@@ -38,9 +38,9 @@ def files(*names: str) -> list[dict[str, str]]:
     return [{"name": name} for name in names]
 
 
-def error_message(operator, **told) -> str:
+def error_message(operator, **settings) -> str:
     try:
-        operator(**told)
+        operator(**settings)
     except RuntimeError as error:
         assert "Traceback" not in str(error), error
         return str(error)
@@ -83,14 +83,14 @@ def test_handlers_are_registered_and_removed() -> None:
 def test_cameras_and_photos_become_capture() -> None:
     """A COLMAP file and a folder of photos: the capture contains the values measured by hand."""
     scan = a_scan()
-    told = {
+    settings = {
         "cameras": str(scan / "sparse" / "cameras.bin"),
         "directory": str(scan / "lit"),
         "files": files("view_01.exr", "view_03.exr"),
         "light": "DISTANT",
         "direction": (0.6, 0.0, 0.8),
     }
-    assert bpy.ops.patina.new_capture(**told) == {"FINISHED"}
+    assert bpy.ops.patina.new_capture(**settings) == {"FINISHED"}
     path = scan / "ball.capture.toml"
     capture = extension("core.capture").read_capture(path)
     assert [p.camera for p in capture.photos] == ["view_01.jpg", "view_03.jpg"]
@@ -134,45 +134,49 @@ def test_invalid_drop_reports_reason_and_leaves_nothing() -> None:
     scan = a_scan()
     (scan / "lit" / "other.exr").write_bytes((scan / "lit" / "view_01.exr").read_bytes())
     operator, before = bpy.ops.patina.new_capture, counts()
-    told = {"cameras": str(scan / "sparse"), "directory": str(scan / "lit")}
-    assert "other.exr" in error_message(operator, **told, files=files("view_01.exr", "other.exr"))
-    assert "expected one" in error_message(operator, directory=told["directory"])
+    settings = {"cameras": str(scan / "sparse"), "directory": str(scan / "lit")}
+    assert "other.exr" in error_message(
+        operator, **settings, files=files("view_01.exr", "other.exr")
+    )
+    assert "expected one" in error_message(operator, directory=settings["directory"])
     (scan / "second.ply").write_bytes((scan / "mesh.ply").read_bytes())
-    assert "mesh" in error_message(operator, **told, files=files("view_01.exr"))
+    assert "mesh" in error_message(operator, **settings, files=files("view_01.exr"))
     (scan / "lit" / "view_02.exr").write_bytes(b"damaged")
     mesh = str(scan / "mesh.ply")
-    assert "view_02.exr" in error_message(operator, **told, mesh=mesh, files=files("view_02.exr"))
+    assert "view_02.exr" in error_message(
+        operator, **settings, mesh=mesh, files=files("view_02.exr")
+    )
     assert not list(scan.glob("*.toml*")) and counts() == before
 
 
 def test_dropped_photos_change_nothing_until_confirmed() -> None:
     scan = a_scan()
-    told = {"directory": str(scan / "lit"), "files": files("view_01.exr", "view_02.exr")}
-    path = made().make_capture(folder() / "open", photos=2)
+    settings = {"directory": str(scan / "lit"), "files": files("view_01.exr", "view_02.exr")}
+    path = make_capture_module().make_capture(folder() / "open", photos=2)
     bpy.ops.patina.import_capture(filepath=str(path))
-    before, said = counts(), path.read_text()
-    assert bpy.ops.patina.drop_photos(**told) == {"CANCELLED"}
-    assert (counts(), path.read_text()) == (before, said)
+    before, saved_text = counts(), path.read_text()
+    assert bpy.ops.patina.drop_photos(**settings) == {"CANCELLED"}
+    assert (counts(), path.read_text()) == (before, saved_text)
     assert len(bpy.context.scene.patina_photos.photos) == 2
 
 
 def test_photos_dropped_on_open_capture_become_new_capture() -> None:
-    path = made().make_capture(folder() / "ball", photos=3)
+    path = make_capture_module().make_capture(folder() / "ball", photos=3)
     lit = path.parent / "more"
     lit.mkdir()
     (lit / "view_02.exr").write_bytes((path.parent / "lit_2.exr").read_bytes())
     bpy.ops.patina.import_capture(filepath=str(path))
-    said = path.read_text()
-    told = {"directory": str(lit), "files": files("view_02.exr"), "use": "LIT"}
-    assert bpy.ops.patina.drop_photos(**told) == {"FINISHED"}
-    assert path.read_text() == said
+    saved_text = path.read_text()
+    settings = {"directory": str(lit), "files": files("view_02.exr"), "use": "LIT"}
+    assert bpy.ops.patina.drop_photos(**settings) == {"FINISHED"}
+    assert path.read_text() == saved_text
     capture = extension("core.capture").read_capture(path.with_name("ball 2.capture.toml"))
     assert [p.camera for p in capture.photos] == ["view_02.jpg"]
     assert capture.scan.mesh.resolve() == (path.parent / "mesh.ply").resolve()
 
     (lit / "other.exr").write_bytes((lit / "view_02.exr").read_bytes())
-    told["files"] = files("other.exr")
-    assert "other.exr" in error_message(bpy.ops.patina.drop_photos, **told)
+    settings["files"] = files("other.exr")
+    assert "other.exr" in error_message(bpy.ops.patina.drop_photos, **settings)
     state = extension("scene.session.running_job")
     state.set_running(state.Running(bpy.context.scene.name, "fit", "sampling", 0.5))
     try:

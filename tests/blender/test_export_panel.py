@@ -9,12 +9,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 from support import extension
-from test_workflow import folder, made
+from test_workflow import folder, make_capture_module
 
 
 def measured():
     """A capture in the scene with the state that a fit would leave: seconds instead of a minute."""
-    path = made().make_capture(folder() / "ball", photos=2)
+    path = make_capture_module().make_capture(folder() / "ball", photos=2)
     assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
     basis = extension("core.basis").default_basis()
     entry = {
@@ -27,9 +27,9 @@ def measured():
             "cube_root_error": 0.06, "lambertian_cube_root_error": 0.5,
         },
     }  # fmt: skip
-    told = {"format": 2, "basis": {"version": basis.version}, "materials": [entry]}
+    description = {"format": 2, "basis": {"version": basis.version}, "materials": [entry]}
     properties = extension("scene.session.scene_properties")
-    properties.store_result(str(path.resolve()), {**told, "capture": str(path.resolve())})
+    properties.store_result(str(path.resolve()), {**description, "capture": str(path.resolve())})
     material = bpy.data.materials.new("surface")
     material["patina_measured"], material["patina_capture"] = "surface", str(path.resolve())
     if material.node_tree is None:
@@ -39,15 +39,17 @@ def measured():
 
 
 def fitted():
-    path = made().make_capture(folder() / "ball", photos=2, extra="[fit]\nheld_out = false")
+    path = make_capture_module().make_capture(
+        folder() / "ball", photos=2, extra="[fit]\nheld_out = false"
+    )
     assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
     assert bpy.ops.patina.fit() == {"FINISHED"}
     return path
 
 
-def error_message(**told) -> str:
+def error_message(**settings) -> str:
     try:
-        bpy.ops.patina.export(**told)
+        bpy.ops.patina.export(**settings)
     except RuntimeError as error:
         assert "Traceback" not in str(error), error
         return str(error)
@@ -56,7 +58,7 @@ def error_message(**told) -> str:
 
 def test_nothing_to_export_without_measured_material() -> None:
     assert not bpy.ops.patina.export.poll()
-    path = made().make_capture(folder() / "ball", photos=2)
+    path = make_capture_module().make_capture(folder() / "ball", photos=2)
     bpy.ops.patina.import_capture(filepath=str(path))
     assert not bpy.ops.patina.export.poll()
     assert "fit the materials first" in error_message(directory=str(folder()), formats={"binary"})
@@ -66,12 +68,12 @@ def test_tables_match_those_of_command_line() -> None:
     """Written from the .blend and by `fit` and `material`: the same bytes."""
     measured()
     out = folder()
-    told = {"directory": str(out), "folder": "mine", "formats": {"binary", "npz", "mtlx"}}
-    assert bpy.ops.patina.export(**told) == {"FINISHED"}
+    settings = {"directory": str(out), "folder": "mine", "formats": {"binary", "npz", "mtlx"}}
+    assert bpy.ops.patina.export(**settings) == {"FINISHED"}
     names = {p.name for p in (out / "mine").iterdir()}
     assert {"surface.binary", "surface.npz", "surface.mtlx", "losses.txt", "losses.json"} <= names
-    said = json.loads(bpy.data.texts["Patina result"].as_string())
-    coefficients = np.array(said["materials"][0]["coefficients"])
+    stored_result = json.loads(bpy.data.texts["Patina result"].as_string())
+    coefficients = np.array(stored_result["materials"][0]["coefficients"])
     assert np.array_equal(np.load(out / "mine" / "surface.npz")["coefficients"], coefficients)
 
     record = out / "record"
@@ -99,8 +101,8 @@ def test_mesh_export_leaves_open_file_unchanged() -> None:
     mesh.hide_set(True)  # exporters take only visible objects
     before = bpy.data.filepath, sorted(o.name for o in scene.objects)
     out = folder()
-    told = {"directory": str(out), "folder": "a", "formats": {"gltf", "blend", "binary"}}
-    assert bpy.ops.patina.export(**told) == {"FINISHED"}
+    settings = {"directory": str(out), "folder": "a", "formats": {"gltf", "blend", "binary"}}
+    assert bpy.ops.patina.export(**settings) == {"FINISHED"}
     assert (bpy.data.filepath, sorted(o.name for o in bpy.context.scene.objects)) == before
     assert bpy.context.scene.patina.mesh["unsaved"] == 7 and mesh.hide_get()
     losses = json.loads((out / "a" / "losses.json").read_text())["losses"]
@@ -129,18 +131,18 @@ def test_report_is_available_as_long_as_fit() -> None:
     path, out = fitted(), folder()
     choice, scene = extension("scene.export.export_choice"), bpy.context.scene
     assert choice.missing(scene, "report") is None
-    told = {"directory": str(out), "folder": "a", "formats": {"report", "record"}}
-    assert bpy.ops.patina.export(**told) == {"FINISHED"}
+    settings = {"directory": str(out), "folder": "a", "formats": {"report", "record"}}
+    assert bpy.ops.patina.export(**settings) == {"FINISHED"}
     page = (out / "a" / "report" / "index.html").read_text("utf-8")
     assert "surface" in page and path.name in page
     record = json.loads((out / "a" / "result.json").read_text())
     assert record == extension("scene.session.scene_properties").stored_result(str(path.resolve()))
 
     text = bpy.data.texts["Patina result"]
-    said, kept = json.loads(text.as_string()), text.as_string()
-    said["materials"][0]["coefficients"][0][0] += 0.01
+    stored_result, kept = json.loads(text.as_string()), text.as_string()
+    stored_result["materials"][0]["coefficients"][0][0] += 0.01
     text.clear()
-    text.write(json.dumps(said))  # as after an undo: the .blend belongs to another fit
+    text.write(json.dumps(stored_result))  # as after an undo: the .blend belongs to another fit
     assert choice.missing(scene, "report") is not None
     text.clear()
     text.write(kept)
@@ -150,21 +152,23 @@ def test_report_is_available_as_long_as_fit() -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     assert "fit again" in choice.missing(bpy.context.scene, "report")
-    told["folder"] = "b"
-    assert "fit again" in error_message(**told) and not (out / "b").exists()
-    told["formats"] = {"record"}
-    assert bpy.ops.patina.export(**told) == {"FINISHED"}
+    settings["folder"] = "b"
+    assert "fit again" in error_message(**settings) and not (out / "b").exists()
+    settings["formats"] = {"record"}
+    assert bpy.ops.patina.export(**settings) == {"FINISHED"}
 
 
 def test_folder_with_other_files_is_not_overwritten() -> None:
     path = measured()
     mine = path.parent / "surface.binary"
     mine.write_bytes(b"mine")
-    told = {"directory": str(path.parent.parent), "folder": "ball", "formats": {"binary"}}
-    assert "not from an earlier export" in error_message(**told) and mine.read_bytes() == b"mine"
-    told["folder"] = ""
+    settings = {"directory": str(path.parent.parent), "folder": "ball", "formats": {"binary"}}
+    assert (
+        "not from an earlier export" in error_message(**settings) and mine.read_bytes() == b"mine"
+    )
+    settings["folder"] = ""
     for _ in range(2):  # again: replaced
-        assert bpy.ops.patina.export(**told) == {"FINISHED"}
+        assert bpy.ops.patina.export(**settings) == {"FINISHED"}
     assert (path.parent.parent / "ball export" / "surface.binary").stat().st_size > 1e6
 
 
@@ -182,15 +186,15 @@ def test_formats_of_panel_are_default() -> None:
 def test_failure_of_second_blender_is_one_line() -> None:
     background = extension("scene.session.background_blender")
     errors = extension("core.errors")
-    for words, said in (
+    for arguments, message in (
         (["material", "/nowhere", "--to", "gltf", "--out", "/tmp/x"], "expected a result"),
         (["nonsense"], "invalid choice"),
     ):
         try:
-            for step in background.in_background(words):
+            for step in background.in_background(arguments):
                 assert 0 <= step.fraction <= 1
         except errors.PatinaError as error:
-            assert said in str(error) and "\n" not in str(error)
+            assert message in str(error) and "\n" not in str(error)
         else:
             raise AssertionError("it went well")
 

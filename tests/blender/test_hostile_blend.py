@@ -142,9 +142,9 @@ def test_valid_file_is_restored_on_load() -> None:
 
 def test_rejections_say_what_was_found_and_what_to_do() -> None:
     _, blend, _ = hostile()
-    told: list[str] = []
+    messages: list[str] = []
     handler = logging.Handler()
-    handler.emit = lambda record: told.append(record.getMessage())
+    handler.emit = lambda record: messages.append(record.getMessage())
     root = logging.getLogger(extension().__name__)
     root.addHandler(handler)
     try:
@@ -152,7 +152,7 @@ def test_rejections_say_what_was_found_and_what_to_do() -> None:
         bpy.ops.wm.save_mainfile()
     finally:
         root.removeHandler(handler)
-    text = "\n".join(told)
+    text = "\n".join(messages)
     for found in ("evil.pth", "not an EXR", LINKED, "symbolic link", "fit the material again"):
         assert found in text, (found, text)
 
@@ -162,8 +162,8 @@ def test_damaged_property_does_not_stop_handlers() -> None:
     opened(blend)
     parts = extension("scene.material.measured_nodes")
     material = bpy.data.materials["broken json"]
-    for told in ("{", "5", "[]", '{"solid": 5}', '{"solid": [1, "x", {}]}', "[" * 5000):
-        material["patina_as_measured"] = told
+    for damaged_value in ("{", "5", "[]", '{"solid": 5}', '{"solid": [1, "x", {}]}', "[" * 5000):
+        material["patina_as_measured"] = damaged_value
         material["patina_measured_sampling"] = "../../evil.pth"
         parts.restore_inputs(material)
         assert "patina_as_measured" not in material

@@ -184,7 +184,7 @@ def test_register_and_unregister_leave_no_traces() -> None:
 
 def test_loading_twenty_files_leaves_no_leftovers() -> None:
     """Alternately a file with a capture and one without: nothing accumulates, nothing remains."""
-    from test_workflow import folder, made
+    from test_workflow import folder, make_capture_module
 
     kinds = ("objects", "cameras", "lights", "images", "collections", "texts", "materials")
 
@@ -198,7 +198,9 @@ def test_loading_twenty_files_leaves_no_leftovers() -> None:
     place = folder()
     files = [str(place / "empty.blend"), str(place / "capture.blend")]
     bpy.ops.wm.save_as_mainfile(filepath=files[0])
-    bpy.ops.patina.import_capture(filepath=str(made().make_capture(place / "ball", photos=3)))
+    bpy.ops.patina.import_capture(
+        filepath=str(make_capture_module().make_capture(place / "ball", photos=3))
+    )
     bpy.ops.wm.save_as_mainfile(filepath=files[1])
     first: dict[str, tuple[dict[str, int], int, dict[str, set[str]]]] = {}
     for k in range(20):

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 from support import extension
-from test_workflow import folder, made
+from test_workflow import folder, make_capture_module
 
 PLACE = np.array([1.9, 0.4, 2.6])  # true position of the lamp
 INTENSITY = 20.0
@@ -18,16 +18,16 @@ def lit_by_a_lamp(offset: tuple[float, float, float] = (0.0, 0.0, 0.0), photos: 
     """A capture whose photos were lit by a near lamp (a flash in the last one); its file states a
     lamp position that is wrong by ``offset``.
     """
-    path = made().make_capture(
+    path = make_capture_module().make_capture(
         folder() / "ball", photos=photos, extra="[fit]\nheld_out = false\ntrials = 1"
     )
-    for i, (rotation, translation) in enumerate(made().poses(photos), start=1):
+    for i, (rotation, translation) in enumerate(make_capture_module().poses(photos), start=1):
         at = PLACE
         if i == photos:
             at = rotation.T @ (np.array([0.4, -0.3, 0.0]) - translation)
         towards = at / np.linalg.norm(at)
-        image = made().photo(rotation, translation, towards, lamp=(at, INTENSITY))
-        made().write_exr(path.parent / f"lit_{i}.exr", image)
+        image = make_capture_module().photo(rotation, translation, towards, lamp=(at, INTENSITY))
+        make_capture_module().write_exr(path.parent / f"lit_{i}.exr", image)
     head, tail = path.read_text().split("[[light]]", 1)
     x, y, z = (float(a) for a in np.add(PLACE, offset))
     lights = f"""# where the lamp was, roughly
@@ -79,10 +79,10 @@ def test_fit_uses_dragged_lamp() -> None:
     lamp("lamp").location = PLACE.tolist()
     bpy.ops.ed.undo_push(message="drag")
     bpy.ops.patina.fit()
-    said = json.loads(bpy.data.texts["Patina result"].as_string())["lights"]
-    assert [light["name"] for light in said] == ["lamp", "flash"]
-    assert np.allclose(said[0]["position"], PLACE, atol=1e-6)
-    assert said[1]["offset"] == [0.4, -0.3, 0.0]
+    stored_lights = json.loads(bpy.data.texts["Patina result"].as_string())["lights"]
+    assert [light["name"] for light in stored_lights] == ["lamp", "flash"]
+    assert np.allclose(stored_lights[0]["position"], PLACE, atol=1e-6)
+    assert stored_lights[1]["offset"] == [0.4, -0.3, 0.0]
     bpy.ops.ed.undo()
     assert not np.allclose(lamp("lamp").location, PLACE)
     capture = extension("core.capture").read_capture(path)
@@ -139,7 +139,7 @@ class LayoutRecorder:
     """Records what a panel draws."""
 
     def __init__(self) -> None:
-        self.said: list[str] = []
+        self.lines: list[str] = []
 
     def column(self, align: bool = False) -> LayoutRecorder:
         return self
@@ -147,12 +147,12 @@ class LayoutRecorder:
     def label(self, text: str = "", icon: str = "NONE") -> None:
         icons = bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
         assert icon in icons, icon
-        self.said.append(text)
+        self.lines.append(text)
 
     def operator(self, name: str, icon: str = "NONE") -> None:
         group, _, function = name.partition(".")
         assert getattr(getattr(bpy.ops, group), function).get_rna_type()
-        self.said.append(name)
+        self.lines.append(name)
 
 
 def test_panel_lists_manual_changes() -> None:
@@ -163,7 +163,7 @@ def test_panel_lists_manual_changes() -> None:
     def drawn() -> list[str]:
         lines = LayoutRecorder()
         box.draw_lamp(lines, scene, scene.camera)
-        return lines.said
+        return lines.lines
 
     assert drawn() == ["Near Lamp: lamp"]
     lamp("lamp").location.x += 1

@@ -11,11 +11,11 @@ from pathlib import Path
 import bpy
 import numpy as np
 from support import extension
-from test_workflow import folder, made
+from test_workflow import folder, make_capture_module
 
 
 @contextmanager
-def preferred(**told: object) -> Iterator[object]:
+def preferred(**changes: object) -> Iterator[object]:
     """The extension's preferences with these changes; a checkout gets a temporary entry."""
     addons, package = bpy.context.preferences.addons, extension().__name__
     before = addons.get(package)
@@ -23,12 +23,12 @@ def preferred(**told: object) -> Iterator[object]:
     if entry is None:
         entry = addons.new()
         entry.module = package
-    for name, value in told.items():
+    for name, value in changes.items():
         setattr(entry.preferences, name, value)
     try:
         yield entry.preferences
     finally:
-        for name in told:
+        for name in changes:
             entry.preferences.property_unset(name)
         if before is None:
             addons.remove(entry)
@@ -38,14 +38,14 @@ class ReportRecorder:
     """An operator stand-in that records its reports."""
 
     def __init__(self) -> None:
-        self.said: list[str] = []
+        self.reports: list[str] = []
 
     def report(self, kind: set[str], text: str) -> None:
-        self.said.append(text)
+        self.reports.append(text)
 
 
 def imported(extra: str = ""):
-    path = made().make_capture(folder() / "ball", photos=2, extra=extra)
+    path = make_capture_module().make_capture(folder() / "ball", photos=2, extra=extra)
     assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
     return path
 
@@ -62,11 +62,11 @@ def test_margins_apply_to_captures_without_own_margins() -> None:
     fit, margins = extension("operators.fit"), extension("core.samples").Margins
     scene = bpy.context.scene
     imported("[fit]\nshadow_margin = 9")
-    told, operator = {"silhouette": 5, "shadow": 6, "mask": 7, "cosine": 0.25}, ReportRecorder()
-    with preferred(**told):
+    margins, operator = {"silhouette": 5, "shadow": 6, "mask": 7, "cosine": 0.25}, ReportRecorder()
+    with preferred(**margins):
         job = fit.fit_job(operator, scene)
     assert job.capture.fit.margins == margins(silhouette=5, shadow=9, mask=7, cosine=0.25)
-    assert any("silhouette 5" in said for said in operator.said)
+    assert any("silhouette 5" in report for report in operator.reports)
     assert fit.fit_job(ReportRecorder(), scene).capture.fit.margins == margins(shadow=9)
 
 
@@ -88,8 +88,8 @@ def test_wider_margins_give_fewer_samples() -> None:
 def test_lengths_are_shown_in_preferred_unit() -> None:
     lengths, stages = extension("scene.session.lengths"), extension("scene.views.workflow_stages")
     imported()
-    said = "2 % of it spreads over 0.02 scan units, so that 1.5e+02 scan units away"
-    assert lengths.with_lengths(said) == said
+    sentence = "2 % of it spreads over 0.02 scan units, so that 1.5e+02 scan units away"
+    assert lengths.with_lengths(sentence) == sentence
     assert "2 scan units long" in stages.stages(bpy.context.scene)["scan"].has[0]
     for unit, ball, near in (
         ("METRES", "2 m long", "2 cm, so that 150 m away"),
@@ -98,7 +98,7 @@ def test_lengths_are_shown_in_preferred_unit() -> None:
     ):
         with preferred(unit=unit):
             assert ball in stages.stages(bpy.context.scene)["scan"].has[0], unit
-            assert near in lengths.with_lengths(said), lengths.with_lengths(said)
+            assert near in lengths.with_lengths(sentence), lengths.with_lengths(sentence)
 
 
 def test_cache_folder_is_used_for_unsaved_files() -> None:
@@ -178,8 +178,11 @@ def test_materials_are_fitted_with_user_basis() -> None:
         with preferred(merl_folder=str(place), cache_folder=str(cache)):
             assert bpy.ops.patina.fit() == {"FINISHED"}
             scene, properties = bpy.context.scene, extension("scene.session.scene_properties")
-            told = properties.stored_result(properties.capture_path(scene))["basis"]
-            assert told["columns"] == 3 * len(sums) and told["version"] != default.version
+            stored_basis = properties.stored_result(properties.capture_path(scene))["basis"]
+            assert (
+                stored_basis["columns"] == 3 * len(sums)
+                and stored_basis["version"] != default.version
+            )
             assert [p.name for p in cache.glob("merl_basis_*.npz")]
             out = {"directory": str(place), "folder": "out", "formats": {"binary"}}
             assert bpy.ops.patina.export(**out) == {"FINISHED"}

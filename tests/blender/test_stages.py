@@ -7,12 +7,12 @@ from __future__ import annotations
 import bpy
 import numpy as np
 from support import extension
-from test_workflow import folder, made
+from test_workflow import folder, make_capture_module
 
 
 def two_from_one_place():
     """Four photos of four cameras, and a fifth from the first camera under the second light."""
-    path = made().make_capture(folder() / "ball", photos=4)
+    path = make_capture_module().make_capture(folder() / "ball", photos=4)
     text = path.read_text()
     camera, light = "lit_1.exr", text.split("[[photo]]")[2]
     more = light.replace('file = "lit_2.exr"', 'file = "again.exr"')
@@ -28,7 +28,9 @@ def test_stages_follow_progress() -> None:
     found = stages.stages(scene)
     assert list(found) == ["scan", "photos", "masks", "fit", "check", "material"]
     assert stages.next_stage(found) == "scan" and found["scan"].press == "patina.import_capture"
-    path = made().make_capture(folder() / "ball", photos=3, extra="[fit]\nheld_out = false")
+    path = make_capture_module().make_capture(
+        folder() / "ball", photos=3, extra="[fit]\nheld_out = false"
+    )
     bpy.ops.patina.import_capture(filepath=str(path))
     found = stages.stages(scene)
     assert found["scan"].done and found["photos"].has == ("3 lit photos, 3 lights",)
@@ -106,7 +108,10 @@ def test_display_exposure_does_not_change_photo() -> None:
 
 
 def test_photo_list_is_saved_and_old_files_get_one() -> None:
-    path, blend = made().make_capture(folder() / "ball", photos=3), folder() / "list.blend"
+    path, blend = (
+        make_capture_module().make_capture(folder() / "ball", photos=3),
+        folder() / "list.blend",
+    )
     bpy.ops.patina.import_capture(filepath=str(path))
     bpy.context.scene.patina_photos.active = 1
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
@@ -123,7 +128,7 @@ def test_photo_list_is_saved_and_old_files_get_one() -> None:
 
 
 def test_deleted_camera_is_skipped() -> None:
-    path = made().make_capture(folder() / "ball", photos=3)
+    path = make_capture_module().make_capture(folder() / "ball", photos=3)
     bpy.ops.patina.import_capture(filepath=str(path))
     scene, listed = bpy.context.scene, extension("scene.photos.photo_list")
     bpy.data.objects.remove(scene.patina_photos.photos[1].camera)
@@ -146,7 +151,7 @@ def test_remaining_time_is_shown_rounded() -> None:
 
 
 def test_measured_material_is_asset_with_provenance() -> None:
-    path = made().make_capture(folder() / "ball", photos=3)
+    path = make_capture_module().make_capture(folder() / "ball", photos=3)
     bpy.ops.patina.import_capture(filepath=str(path))
     assert not bpy.ops.patina.mark_assets.poll()
     bpy.ops.patina.fit()
@@ -161,8 +166,11 @@ def test_measured_material_is_asset_with_provenance() -> None:
     data = material.asset_data
     assert {"Patina", "measured", "surface", "ball"} == {tag.name for tag in data.tags}
     assert "3 lit photos" in data.description and "held-out photos" in data.description
-    told = material["patina_provenance"]
-    assert told["date"].endswith(material["patina_date"]) and "ball.capture.toml" in told["scan"]
+    provenance = material["patina_provenance"]
+    assert (
+        provenance["date"].endswith(material["patina_date"])
+        and "ball.capture.toml" in provenance["scan"]
+    )
     bpy.ops.patina.mark_assets()  # again: the same
     assert len(data.tags) == 4
     blend = folder() / "asset.blend"

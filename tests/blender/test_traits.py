@@ -7,7 +7,7 @@ import time
 import bpy
 import numpy as np
 from support import Skip, extension
-from test_workflow import folder, made
+from test_workflow import folder, make_capture_module
 
 FIT = "[fit]\nheld_out = false"
 
@@ -18,7 +18,7 @@ _fitted: list[str] = []  # the .blend of the one fit that all tests here use
 def measured() -> bpy.types.Material:
     """A fitted material, in a file for this test."""
     if not _fitted:
-        path = made().make_capture(folder() / "ball", photos=3, extra=FIT)
+        path = make_capture_module().make_capture(folder() / "ball", photos=3, extra=FIT)
         assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
         assert bpy.ops.patina.fit() == {"FINISHED"}
         _fitted.append(str(folder() / "fitted.blend"))
@@ -54,7 +54,7 @@ def preview(material: bpy.types.Material) -> np.ndarray:
 def material_state(material: bpy.types.Material) -> dict:
     """All that a slider may change, as exact values."""
     parts = extension("scene.material.measured_nodes")
-    told = {
+    state = {
         "coefficients": list(material["patina_coefficients"]),
         "solid": (*material.diffuse_color, material.metallic, material.roughness),
         "files": [
@@ -68,8 +68,8 @@ def material_state(material: bpy.types.Material) -> dict:
         inputs = {s.identifier: s.default_value for s in node.inputs if hasattr(s, "default_value")}
         plain = (str, int, float)
         values = {k: v if isinstance(v, plain) else tuple(v) for k, v in inputs.items()}
-        told[name] = (node.label, values)
-    return told
+        state[name] = (node.label, values)
+    return state
 
 
 def coefficients(material: bpy.types.Material) -> np.ndarray | None:
@@ -245,8 +245,8 @@ def test_panel_warns_of_impossible_shift() -> None:
     assert len(words) == 8 and all(words)
     assert not box.notes(material)
     material.patina_traits.every.trait_2 = -4.0
-    said = " ".join(line for line, _ in box.notes(material))
-    assert "the albedo is" in said and "component 2" in said and "EEVEE" in said
+    notes = " ".join(line for line, _ in box.notes(material))
+    assert "the albedo is" in notes and "component 2" in notes and "EEVEE" in notes
     assert extension("scene.material.trait_properties").shown_material(bpy.context) == material
     del material["patina_basis"], material["patina_coefficients"]
     assert extension("scene.material.trait_properties").shown_material(bpy.context) is None

@@ -7,7 +7,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 from support import extension
-from test_workflow import folder, made
+from test_workflow import folder, make_capture_module
 
 FIT = "[fit]\nheld_out = false"
 
@@ -21,7 +21,7 @@ def fitted() -> bpy.types.Material:
         bpy.ops.wm.open_mainfile(filepath=_fitted[0])
         bpy.ops.wm.save_as_mainfile(filepath=str(folder() / "own.blend"))
         return bpy.data.materials["surface"]
-    path = made().make_capture(folder() / "ball", photos=3, extra=FIT)
+    path = make_capture_module().make_capture(folder() / "ball", photos=3, extra=FIT)
     assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
     assert bpy.ops.patina.fit() == {"FINISHED"}
     _fitted.append(str(folder() / "fitted.blend"))

@@ -155,11 +155,11 @@ def test_fit_operator_matches_api() -> None:
     path = make_capture_module().make_capture(folder() / "ball", photos=4)
     bpy.ops.patina.import_capture(filepath=str(path))
     assert bpy.ops.patina.fit() == {"FINISHED"}
-    said = json.loads(bpy.data.texts["Patina result"].as_string())
+    stored_result = json.loads(bpy.data.texts["Patina result"].as_string())
     job = extension("core.jobs").FitJob(extension("core.capture").read_capture(path))
     job.drain()
     expected = job.result.materials[0].fit.brdf.coefficients
-    assert np.array_equal(np.array(said["materials"][0]["coefficients"]), expected)
+    assert np.array_equal(np.array(stored_result["materials"][0]["coefficients"]), expected)
 
     mesh = bpy.context.scene.patina.mesh
     assert [m.name for m in mesh.data.materials] == ["surface"]
@@ -186,23 +186,25 @@ def test_demo_by_operator_equals_demo_by_api() -> None:
     """The embedded capture: coefficients, samples and held-out photos to the last digit."""
     assert bpy.ops.patina.import_demo() == {"FINISHED"}
     assert bpy.ops.patina.fit() == {"FINISHED"}
-    said = json.loads(bpy.data.texts["Patina result"].as_string())
+    stored_result = json.loads(bpy.data.texts["Patina result"].as_string())
     demo = extension("operators.import_capture").DEMO
     job = extension("core.jobs").FitJob(
         extension("core.capture").read_capture(demo), portable=False
     )
     job.drain()
-    assert [m["name"] for m in said["materials"]] == ["glaze", "clay"]
-    for told, fitted in zip(said["materials"], job.result.materials, strict=True):
-        assert np.array_equal(np.array(told["coefficients"]), fitted.fit.brdf.coefficients)
-        assert sum(told["samples"]["per_photo"].values()) == sum(fitted.per_photo) > 1000
-        assert told["held_out"]["typical"] == fitted.held_out.typical
+    assert [m["name"] for m in stored_result["materials"]] == ["glaze", "clay"]
+    for written, fitted in zip(stored_result["materials"], job.result.materials, strict=True):
+        assert np.array_equal(np.array(written["coefficients"]), fitted.fit.brdf.coefficients)
+        assert sum(written["samples"]["per_photo"].values()) == sum(fitted.per_photo) > 1000
+        assert written["held_out"]["typical"] == fitted.held_out.typical
 
 
 def test_check_names_light_drift_and_fit_can_include_or_skip_it() -> None:
     path = make_capture_module().make_capture(folder() / "ball", photos=4)
-    told = path.read_text()
-    path.write_text(told.replace('file = "lit_2.exr"', 'file = "lit_2.exr"\nexposure = 1.5'))
+    capture_text = path.read_text()
+    path.write_text(
+        capture_text.replace('file = "lit_2.exr"', 'file = "lit_2.exr"\nexposure = 1.5')
+    )
     bpy.ops.patina.import_capture(filepath=str(path))
     assert not bpy.ops.patina.refit.poll()  # not checked yet
     choose = extension("core.diagnose.pixels.pixel_selection").choose_pixels
@@ -216,14 +218,14 @@ def test_check_names_light_drift_and_fit_can_include_or_skip_it() -> None:
         choose.__defaults__ = usual
     stored = extension("scene.session.scene_properties").stored_result
     kind, mine = extension("scene.session.scene_properties").DIAGNOSIS, str(path.resolve())
-    said, fit = stored(mine, kind), stored(mine)
-    assert said["named"][0] == "light_intensity"
-    assert said["applied"] == [e["cause"] for e in fit["effects"]]
-    gains = [v["value"] for v in said["causes"][0]["parameters"].values()]
+    diagnosis, fit = stored(mine, kind), stored(mine)
+    assert diagnosis["named"][0] == "light_intensity"
+    assert diagnosis["applied"] == [e["cause"] for e in fit["effects"]]
+    gains = [v["value"] for v in diagnosis["causes"][0]["parameters"].values()]
     truth = -np.log([1, 1.5, 1, 1])
     off = np.abs(gains - (truth - truth.mean())).max()
     assert off < 0.08, (off, gains)  # four photos, each with its own light: gain or BRDF?
-    assert said["extended"]["held_out"] < said["baseline"]["held_out"]
+    assert diagnosis["extended"]["held_out"] < diagnosis["baseline"]["held_out"]
 
     scene, mesh = bpy.context.scene, bpy.context.scene.patina.mesh
     layer = mesh.data.color_attributes["Patina: missed"]
@@ -232,7 +234,7 @@ def test_check_names_light_drift_and_fit_can_include_or_skip_it() -> None:
         assert bpy.ops.patina.show_evidence(cause=name) == {"FINISHED"}
         assert mesh.data.color_attributes.active_color.name == f"Patina: {name}"
 
-    assert [c.name for c in scene.patina.causes if c.use] == said["applied"]
+    assert [c.name for c in scene.patina.causes if c.use] == diagnosis["applied"]
     assert scene.patina.causes[0].name == "light_intensity"
     for cause in scene.patina.causes:
         cause.use = False
@@ -257,8 +259,8 @@ def test_results_survive_saving_and_loading() -> None:
     scene = bpy.context.scene
     assert scene.patina.capture == str(path)
     assert scene.patina.mesh.data.materials[0]["patina_measured"] == "surface"
-    said = extension("scene.session.scene_properties").stored_result(str(path.resolve()))
-    assert said["materials"][0]["name"] == "surface"
+    stored_result = extension("scene.session.scene_properties").stored_result(str(path.resolve()))
+    assert stored_result["materials"][0]["name"] == "surface"
 
 
 def test_georeferenced_scans_keep_their_precision() -> None:

@@ -20,7 +20,7 @@ from patina.core.result import read_result
 from patina.core.scan import Mesh
 from tests import make_capture as made
 
-PLAIN = np.array([0.16, 0.05, 0.04])  # 1/sr, of the material that make_capture uses
+BASE_ALBEDO_OVER_PI = np.array([0.16, 0.05, 0.04])  # 1/sr, of the material that make_capture uses
 
 
 def paint(normal):
@@ -29,7 +29,7 @@ def paint(normal):
 
 
 def painted(normal, light, view):
-    return made.blinn(normal, light, view) + PLAIN * (paint(normal) - 1)
+    return made.blinn(normal, light, view) + BASE_ALBEDO_OVER_PI * (paint(normal) - 1)
 
 
 def sphere_uv(mesh):
@@ -74,7 +74,7 @@ def banded(tmp_path_factory):
 def true_albedo(found):
     normal = found.texels.points(found.scan.mesh, slice(None)) - made.CENTRE
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.pi * PLAIN * paint(normal)
+    return np.pi * BASE_ALBEDO_OVER_PI * paint(normal)
 
 
 @pytest.mark.slow
@@ -163,8 +163,8 @@ def test_normal_map_corrects_mesh_normals_towards_true_surface(tmp_path):
     before, after = np.median(off(normal)[seen]), np.median(off(turned)[seen])
     print(f"normals {before:.2f}° before, {after:.2f}° after")
     assert before > 1.0 and after < 0.75 * before
-    unseen = well_conditioned & (found.maps.photos == 0)
-    assert np.median(off(turned)[unseen]) < 1.15 * np.median(off(normal)[unseen])
+    unobserved = well_conditioned & (found.maps.photos == 0)
+    assert np.median(off(turned)[unobserved]) < 1.15 * np.median(off(normal)[unobserved])
 
 
 def test_tangents_follow_u_on_plain_and_mirrored_faces():

@@ -29,10 +29,10 @@ def error_line(folder, data, match, seconds=SECONDS):
     path = folder / "cameras.xml"
     path.write_bytes(data if isinstance(data, bytes) else data.encode())
     started = time.process_time()
-    with pytest.raises(InputError, match=match) as caught:
+    with pytest.raises(InputError, match=match) as raised:
         read_reconstruction(path)
     assert time.process_time() - started < seconds
-    message = str(caught.value)
+    message = str(raised.value)
     assert message.startswith(str(path)) and "\n" not in message
     return message
 
@@ -57,8 +57,8 @@ def check_survives(path):
 def test_file_truncated_at_any_place(tmp_path, good):
     data = good.encode()
     for at in np.random.default_rng(0).integers(0, len(data) - 20, 50):
-        said = error_line(tmp_path, data[:at], "is not valid XML")
-        assert re.match(r".*cameras\.xml:\d+: ", said)
+        error = error_line(tmp_path, data[:at], "is not valid XML")
+        assert re.match(r".*cameras\.xml:\d+: ", error)
 
 
 def test_encodings(tmp_path, good):
@@ -78,9 +78,9 @@ def test_encodings(tmp_path, good):
     assert len(read_reconstruction(path).cameras) > 10
 
 
-LAUGHS = "".join(f'<!ENTITY a{i + 1} "{f"&a{i};" * 10}">' for i in range(9))
+NESTED_ENTITIES = "".join(f'<!ENTITY a{i + 1} "{f"&a{i};" * 10}">' for i in range(9))
 BOMBS = {
-    "billion laughs": f'<!DOCTYPE d [<!ENTITY a0 "ha">{LAUGHS}]><document>&a9;</document>',
+    "billion laughs": f'<!DOCTYPE d [<!ENTITY a0 "ha">{NESTED_ENTITIES}]><document>&a9;</document>',
     "quadratic blowup": f'<!DOCTYPE d [<!ENTITY a "{"x" * 50000}">]><document>{"&a;" * 50000}'
     "</document>",
     "external entity": '<!DOCTYPE d [<!ENTITY a SYSTEM "file:///etc/passwd">]><document>&a;'
@@ -92,8 +92,8 @@ BOMBS = {
 
 @pytest.mark.parametrize("name", BOMBS)
 def test_entity_expansion_bombs(tmp_path, name):
-    said = error_line(tmp_path, made.HEAD + BOMBS[name], "declares a document type")
-    assert "cameras.xml:2:" in said
+    error = error_line(tmp_path, made.HEAD + BOMBS[name], "declares a document type")
+    assert "cameras.xml:2:" in error
 
 
 def test_deep_nesting_and_long_numbers(tmp_path):
@@ -144,7 +144,7 @@ def test_folder_and_missing_file_are_rejected(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("data", "said"),
+    ("data", "expected"),
     [
         ("<calibration/>", "is a lens calibration, not a Metashape <document>"),
         ("<BlocksExchange/>", "is a <BlocksExchange>, not a Metashape <document>"),
@@ -152,8 +152,8 @@ def test_folder_and_missing_file_are_rejected(tmp_path):
         ("<document><chunk/></document>", "holds no cameras; expected a chunk with aligned photos"),
     ],
 )
-def test_other_xml_documents_are_rejected(tmp_path, data, said):
-    error_line(tmp_path, data, said)
+def test_other_xml_documents_are_rejected(tmp_path, data, expected):
+    error_line(tmp_path, data, expected)
 
 
 def scene(**sensor):
@@ -166,7 +166,7 @@ MATRIX = re.compile(r"(<camera [^>]*><transform>)[^<]*")
 
 
 @pytest.mark.parametrize(
-    ("matrix", "said"),
+    ("matrix", "expected"),
     [
         ("nan " * 16, "<transform> holds 'nan nan .*; expected 16 finite numbers"),
         ("inf " * 16, "expected 16 finite numbers"),
@@ -181,9 +181,9 @@ MATRIX = re.compile(r"(<camera [^>]*><transform>)[^<]*")
         ("1 0 0 1e300 0 1 0 0 0 0 1 0 0 0 0 1", "has a translation of 1e.300 units"),
     ],
 )
-def test_invalid_poses_are_rejected(tmp_path, matrix, said):
+def test_invalid_poses_are_rejected(tmp_path, matrix, expected):
     data = MATRIX.sub(rf"\g<1>{matrix}", scene(), count=1)
-    assert re.match(r".*cameras\.xml(:\d+)?: ", error_line(tmp_path, data, said))
+    assert re.match(r".*cameras\.xml(:\d+)?: ", error_line(tmp_path, data, expected))
 
 
 def test_empty_transform_means_unaligned_camera(tmp_path):
@@ -195,7 +195,7 @@ def test_empty_transform_means_unaligned_camera(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("values", "said"),
+    ("values", "expected"),
     [
         ({"f": 1e-9}, "a focal length of 1e-09 pixels"),
         ({"f": -3000.0}, "a focal length of -3000 pixels"),
@@ -205,8 +205,8 @@ def test_empty_transform_means_unaligned_camera(tmp_path):
         ({"k3": 1e200}, "parameter above 1e12"),
     ],
 )
-def test_invalid_lenses_are_rejected(tmp_path, values, said):
-    error_line(tmp_path, scene(**values), said)
+def test_invalid_lenses_are_rejected(tmp_path, values, expected):
+    error_line(tmp_path, scene(**values), expected)
 
 
 def test_zero_focal_length_is_rejected(tmp_path):
@@ -214,7 +214,7 @@ def test_zero_focal_length_is_rejected(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "expected"),
     [
         ('width="4000"', 'width="99999999999"', "a resolution of '99999999999'"),
         ('width="4000"', 'width="9999999"', "has 9999999 × 3000 pixels"),
@@ -229,8 +229,8 @@ def test_zero_focal_length_is_rejected(tmp_path):
         ("<calibration", "<other", "is not valid XML"),
     ],
 )
-def test_invalid_ids_and_sizes_are_rejected(tmp_path, old, new, said):
-    error_line(tmp_path, scene().replace(old, new), said)
+def test_invalid_ids_and_sizes_are_rejected(tmp_path, old, new, expected):
+    error_line(tmp_path, scene().replace(old, new), expected)
 
 
 def test_missing_calibration(tmp_path):
@@ -319,9 +319,9 @@ NUMBER = re.compile(r"(?<=[ >])-?\d+\.\d+(?:e-?\d+)?(?=[ <])")
 def test_fuzz_numbers(good, tmp_path, places, values):
     """Well-formed files in which any number is replaced by any other."""
     found = list(NUMBER.finditer(good))
-    chosen = sorted({int(p * len(found)) for p in places}, reverse=True)
+    replaced = sorted({int(p * len(found)) for p in places}, reverse=True)
     text = good
-    for place, value in zip(chosen, values, strict=False):
+    for place, value in zip(replaced, values, strict=False):
         match = found[place]
         text = f"{text[: match.start()]}{value!r}{text[match.end() :]}"
     path = tmp_path / "fuzz.xml"

@@ -29,11 +29,11 @@ def scene():
 
 def error_line(path, match, **more):
     started = time.process_time()
-    with pytest.raises(InputError, match=match) as caught:
+    with pytest.raises(InputError, match=match) as raised:
         read_reconstruction(path, **more)
     assert time.process_time() - started < SECONDS
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
+    assert "\n" not in str(raised.value)
+    return str(raised.value)
 
 
 @pytest.mark.parametrize("kind", ["psx", "psz"])
@@ -42,8 +42,8 @@ def test_round_trip(tmp_path, scene, kind):
     photos = {0: "../../../photos/IMG_0000.JPG", 1: "C:/shoot/IMG_0001.JPG", 2: "/net/2.JPG"}
     if kind == "psx":
         path = made.write_psx(tmp_path, "my scan", [chunk], photos)
-        beside = "../../../photos/IMG_0000.JPG"
-        assert (tmp_path / "my scan.files" / "0" / "0" / beside).resolve().parent == (
+        relative_path = "../../../photos/IMG_0000.JPG"
+        assert (tmp_path / "my scan.files" / "0" / "0" / relative_path).resolve().parent == (
             tmp_path / "photos"
         )
     else:

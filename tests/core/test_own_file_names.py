@@ -15,7 +15,7 @@ from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.errors import PatinaError
 from patina.core.photo import write_exr, write_png
 
-GOOD = "patina_components_0123456789ab.exr"
+VALID = "patina_components_0123456789ab.exr"
 
 
 def test_generated_names_are_accepted(tmp_path):
@@ -37,8 +37,8 @@ def test_all_digests_are_accepted(kind, number):
 
 
 @given(
-    st.text() | st.builds(lambda a, b: a + GOOD + b, st.text(), st.text())
-    | st.builds(lambda i, c: GOOD[:i] + c + GOOD[i:], st.integers(0, len(GOOD)), st.text())
+    st.text() | st.builds(lambda a, b: a + VALID + b, st.text(), st.text())
+    | st.builds(lambda i, c: VALID[:i] + c + VALID[i:], st.integers(0, len(VALID)), st.text())
 )  # fmt: skip
 def test_accepted_names_are_bare_names_on_every_platform(name):
     if osl_atlas.is_own_name(name):
@@ -50,9 +50,9 @@ def test_accepted_names_are_bare_names_on_every_platform(name):
 @pytest.mark.parametrize(
     "name",
     [
-        "../../evil.pth", "/tmp/" + GOOD, "../" + GOOD, "..\\" + GOOD, "C:" + GOOD, GOOD + "\n",
-        GOOD + "/", GOOD + ":stream", GOOD.upper(), GOOD[:-4] + ".pth", GOOD.replace("0", "g"),
-        GOOD.replace("0", "\u0660"), "", ".", "..", None, 7, [GOOD], GOOD.encode(),
+        "../../evil.pth", "/tmp/" + VALID, "../" + VALID, "..\\" + VALID, "C:" + VALID, VALID + "\n",
+        VALID + "/", VALID + ":stream", VALID.upper(), VALID[:-4] + ".pth", VALID.replace("0", "g"),
+        VALID.replace("0", "\u0660"), "", ".", "..", None, 7, [VALID], VALID.encode(),
     ],
 )  # fmt: skip
 def test_other_names_are_rejected(name):

@@ -23,7 +23,7 @@ from patina.core.diagnose.solver.model import Model
 from patina.core.diagnose.solver.residual_scale import expected_deviation
 from tests.make_lit_ball import NOISE, changed, lit_ball
 
-DEEP = np.radians(6.0)
+BUMP_TILT = np.radians(6.0)
 
 
 def bumpy(seed: int, wide: float) -> tuple[DiagnosisContext, np.ndarray]:
@@ -32,7 +32,7 @@ def bumpy(seed: int, wide: float) -> tuple[DiagnosisContext, np.ndarray]:
     """
     context = lit_ball(seed)
     pixels = context.pixels
-    slope = DEEP * np.sin(2 * np.pi * pixels.point / wide)
+    slope = BUMP_TILT * np.sin(2 * np.pi * pixels.point / wide)
     slope -= np.sum(slope * pixels.normal, axis=1, keepdims=True) * pixels.normal
     normal = pixels.normal + slope
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -98,5 +98,7 @@ def test_white_lambertian_wall_needs_little_slack():
     context = changed(context, observed)
     fitted = fit(Model(context.pixels, context.brdfs), deviation_of(context))
     assert np.median(np.abs(fitted.predicted / observed - 1)) < 1.5 * NOISE
-    hats = fitted.model.brdfs.coefficients[..., -basis_slack.COUNT :]
-    assert np.abs(hats).max() < 0.2  # 0.46 where the basis functions must make it brighter, too
+    slack_coefficients = fitted.model.brdfs.coefficients[..., -basis_slack.COUNT :]
+    assert (
+        np.abs(slack_coefficients).max() < 0.2
+    )  # 0.46 where the basis functions must make it brighter, too

@@ -290,9 +290,9 @@ def broken_exr(path: Path) -> None:
 )
 def test_unsupported_images_are_rejected(tmp_path: Path, name: str, make, message: str) -> None:
     make(tmp_path / name)
-    with pytest.raises(InputError, match=message) as caught:
+    with pytest.raises(InputError, match=message) as raised:
         read_photo(tmp_path / name)
-    assert "\n" not in str(caught.value) and name in str(caught.value)
+    assert "\n" not in str(raised.value) and name in str(raised.value)
 
 
 def seeds(folder: Path) -> dict[str, Path]:

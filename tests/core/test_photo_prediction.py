@@ -96,9 +96,11 @@ def test_select_photos_keeps_lines_and_lights(ball: patina.Capture) -> None:
         assert some.lines["photo", place, "file"] == ball.lines["photo", old, "file"]
 
 
-@pytest.mark.parametrize(("photos", "said"), [(["no.exr"], "no photo"), ([9], "9"), ([], "left")])
-def test_invalid_photo_selection_is_named(ball: patina.Capture, photos: list, said: str) -> None:
-    with pytest.raises(InputError, match=said):
+@pytest.mark.parametrize(
+    ("photos", "message"), [(["no.exr"], "no photo"), ([9], "9"), ([], "left")]
+)
+def test_invalid_photo_selection_is_named(ball: patina.Capture, photos: list, message: str) -> None:
+    with pytest.raises(InputError, match=message):
         patina.select_photos(ball, photos)
 
 

@@ -83,9 +83,9 @@ def test_damaged_raw_files(tmp_path: Path) -> None:
     whole = path.read_bytes()
     for part in np.linspace(0, 0.99, 50):
         path.write_bytes(whole[: int(len(whole) * part)])
-        with pytest.raises(InputError, match=r"p\.dng") as caught:
+        with pytest.raises(InputError, match=r"p\.dng") as raised:
             read_photo(path)
-        assert "\n" not in str(caught.value)
+        assert "\n" not in str(raised.value)
     rng = np.random.default_rng(0)
     for _ in range(100):
         damaged = bytearray(whole)

@@ -11,14 +11,14 @@ from patina.core.appearance.principled_fit import fit_principled
 from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.errors import FitError
 
-OWN = [
+PARAMETER_SETS = [
     Principled(base_color=np.array([0.6, 0.1, 0.05]), roughness=0.3),
     Principled(base_color=np.array([0.9, 0.6, 0.2]), metallic=1.0, roughness=0.15),
     Principled(base_color=np.array([0.3, 0.4, 0.5]), roughness=0.8, specular_ior_level=0.2),
 ]
 
 
-@pytest.mark.parametrize("truth", OWN, ids=["glossy", "metal", "matte"])
+@pytest.mark.parametrize("truth", PARAMETER_SETS, ids=["glossy", "metal", "matte"])
 def test_principled_parameters_are_recovered(truth):
     fit = fit_principled(truth.evaluate)
     found = fit.principled

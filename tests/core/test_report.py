@@ -48,8 +48,8 @@ def test_page_contains_all_linked_images(result: CaptureResult, tmp_path: Path) 
 
 
 def test_result_json_describes_measurement(result: CaptureResult, job: FitJob) -> None:
-    said = json.loads(json.dumps(result_json.describe(result, job.stages)))
-    material = said["materials"][0]
+    description = json.loads(json.dumps(result_json.describe(result, job.stages)))
+    material = description["materials"][0]
     assert material["estimator"] == "measured" and "chosen" not in material
     coefficients = np.array(material["coefficients"])
     assert coefficients.shape == (3, result.basis.count)
@@ -65,10 +65,10 @@ def test_result_json_describes_measurement(result: CaptureResult, job: FitJob) -
     warnings = material["uncertainty"]
     for key, value in warnings["interval_90"].items():
         assert value == pytest.approx(np.exp(1.645 * warnings[key]) - 1, rel=1e-3) and value > 0
-    assert {s["name"] for s in said["stages"]} >= {"reading the scan", "sampling the photos"}
-    assert all(s["seconds"] >= 0 for s in said["stages"])
-    assert said["basis"]["version"] == result.basis.version
-    assert said["basis"]["components"] == result.basis.count
+    assert {s["name"] for s in description["stages"]} >= {"reading the scan", "sampling the photos"}
+    assert all(s["seconds"] >= 0 for s in description["stages"])
+    assert description["basis"]["version"] == result.basis.version
+    assert description["basis"]["components"] == result.basis.count
 
 
 def test_paper_result_lists_selected_pixels(tmp_path: Path) -> None:
@@ -78,8 +78,8 @@ def test_paper_result_lists_selected_pixels(tmp_path: Path) -> None:
     job = FitJob(read_capture(path))
     job.drain()
     assert job.result is not None
-    said = json.loads(json.dumps(result_json.describe(job.result, job.stages)))
-    material = said["materials"][0]
+    description = json.loads(json.dumps(result_json.describe(job.result, job.stages)))
+    material = description["materials"][0]
     assert material["estimator"] == "paper" and np.array(material["coefficients"]).shape == (3, 6)
     assert len(material["chosen"]) == 6 and len(material["cosine_similarity"]) == 2
     for selected in material["chosen"]:
@@ -116,8 +116,8 @@ def test_wide_intervals_are_written_as_factors() -> None:
 
 def test_unused_samples_are_reported(result: CaptureResult) -> None:
     material = replace(result.materials[0], samples=2_500_000, used=400_001)
-    said = dict(figures.figures(material, ["a"] * 3))["Samples"]
-    assert said.startswith("2,500,000 lit pixels; 400,001 of them are used, as a representative")
+    shown = dict(figures.figures(material, ["a"] * 3))["Samples"]
+    assert shown.startswith("2,500,000 lit pixels; 400,001 of them are used, as a representative")
 
 
 def test_page_shows_uncertainty(result: CaptureResult, tmp_path: Path) -> None:
@@ -155,10 +155,10 @@ def test_swapped_photos_are_named_in_warning(tmp_path: Path) -> None:
     path = made.make_capture(tmp_path / "ball", photos=6)
     text = path.read_text().replace("view_02", "swap").replace("view_05", "view_02")
     path.write_text(text.replace("swap", "view_05"))
-    said = " ".join(black_photo_warnings(sampled(path)[0], read_capture(path)))
-    assert "lit_2.exr" in said or "lit_5.exr" in said, said
+    warnings = " ".join(black_photo_warnings(sampled(path)[0], read_capture(path)))
+    assert "lit_2.exr" in warnings or "lit_5.exr" in warnings, warnings
 
 
 def test_good_capture_has_no_swap_warning(result: CaptureResult) -> None:
-    said = " ".join(result.materials[0].warnings)
-    assert "black" not in said and "times the median" not in said
+    warnings = " ".join(result.materials[0].warnings)
+    assert "black" not in warnings and "times the median" not in warnings

@@ -17,8 +17,8 @@ from tests import make_result as made
 
 
 def one(folder: Path, **changes) -> Path:
-    told = made.description(made.material("bronze", made.BRONZE, **changes))
-    return made.write_result(folder, told)
+    description = made.description(made.material("bronze", made.BRONZE, **changes))
+    return made.write_result(folder, description)
 
 
 def test_written_result_is_read_back(tmp_path: Path) -> None:
@@ -51,13 +51,13 @@ def test_user_basis_is_found_by_its_version(tmp_path: Path) -> None:
     (cache / "merl_basis_0.npz").write_bytes(b"damaged")
     storage.save(cache / "merl_basis_1.npz", own)
     stored = storage.load(cache / "merl_basis_1.npz")
-    told = made.description(made.material("a", 0, coefficients=[[0.1] * 5] * 3))
-    told["basis"]["version"] = stored.version
-    folder = made.write_result(tmp_path / "r", told)
+    description = made.description(made.material("a", 0, coefficients=[[0.1] * 5] * 3))
+    description["basis"]["version"] = stored.version
+    folder = made.write_result(tmp_path / "r", description)
     assert read_result(folder, cache).materials[0].brdf.basis.provenance == "mine"
-    with pytest.raises(InputError, match=r"\[basis.version\].*basis --merl") as caught:
+    with pytest.raises(InputError, match=r"\[basis.version\].*basis --merl") as raised:
         read_result(folder, tmp_path / "nothing")
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(raised.value)
 
 
 WRONG = [
@@ -86,10 +86,10 @@ WRONG = [
     ("change", "key"), WRONG, ids=[f"{i}-{k}" for i, (_, k) in enumerate(WRONG)]
 )
 def test_invalid_entry_is_named(tmp_path: Path, change: dict, key: str) -> None:
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(InputError) as raised:
         read_result(one(tmp_path, **change))
-    assert f"materials[0].{key}" in str(caught.value)
-    assert "result.json" in str(caught.value) and "\n" not in str(caught.value)
+    assert f"materials[0].{key}" in str(raised.value)
+    assert "result.json" in str(raised.value) and "\n" not in str(raised.value)
 
 
 def test_invalid_files_are_rejected(tmp_path: Path) -> None:
@@ -105,9 +105,9 @@ def test_invalid_files_are_rejected(tmp_path: Path) -> None:
     }
     for content, message in cases.items():
         file.write_bytes(content)
-        with pytest.raises(InputError, match=message) as caught:
+        with pytest.raises(InputError, match=message) as raised:
             read_result(tmp_path)
-        assert "\n" not in str(caught.value) and len(str(caught.value)) < 600
+        assert "\n" not in str(raised.value) and len(str(raised.value)) < 600
     file.unlink()
     for path in (tmp_path, tmp_path / "nowhere", file):
         with pytest.raises(InputError, match="does not exist"):
@@ -125,9 +125,9 @@ def test_huge_file_is_rejected_without_reading(tmp_path: Path) -> None:
 
 
 def test_duplicate_names_are_rejected(tmp_path: Path) -> None:
-    told = made.description(made.material("Gold", 0), made.material("gold", 1))
+    description = made.description(made.material("Gold", 0), made.material("gold", 1))
     with pytest.raises(InputError, match="twice"):
-        read_result(made.write_result(tmp_path, told))
+        read_result(made.write_result(tmp_path, description))
 
 
 PLACES = st.sampled_from(
@@ -161,13 +161,13 @@ VALUES = st.recursive(
     max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 def test_any_value_is_read_or_rejected_in_one_line(tmp_path: Path, place, value) -> None:
-    told = made.description(made.material("a", 0, coefficients=[[0.1, 0.2]] * 3))
-    told = json.loads(json.dumps(told))
-    holder = told
+    description = made.description(made.material("a", 0, coefficients=[[0.1, 0.2]] * 3))
+    description = json.loads(json.dumps(description))
+    holder = description
     for key in place[:-1]:
         holder = holder[key]
     holder[place[-1]] = value
-    (tmp_path / "result.json").write_text(json.dumps(told), "utf-8")
+    (tmp_path / "result.json").write_text(json.dumps(description), "utf-8")
     try:
         result = read_result(tmp_path, tmp_path / "nothing")
     except InputError as error:
@@ -181,8 +181,8 @@ def test_any_value_is_read_or_rejected_in_one_line(tmp_path: Path, place, value)
     max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 def test_damaged_bytes_are_read_or_rejected(tmp_path: Path, cut: int, byte: int) -> None:
-    told = made.description(made.material("a", 0, coefficients=[[0.1, 0.2]] * 3))
-    content = bytearray(json.dumps(told).encode())
+    description = made.description(made.material("a", 0, coefficients=[[0.1, 0.2]] * 3))
+    content = bytearray(json.dumps(description).encode())
     cut %= len(content)
     for damaged in (bytes(content[:cut]), bytes([*content[:cut], byte, *content[cut + 1 :]])):
         (tmp_path / "result.json").write_bytes(damaged)

@@ -292,13 +292,19 @@ def test_invalid_result_is_rejected(root: Path, measured: dict[str, Any], mistak
     assert not validator(root, "result").is_valid(wrong)
 
 
-TRIED = {"light_intensity", "light_direction", "near_light", "camera_response", "vignetting"}
+TESTED_CAUSES = {
+    "light_intensity",
+    "light_direction",
+    "near_light",
+    "camera_response",
+    "vignetting",
+}
 
 
 @pytest.mark.slow
 def test_diagnosis_is_valid(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a capture in which one lamp was 30 % brighter than stated; five causes are tested."""
-    tried = tuple(kind for kind in effects.EFFECTS if kind.cause in TRIED)
+    tried = tuple(kind for kind in effects.EFFECTS if kind.cause in TESTED_CAUSES)
     monkeypatch.setattr(effects, "EFFECTS", tried)
     capture = made.make_capture(tmp_path / "ball", photos=4)
     poses, lights = list(made.poses(4)), list(made.light_directions(4))
@@ -308,15 +314,22 @@ def test_diagnosis_is_valid(root: Path, tmp_path: Path, monkeypatch: pytest.Monk
     job.drain()
     found, before, after = job.checked.found, job.checked.result, job.result
     assert found is not None and before is not None and after is not None
-    said = json.loads(json.dumps(diagnosis_json.describe(found, before, after), allow_nan=False))
+    described = json.loads(
+        json.dumps(diagnosis_json.describe(found, before, after), allow_nan=False)
+    )
     check = validator(root, "diagnosis")
-    check.validate(said)
-    assert set(said["tried"]) == TRIED and "light_intensity" in said["named"]
+    check.validate(described)
+    assert set(described["tried"]) == TESTED_CAUSES and "light_intensity" in described["named"]
     result = result_json.describe(after, job.stages)
     validator(root, "result").validate(json.loads(json.dumps(result)))
-    for wrong_place in (said, said["causes"][0], said["materials"][0], said["left"]):
+    for wrong_place in (
+        described,
+        described["causes"][0],
+        described["materials"][0],
+        described["left"],
+    ):
         wrong_place["gian"] = 1.0
-        assert not check.is_valid(said)
+        assert not check.is_valid(described)
         del wrong_place["gian"]
-    said["named"] = ["bad_luck"]
-    assert not check.is_valid(said)
+    described["named"] = ["bad_luck"]
+    assert not check.is_valid(described)

@@ -23,11 +23,14 @@ from patina.core.solve import LocaliseJob, SolveJob, find_photos
 from tests import make_photos_of_scene as made
 
 VIEWS = 14
-LIT = (((0.5, -0.3, -0.8), 0.13), ((-0.6, -0.5, -0.6), 2.2))  # light in the camera's frame; where
+LIT_PHOTO_LIGHTS = (
+    ((0.5, -0.3, -0.8), 0.13),
+    ((-0.6, -0.5, -0.6), 2.2),
+)  # light in the camera's frame; where
 
 
 def lit_views():
-    for light, start in LIT:
+    for light, start in LIT_PHOTO_LIGHTS:
         (view,) = made.ring(1, heights=(0.55,), start=start)
         yield view, view.rotation.T @ np.array(light)
 

@@ -247,9 +247,9 @@ def test_prediction_uses_given_brdf(opened: Opened) -> None:
     dark = np.isin(one.criteria, (Criterion.TURNED_AWAY, Criterion.CAST_SHADOW))
     assert lit.sum() > 100 and not one.predicted[known & dark].any()
     assert np.allclose(half.predicted[lit], one.predicted[lit] / 2, rtol=1e-5)
-    missed = one.predicted[known] - one.measured[known]
+    residual = one.predicted[known] - one.measured[known]
     assert one.error == pytest.approx(
-        np.linalg.norm(missed) / np.linalg.norm(one.measured[known]), rel=1e-4
+        np.linalg.norm(residual) / np.linalg.norm(one.measured[known]), rel=1e-4
     )
 
 
@@ -331,5 +331,5 @@ def test_criterion_colours_are_distinguishable_with_colour_blindness() -> None:
 
 
 def test_the_guide_explains_every_criterion(root: Path) -> None:
-    told = (root / "docs" / "guide" / "report.md").read_text("utf-8")
-    assert all(look.word in told for look in LOOKS.values())
+    guide = (root / "docs" / "guide" / "report.md").read_text("utf-8")
+    assert all(look.word in guide for look in LOOKS.values())

@@ -23,7 +23,7 @@ from tests.wheel import maps_scene  # noqa: E402
 from tests.wheel import test_maps_truth as truth  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
-SHOWN = 0  # index of a photo with a highlight and the ball's shadow
+SHOWN_PHOTO = 0  # index of a photo with a highlight and the ball's shadow
 SIZE = 512
 
 
@@ -40,14 +40,14 @@ def coordinates(mesh, face, point):
 
 def panels(folder, result):
     """(h, 3 w, 3) sRGB: a photo, the recovered map and the painted map, from its viewpoint."""
-    camera = capture_data.camera_of(result.capture, result.scan, SHOWN)
+    camera = capture_data.camera_of(result.capture, result.scan, SHOWN_PHOTO)
     view = view_surface(RayScene.build(result.scan.mesh), camera)
     uv = coordinates(result.scan.mesh, view.face, view.point)
     size = result.texels.size
     column, row = np.clip((uv * [1, -1] + [0, 1]) * size, 0, size - 1).astype(int).T
     found = result.texels.image(base_color(result, 0))[row, column]
     painted = maps_scene.base_color(uv[:, 0], uv[:, 1])
-    photo = maps_scene.photo(folder, SHOWN)
+    photo = maps_scene.photo(folder, SHOWN_PHOTO)
     rest = [np.nan_to_num(view.image(v.astype(np.float64))) for v in (found, painted)]
     return np.concatenate([photo, *rest], axis=1)
 
@@ -55,8 +55,8 @@ def panels(folder, result):
 def figures(folder, result):
     """The figures in docs/guide/maps.md."""
     expected, found = truth.truth(result.texels), base_color(result, 0)
-    cosine, shaded, points = truth.looked_at(result.scan, result.texels)
-    plain = truth.plain_way(folder, points, cosine)
+    cosine, shaded, points = truth.visibility(result.scan, result.texels)
+    plain = truth.naive_albedo(folder, points, cosine)
     rows = {
         "seen lit by one photo": result.maps.photos == 1,
         "by two": result.maps.photos == 2,

@@ -77,9 +77,9 @@ def test_invalid_destinations_are_rejected_before_any_work(result: Path, tmp_pat
         (result, result),
     ):
         output = argparse.Namespace(result=source, to=["binary"], out=out, material=None)
-        with pytest.raises(InputError) as caught:
+        with pytest.raises(InputError) as raised:
             material.run(output)
-        assert "\n" not in str(caught.value)
+        assert "\n" not in str(raised.value)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file"]
     assert [p.name for p in result.iterdir()] == ["result.json"]
 

@@ -60,9 +60,9 @@ def test_fit_writes_exactly_the_documented_files(fitted: Path) -> None:
 
 
 def test_binary_file_holds_brdf_of_coefficients(fitted: Path) -> None:
-    said = json.loads((fitted / "result.json").read_text())
-    coefficients = np.array(said["materials"][0]["coefficients"])
-    assert said["basis"]["version"] == default_basis().version
+    result = json.loads((fitted / "result.json").read_text())
+    coefficients = np.array(result["materials"][0]["coefficients"])
+    assert result["basis"]["version"] == default_basis().version
     table = merl_file.read(fitted / "surface.binary")
     # at a cell's centre, as docs say: θh = 90°·((ih+½)/90)², θd = id+½°, φd = ip+½°
     ih, idx, ip = 20, 33, 120
@@ -116,9 +116,9 @@ def test_user_error_is_one_line_and_leaves_no_files(
     before = sorted(p.name for p in ball.parent.iterdir())
     done = headless(root, "fit", broken, "--out", tmp_path / "out")
     assert done.returncode == 2
-    said = [line for line in done.stderr.splitlines() if not line.startswith("[")]
-    assert len(said) == 1 and "Traceback" not in done.stderr
-    assert re.search(message.replace("ball", "broken"), said[0]), said[0]
+    error_lines = [line for line in done.stderr.splitlines() if not line.startswith("[")]
+    assert len(error_lines) == 1 and "Traceback" not in done.stderr
+    assert re.search(message.replace("ball", "broken"), error_lines[0]), error_lines[0]
     assert list(tmp_path.iterdir()) == []
     assert sorted(p.name for p in ball.parent.iterdir()) == before
 

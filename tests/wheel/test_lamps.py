@@ -90,14 +90,14 @@ def test_cycles_irradiance_matches_core(light: Light, tmp_path: Path) -> None:
     assert np.median(error) < 0.001
 
 
-SOFT = [
+EXTENDED_LIGHTS = [
     DistantLight("sun", np.array([0.48, -0.36, 0.8]), COLOUR, np.radians(3.0)),
     NearLight("lamp", ORIGIN + np.array([1.1, 0.9, 1.6]), COLOUR, 0.25),
     MountedLight("flash", np.array([0.5, -0.3, 0.2]), COLOUR, 0.25),
 ]
 
 
-@pytest.mark.parametrize("light", SOFT, ids=lambda light: light.name)
+@pytest.mark.parametrize("light", EXTENDED_LIGHTS, ids=lambda light: light.name)
 def test_extended_source_gives_same_irradiance_where_fully_visible(
     light: Light, tmp_path: Path
 ) -> None:

@@ -64,4 +64,4 @@ def test_principled_matches_cycles(node, case, tmp_path):
         node.inputs[socket].default_value = (*value, 1.0) if np.ndim(value) else value
     image = cycles_sphere.render(tmp_path)
     bpy.data.objects.remove(lamp)
-    cycles_sphere.assert_is(image, model, light, 2.0)
+    cycles_sphere.assert_matches_model(image, model, light, 2.0)

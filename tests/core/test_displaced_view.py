@@ -72,18 +72,18 @@ def test_shadows_are_those_at_displaced_pixel():
     """Boxes stand between the lamps and the ball; six pixels away their shadows fall elsewhere."""
     context, truth = _ball_context(boxes=True)
     pixels = context.pixels
-    lit, told = (
+    lit, uncorrected = (
         (~cast_shadow(context.rays, RADIUS * normal, normal, pixels.light, None)).astype(np.float32)
         for normal in (truth, pixels.normal.astype(float))
     )
-    pixels = replace(pixels, visible=told)
+    pixels = replace(pixels, visible=uncorrected)
     context = replace(context, pixels=pixels)
     effect = CameraPose.of(context)
     x = np.tile([6.0, 0.0, 0.0], len(effect.photos))
     seen = effect.with_rays(context, x)
     found = seen.shading(ShadingState.of(pixels), x).visible
     facing = np.einsum("ij,ij->i", truth, pixels.light) > 0.05
-    errors = [np.abs(v - lit)[facing].mean() for v in (told, found)]
+    errors = [np.abs(v - lit)[facing].mean() for v in (uncorrected, found)]
     assert errors[0] > 0.015
     assert errors[1] < 0.1 * errors[0]
 

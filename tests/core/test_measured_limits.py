@@ -34,7 +34,7 @@ from patina.core.samples import SampleTable, sample_photo
 from patina.core.samples.take import light_surface
 from tests import make_capture as made
 
-QUICK = MeasuredSettings(components=30, rounds=2)
+FAST_SETTINGS = MeasuredSettings(components=30, rounds=2)
 BALL, PLANE = "ball", "plane"
 
 
@@ -116,13 +116,13 @@ def is_finite(fit: MeasuredFit) -> None:
     assert np.isfinite(rho).all() and (rho >= 0).all()
     kept = MeasuredResult.of(fit)
     assert np.isfinite(kept.band.values).all() and (kept.band.values > 0).all()
-    told = [
+    reported = [
         kept.normal_deviation,
         fit.temperature,
         *kept.gains.values(),
         *vars(kept.band.spread()).values(),
     ]
-    json.dumps([float(x) for x in told], allow_nan=False)
+    json.dumps([float(x) for x in reported], allow_nan=False)
     for other in fit.without.values():
         assert np.isfinite(other.coefficients).all()
 
@@ -145,21 +145,21 @@ def is_finite(fit: MeasuredFit) -> None:
 )
 def test_unusual_captures_give_finite_results(case: dict) -> None:
     table = samples(**case)
-    fit = fit_measured(table, default_basis(), QUICK)
+    fit = fit_measured(table, default_basis(), FAST_SETTINGS)
     is_finite(fit)
     photos = np.unique(table.photo).tolist()
     assert sorted(fit.without) == (photos if len(photos) > 1 else [])
 
 
 def test_grey_material_stays_grey() -> None:
-    fit = fit_measured(samples(400, rho=(0.3, 0.3, 0.3)), default_basis(), QUICK)
+    fit = fit_measured(samples(400, rho=(0.3, 0.3, 0.3)), default_basis(), FAST_SETTINGS)
     c = fit.brdf.coefficients
     assert np.allclose(c[0], c[1], atol=1e-5) and np.allclose(c[0], c[2], atol=1e-5)
 
 
 def test_black_material_stays_black() -> None:
     table = samples(1000, rho=(0.0, 0.0, 0.0))
-    fit = fit_measured(table, default_basis(), QUICK)
+    fit = fit_measured(table, default_basis(), FAST_SETTINGS)
     assert np.median(fit.brdf.evaluate(table.angles)) < 2e-3
 
 
@@ -167,7 +167,7 @@ def test_all_samples_at_one_direction() -> None:
     table = samples(200)
     patches = Patches.of_points(np.ones((200, 3)))
     assert patches.count == 1 and patches.neighbours.shape == (1, 1)
-    is_finite(fit_measured(replace(table, point=np.ones((200, 3))), default_basis(), QUICK))
+    is_finite(fit_measured(replace(table, point=np.ones((200, 3))), default_basis(), FAST_SETTINGS))
 
 
 def test_invalid_samples_are_ignored() -> None:
@@ -181,8 +181,10 @@ def test_invalid_samples_are_ignored() -> None:
     point[77, 0] = np.nan
     bad = [3, 17, 40, 41, 77]
     broken = replace(table, radiance=radiance, irradiance=irradiance, point=point)
-    fit = fit_measured(broken, default_basis(), QUICK)
-    expected = fit_measured(table.select(np.delete(np.arange(600), bad)), default_basis(), QUICK)
+    fit = fit_measured(broken, default_basis(), FAST_SETTINGS)
+    expected = fit_measured(
+        table.select(np.delete(np.arange(600), bad)), default_basis(), FAST_SETTINGS
+    )
     assert fit.samples == 595
     assert fit.brdf.coefficients.tobytes() == expected.brdf.coefficients.tobytes()
 
@@ -192,7 +194,7 @@ def test_too_few_valid_samples_are_rejected() -> None:
     radiance = np.array(table.radiance)
     radiance[:20] = np.nan
     with pytest.raises(FitError, match="40 lit samples"):
-        fit_measured(replace(table, radiance=radiance), default_basis(), QUICK)
+        fit_measured(replace(table, radiance=radiance), default_basis(), FAST_SETTINGS)
 
 
 def test_large_curved_patches_keep_positive_normal_variance() -> None:
@@ -345,7 +347,7 @@ def test_black_photo_has_no_relative_error() -> None:
     dark = table.photo == 1
     radiance = np.where(dark[:, None], np.float32(0), table.radiance)
     table = replace(table, radiance=radiance)
-    fit = fit_measured(table, default_basis(), QUICK)
+    fit = fit_measured(table, default_basis(), FAST_SETTINGS)
     held = summarise([prediction_errors(table, p, fit.brdf) for p in (0, 1, 2)])
     assert held is not None and sorted(held.per_photo) == [0, 2]
     assert np.isfinite([held.error, held.typical]).all() and held.typical < 1.0
@@ -362,7 +364,9 @@ def test_noise_below_black_level_gives_no_infinite_error() -> None:
     radiance[:100] = 0.0
     radiance[100:180] = table.radiance[100:180]
     found = prediction_errors(
-        replace(table, radiance=radiance), 0, fit_measured(table, default_basis(), QUICK).brdf
+        replace(table, radiance=radiance),
+        0,
+        fit_measured(table, default_basis(), FAST_SETTINGS).brdf,
     )
     assert np.isfinite(found.relative).all() and (found.relative >= 0).all()
     assert len(found.relative) == 80

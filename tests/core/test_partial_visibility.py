@@ -25,13 +25,13 @@ from patina.core.geometry.lift import MIN_LIFT, SHADOW_LIFT, facet_lift
 from patina.core.scan import Mesh
 from tests import make_lit_ball
 
-WALL = 0.5  # height; the wall stands at x = 0 across a floor
-WIDE = 0.02  # width of a pixel on the floor
+WALL_HEIGHT = 0.5  # height; the wall stands at x = 0 across a floor
+PIXEL_WIDTH = 0.02  # width of a pixel on the floor
 
 
 def _floor_and_wall() -> RayScene:
     floor = [[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]]
-    wall = [[0, -2, 0], [0, 2, 0], [0, 2, WALL], [0, -2, WALL]]
+    wall = [[0, -2, 0], [0, 2, 0], [0, 2, WALL_HEIGHT], [0, -2, WALL_HEIGHT]]
     faces = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]
     mesh = Mesh(np.array(floor + wall, float), np.array(faces, np.int32))
     return RayScene.build(mesh).close()
@@ -42,7 +42,7 @@ def _row_of_pixels(x: np.ndarray, light: np.ndarray) -> Pixels:
     some = make_lit_ball.lit_ball().pixels.select(np.zeros(n, np.intp))
     ones = np.ones((n, 1), np.float32)
     step = np.zeros((n, 2, 3), np.float32)
-    step[:, 0, 0] = step[:, 1, 1] = WIDE
+    step[:, 0, 0] = step[:, 1, 1] = PIXEL_WIDTH
     point = np.stack([x, np.full(n, 0.1), np.zeros(n)], axis=1)
     return replace(
         some, point=point, normal=ones * np.float32([0, 0, 1]), light=ones * light, step=step,
@@ -56,14 +56,14 @@ def _towards(elevation: float) -> np.ndarray:
 
 @pytest.mark.parametrize("elevation", [0.2, 0.5, 1.0])
 def test_visibility_is_unshadowed_fraction_of_pixel(elevation: float) -> None:
-    ends = WALL / np.tan(elevation)  # of the shadow
-    x = ends + WIDE * np.linspace(-2, 2, 41)
+    ends = WALL_HEIGHT / np.tan(elevation)  # of the shadow
+    x = ends + PIXEL_WIDTH * np.linspace(-2, 2, 41)
     towards = _towards(elevation)
     pixels = _row_of_pixels(x, towards)
     found = partial_visibility(_floor_and_wall(), pixels, pixels.light)
-    true = np.clip((x - ends) / WIDE + 0.5, 0, 1)
+    true = np.clip((x - ends) / PIXEL_WIDTH + 0.5, 0, 1)
     # columns of rays, and the ray offset by which a shadow begins late
-    late = SHADOW_LIFT * 4 / np.tan(elevation) / WIDE
+    late = SHADOW_LIFT * 4 / np.tan(elevation) / PIXEL_WIDTH
     assert np.abs(found - true).max() <= 0.5 / SIDE + late + 1e-6
     assert abs(found.mean() - true.mean()) < 0.02 + late
 
@@ -78,12 +78,12 @@ def test_wide_lamp_gives_penumbra_over_whole_pixels() -> None:
     lamp equals a point.
     """
     high, rng = 0.5, np.random.default_rng(0)
-    ends = WALL / np.tan(high)
-    wide = 5 * WIDE  # than which the penumbra is narrower
+    ends = WALL_HEIGHT / np.tan(high)
+    wide = 5 * PIXEL_WIDTH  # than which the penumbra is narrower
     x = ends + np.linspace(-0.15, 0.15, 61)
     rays = _floor_and_wall()
     pixels = _row_of_pixels(x, _towards(high))
-    pixels = replace(pixels, step=pixels.step * np.float32(wide / WIDE))
+    pixels = replace(pixels, step=pixels.step * np.float32(wide / PIXEL_WIDTH))
     pixels = replace(pixels, visible=partial_visibility(rays, pixels, pixels.light))
     effect = AreaLight.of(replace(make_lit_ball.lit_ball(), pixels=pixels, rays=rays))
     assert effect is not None and np.array_equal(effect.free[:, 0], pixels.visible)
@@ -94,7 +94,7 @@ def test_wide_lamp_gives_penumbra_over_whole_pixels() -> None:
             aside * np.cos(turn) * effect.first[:1].T + aside * np.sin(turn) * effect.other[:1].T
         )
         lamps = _towards(high)[:, None] + sides
-        reach = -WALL * lamps[0] / lamps[2]
+        reach = -WALL_HEIGHT * lamps[0] / lamps[2]
         true = np.clip((x[:, None] - reach) / wide + 0.5, 0, 1).mean(axis=1)
         assert np.abs(effect.free[:, place] - true).max() < 0.5 / SIDE  # columns of rays
         assert abs(effect.free[:, place].mean() - true.mean()) < 0.02
