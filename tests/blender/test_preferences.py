@@ -62,8 +62,8 @@ def test_margins_apply_to_captures_without_own_margins() -> None:
     fit, margins = extension("operators.fit"), extension("core.samples").Margins
     scene = bpy.context.scene
     imported("[fit]\nshadow_margin = 9")
-    margins, operator = {"silhouette": 5, "shadow": 6, "mask": 7, "cosine": 0.25}, ReportRecorder()
-    with preferred(**margins):
+    changes, operator = {"silhouette": 5, "shadow": 6, "mask": 7, "cosine": 0.25}, ReportRecorder()
+    with preferred(**changes):
         job = fit.fit_job(operator, scene)
     assert job.capture.fit.margins == margins(silhouette=5, shadow=9, mask=7, cosine=0.25)
     assert any("silhouette 5" in report for report in operator.reports)

@@ -208,10 +208,8 @@ def test_check_names_light_drift_and_fit_can_include_or_skip_it() -> None:
     bpy.ops.patina.import_capture(filepath=str(path))
     assert not bpy.ops.patina.refit.poll()  # not checked yet
     choose = extension("core.diagnose.pixels.pixel_selection").choose_pixels
-    usual, choose.__defaults__ = (
-        choose.__defaults__,
-        (3000,),
-    )  # numpy of some Blender versions is slow
+    # numpy of some Blender versions is slow
+    usual, choose.__defaults__ = choose.__defaults__, (3000,)
     try:
         assert bpy.ops.patina.check() == {"FINISHED"}
     finally:

@@ -156,9 +156,8 @@ def test_normal_map_corrects_mesh_normals_towards_true_surface(tmp_path):
     def off(values):
         return np.degrees(np.arccos(np.clip(np.einsum("nc,nc->n", values, exact), -1, 1)))
 
-    well_conditioned = (
-        np.abs(exact[:, 2]) < 0.9
-    )  # tangents at face corners turn fast near the poles
+    # tangents at face corners turn fast near the poles
+    well_conditioned = np.abs(exact[:, 2]) < 0.9
     seen = well_conditioned & (found.maps.photos >= 2)
     before, after = np.median(off(normal)[seen]), np.median(off(turned)[seen])
     print(f"normals {before:.2f}° before, {after:.2f}° after")

@@ -112,9 +112,7 @@ def test_margins_copy_nearest_texel_up_to_margin_width():
     image = np.where(known, np.arange(64)[:, None] * 100.0 + np.arange(64), 0.0)
     (out,), reached = dilated([image], known, 4)
     assert out[18, 15] == image[20, 15] and out[30, 33] == image[30, 29]
-    assert (
-        out[17, 7] == 0 and not reached[15, 15]
-    )  # a corner 4.2 texels away, and beyond the margin
+    assert out[17, 7] == 0 and not reached[15, 15]  # a corner 4.2 texels away, beyond the margin
     assert np.array_equal(out[known], image[known])
     assert reached[16, 15] and margin_of(2048) == 32
 

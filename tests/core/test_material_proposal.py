@@ -170,7 +170,7 @@ def test_capture_without_lit_surface_is_reported(tmp_path: Path) -> None:
         proposed(path)
 
 
-def test_too_few_cells_are_reported() -> None:
+def test_empty_cells_are_reported() -> None:
     vertices, faces = made.sphere_mesh(2)
     k = 2
     none = Cells(

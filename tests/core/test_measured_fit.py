@@ -196,7 +196,7 @@ def test_too_few_samples_are_rejected(table: SampleTable) -> None:
         fit_measured(table.select(np.arange(10)), default_basis())
 
 
-def test_patches_overlap_their_neighbours(table: SampleTable) -> None:
+def test_patch_laplacian_rows_sum_to_zero(table: SampleTable) -> None:
     patches = Patches.of_points(table.point)
     assert patches.of.shape == (len(table),)
     assert np.abs(patches.neighbours.sum(axis=1)).max() < 1e-9

@@ -139,9 +139,8 @@ def test_flash_position_is_recovered_from_photos(flash_photos: Path) -> None:
     light = found.by_name["lamp"]
     assert isinstance(light, MountedLight)
     assert np.abs(light.offset - OFFSET)[:2].max() < 0.08  # of a camera 3.6 away: 1.3 degrees
-    assert (
-        np.abs(light.offset - OFFSET)[2] < 0.4
-    )  # along the view direction the photos carry little information
+    # along the view direction the photos carry little information
+    assert np.abs(light.offset - OFFSET)[2] < 0.4
     before, after = found.unexplained
     assert after < 0.5 * before
     errors = [error for _, error in found.moved["lamp"].values()]
@@ -187,7 +186,7 @@ def test_light_refinement_with_two_materials(tmp_path: Path) -> None:
     assert angular_error(refined_lights(path).by_name["lamp"].offset) < 1.5
 
 
-def test_too_few_photos_to_refine_lights_are_reported(flash_photos: Path) -> None:
+def test_missing_lit_pixels_for_light_refinement_are_reported(flash_photos: Path) -> None:
     text = flash_photos.read_text().replace(f"intensity = {[INTENSITY] * 3}", "refine = true")
     text = text.replace(str(OFFSET.tolist()), "[0, 0, 0]\nbeam = 5")
     path = flash_photos.with_name("narrow.capture.toml")

@@ -50,9 +50,10 @@ def test_accepted_names_are_bare_names_on_every_platform(name):
 @pytest.mark.parametrize(
     "name",
     [
-        "../../evil.pth", "/tmp/" + VALID, "../" + VALID, "..\\" + VALID, "C:" + VALID, VALID + "\n",
-        VALID + "/", VALID + ":stream", VALID.upper(), VALID[:-4] + ".pth", VALID.replace("0", "g"),
-        VALID.replace("0", "\u0660"), "", ".", "..", None, 7, [VALID], VALID.encode(),
+        "../../evil.pth", "/tmp/" + VALID, "../" + VALID, "..\\" + VALID, "C:" + VALID,
+        VALID + "\n", VALID + "/", VALID + ":stream", VALID.upper(), VALID[:-4] + ".pth",
+        VALID.replace("0", "g"), VALID.replace("0", "\u0660"), "", ".", "..", None, 7, [VALID],
+        VALID.encode(),
     ],
 )  # fmt: skip
 def test_other_names_are_rejected(name):

@@ -99,6 +99,5 @@ def test_white_lambertian_wall_needs_little_slack():
     fitted = fit(Model(context.pixels, context.brdfs), deviation_of(context))
     assert np.median(np.abs(fitted.predicted / observed - 1)) < 1.5 * NOISE
     slack_coefficients = fitted.model.brdfs.coefficients[..., -basis_slack.COUNT :]
-    assert (
-        np.abs(slack_coefficients).max() < 0.2
-    )  # 0.46 where the basis functions must make it brighter, too
+    # 0.46 where the basis functions must make it brighter, too
+    assert np.abs(slack_coefficients).max() < 0.2

@@ -29,7 +29,7 @@ def test_skies_have_equal_brightness() -> None:
     assert pictures.where.cos_o.min() == pytest.approx((1 - LIMB * (1 - 0.5 / VIEWS)) ** 0.5)
 
 
-def test_true_brdf_has_smallest_residual_and_ten_percent_is_detected() -> None:
+def test_psnr_of_true_and_slightly_darker_brdf() -> None:
     pictures = Pictures.of(GLOSSY.evaluate)
     f = GLOSSY.at(pictures.where)
     assert pictures.psnr(f) > 55  # folded angles swap light and view in half of the directions

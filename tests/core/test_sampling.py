@@ -114,11 +114,8 @@ def test_faces_get_material_by_majority_of_pixels() -> None:
     votes = FaceVotes.empty(3, 2)
     votes.add(0, np.array([0, 0, 0, 1]))
     votes.add(1, np.array([0, 1, 1]))
-    assert votes.winners(mesh).tolist() == [
-        0,
-        1,
-        0,
-    ]  # no pixel shows the last face: it takes its neighbour's material
+    # no pixel shows the last face: it takes its neighbour's material
+    assert votes.winners(mesh).tolist() == [0, 1, 0]
 
 
 def test_margins_exclude_outlines_shadow_edges_and_grazing_angles(ball: Path) -> None:

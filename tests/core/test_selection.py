@@ -66,9 +66,7 @@ def test_search_is_not_worse_than_plain_search(k, n, m, spread, seed) -> None:
     plain = np.linalg.cond(rows[choose_plainly(rows, n, lambda selected: np.ones(m, bool))])
     quick = np.linalg.cond(rows[choose(rows, n)])
     many = np.linalg.cond(rows[choose_from_cells(rows, np.arange(m) // 5, n)])
-    if (
-        plain < 1e6
-    ):  # the only worse result would be no set at all; differences by rounding are irrelevant
+    if plain < 1e6:  # beyond that no set is usable and the order is decided by rounding
         assert quick <= plain * (1 + 1e-6) and many <= plain * (1 + 1e-4)
 
 

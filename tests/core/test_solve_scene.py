@@ -23,10 +23,8 @@ from patina.core.solve import LocaliseJob, SolveJob, find_photos
 from tests import make_photos_of_scene as made
 
 VIEWS = 14
-LIT_PHOTO_LIGHTS = (
-    ((0.5, -0.3, -0.8), 0.13),
-    ((-0.6, -0.5, -0.6), 2.2),
-)  # light in the camera's frame; where
+# (direction to the light in the camera's frame, start angle on the orbit) of the lit photos
+LIT_PHOTO_LIGHTS = (((0.5, -0.3, -0.8), 0.13), ((-0.6, -0.5, -0.6), 2.2))
 
 
 def lit_views():

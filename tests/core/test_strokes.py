@@ -24,9 +24,8 @@ def test_stroke_is_recognised_by_its_colour(seed: int, strength: float) -> None:
     found = strokes(picture, painted, PALETTE)
     assert (found[worn < 0] == -1).all()
     recognised = (worn >= 0) & far
-    assert (
-        found[recognised] == worn[recognised]
-    ).mean() > 0.9  # two colours may lie on one line in colour space
+    # two colours may lie on one line in colour space
+    assert (found[recognised] == worn[recognised]).mean() > 0.9
     solid = strokes(picture, overlaid(picture, worn, PALETTE, 1.0), PALETTE)
     changed = (worn >= 0) & (np.abs(picture.astype(int) - PALETTE[worn]).max(axis=2) >= 2)
     assert (solid[changed] == worn[changed]).all()

@@ -43,9 +43,8 @@ def test_shift_is_in_standard_deviations_of_training_coefficients(brdf) -> None:
         there[:, :8] - brdf.coefficients[:, :8], traits.shift_unit(basis) * shifts, atol=1e-12
     )
     np.testing.assert_array_equal(there[:, 8:], brdf.coefficients[:, 8:])
-    few = PrincipalBRDF(
-        basis, brdf.coefficients[:, :5]
-    )  # the paper's method has no more components
+    # the paper's method has no more components
+    few = PrincipalBRDF(basis, brdf.coefficients[:, :5])
     assert traits.shifted(few, shifts).coefficients.shape == (3, 5)
 
 

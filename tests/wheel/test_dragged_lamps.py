@@ -79,9 +79,8 @@ def _build(folder: Path, far: np.ndarray, known: bool = True) -> Built:
     body = TEXT % tuple(float(x) for x in AT + far)
     path.write_text(f"{head}{body}\n\n{photos}")
     capture = read_capture(path)
-    if (
-        not known
-    ):  # a file may not mix near and distant lights in this way, because they have no common scale
+    # a file may not mix near and distant lights in this way, because they have no common scale
+    if not known:
         bare = (replace(light, strength=None, white=None) for light in capture.lights)
         capture = replace(capture, lights=tuple(bare))
     scan = capture_data.open_scan(capture)

@@ -47,9 +47,9 @@ def test_several_formats_at_once(root: Path, result: Path, tmp_path: Path) -> No
         "old_rug.bsdf", "old_rug.xml", "old_rug_spectral.xml", "old_rug_mitsuba.npz",
         "patina_bsdf.py", "render.py",
     }  # fmt: skip
-    output = json.loads((out / "losses.json").read_text("utf-8"))["losses"]
-    assert [loss["format"] for loss in output] == ["binary", "mtlx", "pbrt", "mitsuba"]
-    for loss in output:
+    losses = json.loads((out / "losses.json").read_text("utf-8"))["losses"]
+    assert [loss["format"] for loss in losses] == ["binary", "mtlx", "pbrt", "mitsuba"]
+    for loss in losses:
         assert loss["material"] == "old rug" and loss["errors"]
         assert all((out / file).is_file() for file in loss["files"])
         for what, error in loss["errors"].items():
@@ -76,9 +76,9 @@ def test_invalid_destinations_are_rejected_before_any_work(result: Path, tmp_pat
         (result, tmp_path / "file"),
         (result, result),
     ):
-        output = argparse.Namespace(result=source, to=["binary"], out=out, material=None)
+        namespace = argparse.Namespace(result=source, to=["binary"], out=out, material=None)
         with pytest.raises(InputError) as raised:
-            material.run(output)
+            material.run(namespace)
         assert "\n" not in str(raised.value)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file"]
     assert [p.name for p in result.iterdir()] == ["result.json"]
@@ -90,11 +90,11 @@ def test_failed_run_leaves_no_files(result: Path, tmp_path: Path, monkeypatch) -
         raise OSError("no space left")
 
     monkeypatch.setitem(material_formats.PLAIN, "pbrt", fails)
-    output = argparse.Namespace(
+    namespace = argparse.Namespace(
         result=result, to=["binary", "pbrt"], out=tmp_path / "out", material=["bronze"]
     )
     with pytest.raises(InputError, match="no space left"):
-        material.run(output)
+        material.run(namespace)
     assert list(tmp_path.iterdir()) == []
 
 

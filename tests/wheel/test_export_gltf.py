@@ -26,8 +26,8 @@ validator.validateBytes(new Uint8Array(fs.readFileSync(process.argv[1])))
 
 def node_modules() -> Path | None:
     """Where npm installed gltf-validator: PATINA_NODE_MODULES, or node/ in the tools' cache."""
-    output = os.environ.get("PATINA_NODE_MODULES")
-    folders = [Path(output)] if output else [cache_dir() / "node" / "node_modules"]
+    configured = os.environ.get("PATINA_NODE_MODULES")
+    folders = [Path(configured)] if configured else [cache_dir() / "node" / "node_modules"]
     return next((f for f in folders if (f / "gltf-validator").is_dir()), None)
 
 
@@ -66,8 +66,8 @@ def test_khronos_validator_reports_no_issues(glb: Path) -> None:
 
 
 def test_glb_contains_fitted_parameters(glb: Path) -> None:
-    output = read_glb(glb)
-    materials = {m["name"]: m for m in output["materials"]}
+    document = read_glb(glb)
+    materials = {m["name"]: m for m in document["materials"]}
     assert set(materials) == {"bronze", "old rug"}
     bronze = materials["bronze"]["pbrMetallicRoughness"]
     assert bronze["baseColorFactor"][:3] == pytest.approx([0.7, 0.5, 0.3], abs=1e-5)
@@ -80,7 +80,7 @@ def test_glb_contains_fitted_parameters(glb: Path) -> None:
     assert coat["clearcoatRoughnessFactor"] == pytest.approx(0.1, abs=1e-5)
     specular = rug["extensions"]["KHR_materials_specular"]
     assert specular["specularFactor"] == pytest.approx(0.8, abs=1e-5)
-    assert len(output["meshes"]) == 2 and not output.get("cameras")
-    worn = {p["material"] for mesh in output["meshes"] for p in mesh["primitives"]}
+    assert len(document["meshes"]) == 2 and not document.get("cameras")
+    worn = {p["material"] for mesh in document["meshes"] for p in mesh["primitives"]}
     assert worn == {0, 1}
-    assert "TEXCOORD_0" in output["meshes"][0]["primitives"][0]["attributes"]
+    assert "TEXCOORD_0" in document["meshes"][0]["primitives"][0]["attributes"]

@@ -33,16 +33,16 @@ def test_fit_is_exported_with_its_mesh(root: Path, tmp_path: Path) -> None:
     assert names == {"scan.glb", "scan.usdc", "losses.txt", "losses.json"}
     assert sorted(p.name for p in (tmp_path / "fit").iterdir()) == before
     raw = (tmp_path / "out" / "scan.glb").read_bytes()
-    output = json.loads(raw[20 : 20 + struct.unpack_from("<I", raw, 12)[0]])
+    gltf = json.loads(raw[20 : 20 + struct.unpack_from("<I", raw, 12)[0]])
     fitted = json.loads((tmp_path / "fit" / "result.json").read_text("utf-8"))["materials"][0]
-    material = output["materials"][0]
+    material = gltf["materials"][0]
     assert material["name"] == fitted["name"] == "surface"
     assert material["pbrMetallicRoughness"]["baseColorFactor"][:3] == pytest.approx(
         fitted["principled"]["base_color"], abs=1e-4
     )
-    primitive = output["meshes"][0]["primitives"][0]
+    primitive = gltf["meshes"][0]["primitives"][0]
     assert primitive["material"] == 0
-    assert output["accessors"][primitive["indices"]]["count"] > 1000
+    assert gltf["accessors"][primitive["indices"]]["count"] > 1000
     # one material of several, or a result that has lost its scene: preview spheres
     (tmp_path / "fit" / "scene.blend").unlink()
     headless(root, "material", tmp_path / "fit", "--to", "gltf", "--out", tmp_path / "bare")

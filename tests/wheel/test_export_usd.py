@@ -31,16 +31,16 @@ for prim in stage.Traverse():
         for context in ("", "mtlx"):
             shader = UsdShade.Material(prim).ComputeSurfaceSource(context)[0]
             if shader:
-                told = {i.GetBaseName(): i.Get() for i in shader.GetInputs()}
+                values = {i.GetBaseName(): i.Get() for i in shader.GetInputs()}
                 plain = {k: list(v) if hasattr(v, "__len__") and not isinstance(v, str) else v
-                         for k, v in told.items() if v is not None}
+                         for k, v in values.items() if v is not None}
                 kinds[context] = [shader.GetIdAttr().Get(), plain]
         found[prim.GetName()] = kinds
-said, checked = [], 0
+issues, checked = [], 0
 if hasattr(UsdUtils, "ComplianceChecker"):
     checker = UsdUtils.ComplianceChecker(arkit=False)
     checker.CheckCompliance(sys.argv[1])
-    said += [["", x] for x in checker.GetErrors() + checker.GetFailedChecks()
+    issues += [["", x] for x in checker.GetErrors() + checker.GetFailedChecks()
              + checker.GetWarnings()]
     checked += 1
 try:
@@ -49,7 +49,7 @@ try:
     names = [m.name for m in registry.GetAllValidatorMetadata()]
     validators = registry.GetOrLoadValidatorsByName(names)
     for error in UsdValidation.ValidationContext(validators).Validate(stage):
-        said.append([error.GetName(), error.GetMessage()])
+        issues.append([error.GetName(), error.GetMessage()])
     checked += len(names)
 except ImportError:
     pass
@@ -61,12 +61,12 @@ try:
     undefined = [i for i in ids if i.startswith("ND_") and library.getNodeDef(i) is None]
 except ImportError:
     pass
-print(json.dumps([checked, said, undefined, found, str(stage.GetDefaultPrim().GetPath())]))
+print(json.dumps([checked, issues, undefined, found, str(stage.GetDefaultPrim().GetPath())]))
 """
 
 
 @pytest.fixture(scope="module")
-def check_output(root: Path, tmp_path_factory: pytest.TempPathFactory) -> list:
+def checker_output(root: Path, tmp_path_factory: pytest.TempPathFactory) -> list:
     if importlib.util.find_spec("pxr") is None:
         pytest.skip("the usd-core package is not installed")
     folder = tmp_path_factory.mktemp("usd")
@@ -84,16 +84,16 @@ def check_output(root: Path, tmp_path_factory: pytest.TempPathFactory) -> list:
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def test_usdchecker_reports_no_issues(check_output: list) -> None:
-    checked, expected, undefined, _, default = check_output
+def test_usdchecker_reports_no_issues(checker_output: list) -> None:
+    checked, issues, undefined, _, default = checker_output
     assert checked > 0 and default == "/root"
-    ours = [x for x in expected if not (x[0] == "MissingShaderIdInRegistry" and "'ND_" in x[1])]
+    ours = [x for x in issues if not (x[0] == "MissingShaderIdInRegistry" and "'ND_" in x[1])]
     assert ours == []
     assert not undefined  # None if the MaterialX package is not installed
 
 
-def test_usd_contains_both_materials(check_output: list) -> None:
-    found = check_output[3]
+def test_usd_contains_both_materials(checker_output: list) -> None:
+    found = checker_output[3]
     assert set(found) == {"bronze", "old_rug"}
     kind, inputs = found["old_rug"][""]
     assert kind == "UsdPreviewSurface"

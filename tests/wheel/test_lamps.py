@@ -104,9 +104,8 @@ def test_extended_source_gives_same_irradiance_where_fully_visible(
     """A ball of uniform radiance gives I/d² whatever its radius."""
     image = _rendered(light, tmp_path, samples=64)
     radiance, lit = _predicted(light)
-    lit &= (
-        cycles_sphere.normals()[0][..., 2] > 0.5
-    )  # several rays per pixel: exclude pixels at the edge
+    # several rays per pixel: exclude pixels at the edge
+    lit &= cycles_sphere.normals()[0][..., 2] > 0.5
     ratio = image[lit].sum() / radiance[lit].sum()
     print(f"{light.name}: {ratio:.5f}")
     assert abs(ratio - 1) < 0.002

@@ -30,8 +30,10 @@ def test_one_sphere_for_each_material_and_environment(tmp_path):
     sky[8:10, 20:22] = 300.0
     write_exr(tmp_path / "lamp.exr", sky)
     result = two_materials(tmp_path / "result")
-    output = [str(tmp_path / name) for name in ("even.exr", "lamp.exr")]
-    found = command.render_to_folder(result, tmp_path / "out", output, 40, 16, 2, denoise=False)
+    environments = [str(tmp_path / name) for name in ("even.exr", "lamp.exr")]
+    found = command.render_to_folder(
+        result, tmp_path / "out", environments, 40, 16, 2, denoise=False
+    )
     spheres = [p for p in found if p.turn is None]
     assert {p.world for p in spheres} == {"even", "lamp"}
     assert (tmp_path / "out" / "index.html").is_file()
@@ -43,9 +45,9 @@ def test_one_sphere_for_each_material_and_environment(tmp_path):
 
 
 def test_invalid_environment_gives_one_line_error(tmp_path):
-    with pytest.raises(InputError, match="neither a file nor an environment image") as output:
+    with pytest.raises(InputError, match="neither a file nor an environment image") as raised:
         relight.find_worlds([str(tmp_path / "none.hdr")])
-    assert "\n" not in str(output.value)
+    assert "\n" not in str(raised.value)
     (tmp_path / "text.hdr").write_text("not a picture")
     bpy.ops.wm.read_factory_settings(use_empty=True)
     with pytest.raises(InputError, match="picture"):
