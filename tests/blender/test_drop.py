@@ -23,7 +23,7 @@ def drop(*names: str) -> str:
     return fits[0].bl_import_operator
 
 
-def a_scan(photos: int = 3):
+def make_scan(photos: int = 3):
     """A scan without a capture file; its lit photos are named like the scan's."""
     path = make_capture_module().make_capture(folder() / "ball", photos=photos)
     path.unlink()
@@ -44,7 +44,7 @@ def error_message(operator, **settings) -> str:
     except RuntimeError as error:
         assert "Traceback" not in str(error), error
         return str(error)
-    raise AssertionError("it was taken")
+    raise AssertionError("the operator accepted the files")
 
 
 def test_each_file_type_has_one_operator() -> None:
@@ -82,7 +82,7 @@ def test_handlers_are_registered_and_removed() -> None:
 
 def test_cameras_and_photos_become_capture() -> None:
     """A COLMAP file and a folder of photos: the capture contains the values measured by hand."""
-    scan = a_scan()
+    scan = make_scan()
     settings = {
         "cameras": str(scan / "sparse" / "cameras.bin"),
         "directory": str(scan / "lit"),
@@ -107,7 +107,7 @@ def test_cameras_and_photos_become_capture() -> None:
 
 def test_every_light_is_read_back() -> None:
     new, reader = extension("core.capture.new_capture"), extension("core.capture")
-    scan = a_scan(2)
+    scan = make_scan(2)
     photos = sorted((scan / "lit").iterdir())
     for lamp, way in (
         (new.LampText.flash((0.1, -0.2, 0.0)), "mounted"),
@@ -123,7 +123,7 @@ def test_every_light_is_read_back() -> None:
 
 
 def test_cameras_alone_are_imported_as_cameras() -> None:
-    scan = a_scan()
+    scan = make_scan()
     cameras = str(scan / "sparse" / "images.bin")
     assert bpy.ops.patina.new_capture(filepath=cameras) == {"FINISHED"}
     assert len([o for o in bpy.context.scene.objects if o.type == "CAMERA"]) >= 3
@@ -131,7 +131,7 @@ def test_cameras_alone_are_imported_as_cameras() -> None:
 
 
 def test_invalid_drop_reports_reason_and_leaves_nothing() -> None:
-    scan = a_scan()
+    scan = make_scan()
     (scan / "lit" / "other.exr").write_bytes((scan / "lit" / "view_01.exr").read_bytes())
     operator, before = bpy.ops.patina.new_capture, counts()
     settings = {"cameras": str(scan / "sparse"), "directory": str(scan / "lit")}
@@ -150,7 +150,7 @@ def test_invalid_drop_reports_reason_and_leaves_nothing() -> None:
 
 
 def test_dropped_photos_change_nothing_until_confirmed() -> None:
-    scan = a_scan()
+    scan = make_scan()
     settings = {"directory": str(scan / "lit"), "files": files("view_01.exr", "view_02.exr")}
     path = make_capture_module().make_capture(folder() / "open", photos=2)
     bpy.ops.patina.import_capture(filepath=str(path))

@@ -53,7 +53,7 @@ def error_message(**settings) -> str:
     except RuntimeError as error:
         assert "Traceback" not in str(error), error
         return str(error)
-    raise AssertionError("it was written")
+    raise AssertionError("the export was not rejected")
 
 
 def test_nothing_to_export_without_measured_material() -> None:
@@ -108,7 +108,7 @@ def test_mesh_export_leaves_open_file_unchanged() -> None:
     losses = json.loads((out / "a" / "losses.json").read_text())["losses"]
     assert {loss["format"] for loss in losses} == {"gltf", "blend", "binary"}
     assert all((out / "a" / file).is_file() for loss in losses for file in loss["files"])
-    assert not [p for p in out.iterdir() if p.name != "a"], "crumbs"
+    assert not [p for p in out.iterdir() if p.name != "a"], "temporary files were left"
 
     faces = len(mesh.data.polygons)
     bpy.ops.wm.read_homefile(use_empty=True)
@@ -196,7 +196,7 @@ def test_failure_of_second_blender_is_one_line() -> None:
         except errors.PatinaError as error:
             assert message in str(error) and "\n" not in str(error)
         else:
-            raise AssertionError("it went well")
+            raise AssertionError("the second Blender did not fail")
 
 
 def test_abandoned_export_leaves_no_files() -> None:

@@ -111,7 +111,7 @@ def test_lights_are_saved_and_restored() -> None:
     except RuntimeError as error:
         assert "the file exists already" in str(error)
     else:
-        raise AssertionError("a file was replaced unasked")
+        raise AssertionError("a file was overwritten without consent")
     bpy.ops.patina.save_lights(filepath=str(path), check_existing=False)  # into its own file
     assert "# by eye" in path.read_text()
     reader, moved = extension("core.capture").read_capture, extension("scene.photos.dragged_lamps")
@@ -132,7 +132,7 @@ def test_lamp_without_power_is_one_message() -> None:
     except RuntimeError as error:
         assert "emits no light" in str(error) and "Traceback" not in str(error)
     else:
-        raise AssertionError("a lamp without light was fitted with")
+        raise AssertionError("a lamp without power was accepted")
 
 
 class LayoutRecorder:

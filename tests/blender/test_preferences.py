@@ -192,6 +192,6 @@ def test_materials_are_fitted_with_user_basis() -> None:
             except RuntimeError as error:
                 assert "MERL files are missing" in str(error) and "Traceback" not in str(error)
             else:
-                raise AssertionError("a folder without the files was taken")
+                raise AssertionError("a folder without the files was accepted")
     finally:
         merl.checksums = usual

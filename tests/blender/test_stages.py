@@ -34,7 +34,7 @@ def test_stages_follow_progress() -> None:
     bpy.ops.patina.import_capture(filepath=str(path))
     found = stages.stages(scene)
     assert found["scan"].done and found["photos"].has == ("3 lit photos, 3 lights",)
-    assert stages.next_stage(found) == "fit", "masks are no must"
+    assert stages.next_stage(found) == "fit", "masks are optional"
     bpy.ops.patina.shadow_masks()
     assert stages.stages(scene)["masks"].done
     bpy.ops.patina.fit()
@@ -101,7 +101,7 @@ def test_display_exposure_does_not_change_photo() -> None:
     assert np.abs(linear - np.clip(2 * before, 0, 1)).max() < 0.01
     assert np.array_equal(level(first.image), before), "the photo itself was changed"
     state.active = 4
-    assert shown.image != last.image, "the next photo is shown as bright"
+    assert shown.image != last.image, "the next photo is shown with the same exposure"
     state.view_exposure = 0.0
     assert shown.image == last.image
     assert len([i for i in bpy.data.images if "patina_exposed" in i]) == 1
@@ -159,9 +159,9 @@ def test_measured_material_is_asset_with_provenance() -> None:
     width, height = material.preview.image_size
     pixels = np.array(material.preview.image_pixels_float[:]).reshape(height, width, 4)
     disc = pixels[..., 3] > 0.5
-    assert abs(disc.mean() - np.pi / 4 / 1.05**2) < 0.01, "a sphere on nothing"
+    assert abs(disc.mean() - np.pi / 4 / 1.05**2) < 0.01, "a sphere on a transparent background"
     red, green, blue, _ = pixels[disc].mean(axis=0)
-    assert red > 1.3 * green and red > 1.3 * blue, "the ball's red"
+    assert red > 1.3 * green and red > 1.3 * blue, "the preview has the ball's red colour"
     assert bpy.ops.patina.mark_assets() == {"FINISHED"}
     data = material.asset_data
     assert {"Patina", "measured", "surface", "ball"} == {tag.name for tag in data.tags}

@@ -106,7 +106,7 @@ def test_preview_and_shader_update_immediately() -> None:
         follow.finish_updates()
         assert not follow.outdated_pieces(material)
     large = preview(material).reshape(moved.QUICK_SIZE, 2, moved.QUICK_SIZE, 2, 4).mean(axis=(1, 3))
-    assert np.abs(small - large).mean() < 0.01, "the sphere in full is the same sphere"
+    assert np.abs(small - large).mean() < 0.01, "both sizes show the same sphere"
 
 
 def test_change_is_shown_within_tenth_of_second() -> None:
@@ -218,7 +218,7 @@ def test_timer_updates_and_stops() -> None:
     with QuickFits() as follow:
         material.patina_traits.every.trait_3 = 1.0
         assert bpy.app.timers.is_registered(follow._tick)
-        assert follow._tick() > 0, "not while the slider moves"
+        assert follow._tick() > 0, "no update while the slider moves"
         end = time.monotonic() + 120
         while (wait := follow._tick()) is not None and time.monotonic() < end:
             time.sleep(wait)

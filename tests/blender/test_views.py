@@ -47,7 +47,7 @@ def view(kind: str) -> bpy.types.Image:
 
 def test_material_stores_samples_and_interval() -> None:
     """Its samples and its interval are those of the fit."""
-    assert not bpy.ops.patina.show_chart.poll(), "there is nothing to show yet"
+    assert not bpy.ops.patina.show_chart.poll(), "nothing to show before a fit"
     material = fitted()
     subject = extension("scene.material.material_evidence").subject_of(material)
     assert 100 < len(subject.points) <= 6000 and subject.interval is not None
@@ -77,7 +77,7 @@ def test_all_charts_are_shown_and_survive_reload() -> None:
     best = extension("core.views.charts").best_sampled_theta_d(
         extension("scene.material.material_evidence").subject_of(bpy.data.materials["surface"])
     )
-    assert abs(np.degrees(views.theta_d) - best) < 0.01, "the highlight where most samples are"
+    assert abs(np.degrees(views.theta_d) - best) < 0.01, "the slice lies where most samples are"
     path = str(folder() / "views.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
@@ -109,9 +109,9 @@ def test_fits_are_compared() -> None:
     except RuntimeError as error:
         assert "fitted only once" in str(error)
     else:
-        raise AssertionError("a ratio to nothing")
+        raise AssertionError("a ratio without an earlier fit")
     charted.keep_earlier(material, material.copy())
-    assert not charted.has_earlier(material), "a fit that finds the same is none to compare with"
+    assert not charted.has_earlier(material), "an identical fit is not kept for comparison"
     material["patina_coefficients"] = [1.2 * c for c in material["patina_coefficients"]]
     changed = list(material["patina_coefficients"])
     assert bpy.ops.patina.fit() == {"FINISHED"}
@@ -119,7 +119,9 @@ def test_fits_are_compared() -> None:
     assert material.name == "surface" and list(material["patina_earlier_coefficients"]) == changed
     alone = pixels(view("ratio"))
     views.against = "CHANGED"
-    assert not np.array_equal(pixels(view("ratio")), alone), "unmoved traits are the fit itself"
+    assert not np.array_equal(pixels(view("ratio")), alone), (
+        "without shifts the ratio is to the fit itself"
+    )
     views.against = "MATERIAL"
     views.other = material
     same = pixels(view("ratio"))[150, 400, :3]
@@ -139,7 +141,7 @@ def test_photo_view_after_fit_and_after_reload() -> None:
     fitted()
     scene, listed = bpy.context.scene, extension("scene.photos.photo_list")
     scene.camera = None
-    assert not bpy.ops.patina.look_at_photo.poll(), "no photo is looked through"
+    assert not bpy.ops.patina.look_at_photo.poll(), "no photo is shown"
     scene.patina_photos.active = 1
     assert listed.looked_at(scene) is not None
     find = extension("scene.views.view_image").view_image
@@ -148,7 +150,7 @@ def test_photo_view_after_fit_and_after_reload() -> None:
     comparison, samples = pixels(find("comparison")), pixels(find("samples"))
     assert comparison[..., :3].std() > 0.05 and samples[..., :3].std() > 0.05
     reliable = np.abs(samples[..., :3] * 255 - [0, 147, 155]).max(axis=-1) < 90
-    assert reliable.mean() > 0.05, "samples came from somewhere"
+    assert reliable.mean() > 0.05, "the photo has reliable pixels"
     bpy.context.scene.patina_views.shown = "comparison"
     bpy.context.scene.patina_views.exposure = -3.0
     darker = pixels(find("comparison"))

@@ -317,7 +317,7 @@ def test_capture_is_imported_once_and_again_after_deletion() -> None:
     except RuntimeError as error:
         assert "already in the scene" in str(error)
     else:
-        raise AssertionError("the same capture came in twice")
+        raise AssertionError("the same capture was imported twice")
     assert counts() == before
     bpy.data.objects.remove(bpy.context.scene.patina.mesh)
     assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}

@@ -38,8 +38,8 @@ def test_scale_is_weighted_mean_with_its_standard_error():
     assert np.abs(found.scale.mean(axis=0) - truth).max() < 0.003
     best = 1 / np.sqrt(sum(e**-2 for e in errors))
     assert found.scale.std(axis=0).max() < 1.25 * best  # loss of efficiency of the robust estimator
-    reported = 1 / np.sqrt(np.median(found.weight))
-    assert 0.7 * best < reported < 1.5 * best
+    stated_error = 1 / np.sqrt(np.median(found.weight))
+    assert 0.7 * best < stated_error < 1.5 * best
 
 
 def test_outlier_photo_is_downweighted():

@@ -68,8 +68,8 @@ def test_shadow_masks_match_visibility_and_exclude_penumbra(tmp_path: Path) -> N
         grey = pixels(capture.photos[place].masks["shadow"])
         assert grey.shape == (made.HEIGHT, made.WIDTH)
         assert (grey[~view.seen] == 0).all()
-        reported = from_grey(grey.ravel()[view.pixel])
-        assert np.abs(reported - exact).mean() < 0.01
+        visibility = from_grey(grey.ravel()[view.pixel])
+        assert np.abs(visibility - exact).mean() < 0.01
         _, out = material_pixels(capture, scan, view, capture_data.photo_masks(capture, place))
         assert out[exact < 0.88].all()
         assert not out[exact > 0.999].any()

@@ -62,9 +62,9 @@ def test_result_json_describes_measurement(result: CaptureResult, job: FitJob) -
     assert 1 <= len(lobes["lobes"]) <= 3 and lobes["lobes"][0].keys() >= {"f0", "f90", "roughness"}
     assert not any(key.endswith(("_mid", "_edge")) for key in (*lobes, *lobes["lobes"][0]))
     assert 0 < turning["cube_root_error"] < 0.3
-    warnings = material["uncertainty"]
-    for key, value in warnings["interval_90"].items():
-        assert value == pytest.approx(np.exp(1.645 * warnings[key]) - 1, rel=1e-3) and value > 0
+    uncertainty = material["uncertainty"]
+    for key, value in uncertainty["interval_90"].items():
+        assert value == pytest.approx(np.exp(1.645 * uncertainty[key]) - 1, rel=1e-3) and value > 0
     assert {s["name"] for s in description["stages"]} >= {"reading the scan", "sampling the photos"}
     assert all(s["seconds"] >= 0 for s in description["stages"])
     assert description["basis"]["version"] == result.basis.version
@@ -97,11 +97,11 @@ def test_page_shows_sources_of_samples(result: CaptureResult, tmp_path: Path) ->
     page = (tmp_path / "report" / "index.html").read_text()
     counts = re.findall(r"<ul class='counts'>(.*?)</ul>", page)
     assert len(counts) == 3 and "Rings" not in page
-    for place, entry in enumerate(counts):
-        percent = int(re.search(r"(\d+) % reliable", entry).group(1))
+    for place, share_list in enumerate(counts):
+        percent = int(re.search(r"(\d+) % reliable", share_list).group(1))
         assert 20 < percent < 100
         reliable = result.materials[0].per_photo[place]
-        others = sum(int(n) for n in re.findall(r"(\d+) %", entry)) - percent
+        others = sum(int(n) for n in re.findall(r"(\d+) %", share_list)) - percent
         assert reliable > 500 and percent + others == pytest.approx(100, abs=5)
     head = page[page.index("<details>") : page.index("</details>")]
     assert "in shadow: turned away" in head and "too curved" not in head and "clipped" not in head

@@ -117,9 +117,9 @@ def test_albedo_above_one_is_reported(brdf) -> None:
     shifts = np.zeros((3, 8))
     shifts[1, 1] = -5.0  # green alone: a much brighter diffuse colour
     found = albedo.at(shifts)
-    messages = traits.excess(found)
-    assert messages is not None and messages[0] == pytest.approx(found[:, 1].max())
-    assert messages[1] == traits.VIEWS[int(np.argmax(found[:, 1]))]
+    excess = traits.excess(found)
+    assert excess is not None and excess[0] == pytest.approx(found[:, 1].max())
+    assert excess[1] == traits.VIEWS[int(np.argmax(found[:, 1]))]
     assert traits.excess(np.full((7, 3), 1.005)) is None
 
 

@@ -86,9 +86,9 @@ def test_changed_lights_are_read_back_and_rest_is_kept(tmp_path: Path) -> None:
     back = read_capture(tmp_path / "new.capture.toml")
     for light, there in zip(lights, back.lights, strict=True):
         for key in ("direction", "position", "mounted", "strength", "angle", "radius", "beam"):
-            written, found = getattr(light, key), getattr(there, key)
-            assert (written is None) == (found is None), (light.name, key)
-            assert written is None or np.allclose(written, found, rtol=1e-14, atol=0), (
+            expected, found = getattr(light, key), getattr(there, key)
+            assert (expected is None) == (found is None), (light.name, key)
+            assert expected is None or np.allclose(expected, found, rtol=1e-14, atol=0), (
                 light.name,
                 key,
             )

@@ -1,4 +1,4 @@
-"""The picture and the figures of docs/guide/maps.md, made anew (needs the bpy wheel, some minutes):
+"""Make the picture and the figures of docs/guide/maps.md (needs the bpy wheel, some minutes):
 
 python -m tests.wheel.maps_picture docs/images/maps.jpg
 """

@@ -105,8 +105,8 @@ def _build(folder: Path, far: np.ndarray, known: bool = True) -> Built:
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     scene = bpy.context.scene
     built = create_scan_collection(scene, capture, scan, found, folder / "rectified")
-    position = [built.cameras[photo.camera] for photo in capture.photos]
-    return Built(capture, scene, built.lamps, position, built.mesh, scan)
+    photo_cameras = [built.cameras[photo.camera] for photo in capture.photos]
+    return Built(capture, scene, built.lamps, photo_cameras, built.mesh, scan)
 
 
 @pytest.fixture(params=FAR, ids=["here", "far"])
@@ -220,9 +220,9 @@ def test_transform_of_whole_scan_changes_no_light(built: Built) -> None:
     """Mesh, cameras and lamps transformed together, by a parent or one by one; then a drag."""
     _step_through(built)
     turn = Matrix.Translation((1, 2, 3)) @ Matrix.Rotation(1.1, 4, "X") @ Matrix.Scale(0.5, 4)
-    for thing in [*built.cameras, built.mesh, *built.lamps.values()]:
-        if thing.parent is None:
-            thing.matrix_world = turn @ thing.matrix_world
+    for item in [*built.cameras, built.mesh, *built.lamps.values()]:
+        if item.parent is None:
+            item.matrix_world = turn @ item.matrix_world
     bpy.context.view_layer.update()
     assert built.now()[1] == []
     lamp = built.lamps["lamp"]

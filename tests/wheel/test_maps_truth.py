@@ -197,12 +197,12 @@ def test_texture_sizes_agree(painted, result):
 
 def test_command_writes_maps_and_scene_that_uses_them(painted):
     out = painted / "maps"
-    stated = json.loads((out / "maps.json").read_text())
-    for file in stated["files"]:
+    record = json.loads((out / "maps.json").read_text())
+    for file in record["files"]:
         assert (out / file["file"]).is_file()
-    names = {f["file"] for f in stated["files"]}
+    names = {f["file"] for f in record["files"]}
     assert {"surface_base_color.png", "surface_roughness.png", "coverage.png"} <= names
-    assert 0.4 < stated["seen"] <= 1 and stated["materials"][0]["varies"] == "its diffuse part"
+    assert 0.4 < record["seen"] <= 1 and record["materials"][0]["varies"] == "its diffuse part"
     bpy.ops.wm.open_mainfile(filepath=str(out / "scene.blend"))
     material = bpy.data.materials["surface"]
     shader = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")

@@ -87,15 +87,15 @@ def test_proposed_materials_become_slots_used_by_fit(scene) -> None:
     assert np.array_equal(slots(mesh), true)
     from patina.scene.session.scene_properties import capture_path, stored_result
 
-    message = stored_result(capture_path(scene))
-    assert [m["name"] for m in message["materials"]] == ["red_gold", "material_2"]
+    first_fit = stored_result(capture_path(scene))
+    assert [m["name"] for m in first_fit["materials"]] == ["red_gold", "material_2"]
 
     # a second fit keeps the names, although the slots now have measured materials
     assert bpy.ops.patina.fit() == {"FINISHED"}
     again = stored_result(capture_path(scene))
     assert [m["name"] for m in again["materials"]] == ["red_gold", "material_2"]
     assert json.dumps(again["materials"][0]["coefficients"]) == json.dumps(
-        message["materials"][0]["coefficients"]
+        first_fit["materials"][0]["coefficients"]
     )
 
 

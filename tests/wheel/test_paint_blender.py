@@ -100,10 +100,10 @@ def test_painted_ignore_mask_is_used_by_fit(scene, tmp_path: Path) -> None:  # n
     assert bpy.ops.patina.take_paint() == {"FINISHED"}
     kinds = {kind for place, kind in mask_images(capture) if place == 1}
     assert kinds == {"ignore", "highlight"}
-    messages = with_mask_images(read_capture(Path(capture)))
-    assert np.array_equal(read_mask(messages.photos[1].masks["ignore"]), where)
-    assert np.array_equal(read_mask(messages.photos[1].masks["highlight"]), bright)
-    assert not messages.photos[0].masks
+    masked_capture = with_mask_images(read_capture(Path(capture)))
+    assert np.array_equal(read_mask(masked_capture.photos[1].masks["ignore"]), where)
+    assert np.array_equal(read_mask(masked_capture.photos[1].masks["highlight"]), bright)
+    assert not masked_capture.photos[0].masks
 
     # the eraser removes a part of it
     gone = np.zeros_like(where)
@@ -112,7 +112,7 @@ def test_painted_ignore_mask_is_used_by_fit(scene, tmp_path: Path) -> None:  # n
     # saving takes the strokes and packs them; the files may be deleted
     file = tmp_path / "painted.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
-    for folder in (Path(messages.photos[1].masks["ignore"]).parent,):
+    for folder in (Path(masked_capture.photos[1].masks["ignore"]).parent,):
         for mask in folder.iterdir():
             mask.unlink()
     bpy.ops.wm.open_mainfile(filepath=str(file))

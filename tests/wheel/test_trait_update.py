@@ -99,4 +99,4 @@ def test_impossible_shift_is_limited_to_incident_light(tmp_path):
     normal, inside = cycles_sphere.normals()
     kept = inside & (normal @ VIEW > 0.4)
     assert image[kept].mean(axis=0).max() < 1.02
-    assert image[kept].max(axis=-1).mean() > 0.95, "held to it, not darker"
+    assert image[kept].max(axis=-1).mean() > 0.95, "limited to the incident light, not darker"
