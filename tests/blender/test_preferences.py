@@ -116,7 +116,7 @@ def test_cache_folder_is_used_for_unsaved_files() -> None:
     assert (folders.own_folder(), folders.cache_folder()) == usual
 
 
-def fill(place: Path) -> list[Path]:
+def fill_cache(place: Path) -> list[Path]:
     """Files of every kind, oldest first, 1 MB each; the last two do not belong to the cache."""
     names = (
         "files/patina_components_0123456789ab.exr",
@@ -138,7 +138,7 @@ def test_cache_is_cleared_except_files_in_use() -> None:
     place, cache = folder(), extension("scene.material.file_cache")
     with preferred(cache_folder=str(place)):
         assert not bpy.ops.patina.empty_cache.poll()
-        files = fill(place)
+        files = fill_cache(place)
         assert sum(cache.cached_files().values()) == 4_000_000
         shown = bpy.data.images.new("shown", 4, 4)
         shown.filepath = str(files[1])
@@ -153,7 +153,7 @@ def test_oldest_cache_files_are_removed_on_load() -> None:
     place = folder()
     blend = place / "x.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
-    files = fill(place)
+    files = fill_cache(place)
     with preferred(cache_folder=str(place), cache_size=4):
         bpy.ops.wm.open_mainfile(filepath=str(blend))
         assert all(p.exists() for p in files)

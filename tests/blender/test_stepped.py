@@ -19,7 +19,7 @@ def begun(module: str, name: str):
     return without_window(operator, replace=False, count=0)
 
 
-def ticked(operator) -> list[float]:
+def tick_durations(operator) -> list[float]:
     """Seconds of every tick, to the end."""
     ticks = []
     while True:
@@ -35,7 +35,7 @@ def ticked(operator) -> list[float]:
 def test_fit_by_timer_equals_fit_by_script() -> None:
     assert bpy.ops.patina.import_demo() == {"FINISHED"}
     running = extension("scene.session.running_job").running
-    ticks = ticked(begun("fit", "PATINA_OT_fit"))
+    ticks = tick_durations(begun("fit", "PATINA_OT_fit"))
     measured = extension("scene.scan.apply_result").measured_materials
     stepped = {m.name: list(m["patina_coefficients"]) for m in measured()}
     assert running(bpy.context.scene) is None and stepped

@@ -20,7 +20,7 @@ from patina.core.result import read_result
 from patina.core.scan import Mesh
 from tests import make_capture as made
 
-BASE_ALBEDO_OVER_PI = np.array([0.16, 0.05, 0.04])  # 1/sr, of the material that make_capture uses
+DIFFUSE_BRDF = np.array([0.16, 0.05, 0.04])  # 1/sr, of the material that make_capture uses
 
 
 def paint(normal):
@@ -29,7 +29,7 @@ def paint(normal):
 
 
 def painted(normal, light, view):
-    return made.blinn(normal, light, view) + BASE_ALBEDO_OVER_PI * (paint(normal) - 1)
+    return made.blinn(normal, light, view) + DIFFUSE_BRDF * (paint(normal) - 1)
 
 
 def sphere_uv(mesh):
@@ -59,7 +59,7 @@ def fitted(folder, brdf, waves=0.0):
     return capture, read_result(folder / "fit")
 
 
-def maps_of(capture, result, size=128, refits=1, unwrap=sphere_uv):
+def run_maps_job(capture, result, size=128, refits=1, unwrap=sphere_uv):
     job = MapsJob(capture, result, MapsSettings(size, refits), unwrap)
     job.drain()
     return job.result
@@ -68,13 +68,13 @@ def maps_of(capture, result, size=128, refits=1, unwrap=sphere_uv):
 @pytest.fixture(scope="module")
 def banded(tmp_path_factory):
     capture, result = fitted(tmp_path_factory.mktemp("banded"), painted)
-    return capture, result, maps_of(capture, result, refits=2)
+    return capture, result, run_maps_job(capture, result, refits=2)
 
 
 def true_albedo(found):
     normal = found.texels.points(found.scan.mesh, slice(None)) - made.CENTRE
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.pi * BASE_ALBEDO_OVER_PI * paint(normal)
+    return np.pi * DIFFUSE_BRDF * paint(normal)
 
 
 @pytest.mark.slow
@@ -92,7 +92,7 @@ def test_albedo_map_matches_painted_albedo(banded):
 @pytest.mark.slow
 def test_uniform_surface_stays_uniform_and_is_not_refitted(tmp_path):
     capture, result = fitted(tmp_path, made.blinn)
-    found = maps_of(capture, result)
+    found = run_maps_job(capture, result)
     assert found.refit is None
     seen = (found.maps.photos > 0) & (found.maps.error < 0.1)
     assert seen.mean() > 0.4
@@ -121,7 +121,7 @@ def test_written_maps_describe_themselves(banded, tmp_path):
 def test_mesh_without_texture_coordinates_outside_blender(banded):
     capture, result, _ = banded
     with pytest.raises(InputError, match=r"no texture coordinates.*unwrap"):
-        maps_of(capture, result, unwrap=None)
+        run_maps_job(capture, result, unwrap=None)
 
 
 @pytest.mark.slow
@@ -130,7 +130,7 @@ def test_photos_without_lit_pixels_raise_capture_error(banded):
     away = [rotation.T @ np.array([0.0, 0.0, 1.0]) for rotation, _ in made.poses(9)]
     lights = tuple(replace(a, direction=d) for a, d in zip(capture.lights, away, strict=True))
     with pytest.raises(InputError, match="no texel is seen lit"):
-        maps_of(replace(capture, lights=lights), result)
+        run_maps_job(replace(capture, lights=lights), result)
 
 
 @pytest.mark.slow
@@ -153,17 +153,19 @@ def test_normal_map_corrects_mesh_normals_towards_true_surface(tmp_path):
     exact = texels.points(mesh, slice(None)) - made.CENTRE
     exact /= np.linalg.norm(exact, axis=1, keepdims=True)
 
-    def off(values):
+    def angular_error(values):
         return np.degrees(np.arccos(np.clip(np.einsum("nc,nc->n", values, exact), -1, 1)))
 
     # tangents at face corners turn fast near the poles
     well_conditioned = np.abs(exact[:, 2]) < 0.9
     seen = well_conditioned & (found.maps.photos >= 2)
-    before, after = np.median(off(normal)[seen]), np.median(off(turned)[seen])
+    before, after = np.median(angular_error(normal)[seen]), np.median(angular_error(turned)[seen])
     print(f"normals {before:.2f}° before, {after:.2f}° after")
     assert before > 1.0 and after < 0.75 * before
     unobserved = well_conditioned & (found.maps.photos == 0)
-    assert np.median(off(turned)[unobserved]) < 1.15 * np.median(off(normal)[unobserved])
+    assert np.median(angular_error(turned)[unobserved]) < 1.15 * np.median(
+        angular_error(normal)[unobserved]
+    )
 
 
 def test_tangents_follow_u_on_plain_and_mirrored_faces():

@@ -14,7 +14,7 @@ from patina.core.maps.texels import rasterise
 from patina.core.scan import Mesh
 
 
-def filled(samples):
+def filled_slots(samples):
     """Slots of n texels from a list of (scale (n, 3), error (n,), gloss (n,))."""
     n = len(samples[0][0])
     slots = TexelSlots.empty(n)
@@ -24,7 +24,7 @@ def filled(samples):
     return slots
 
 
-def solved(slots, n):
+def solve_slots(slots, n):
     return solve_texels(slots, np.zeros(n, np.uint8), slice(0, n))
 
 
@@ -33,8 +33,10 @@ def test_scale_is_weighted_mean_with_its_standard_error():
     n, truth = 4000, np.array([0.5, 1.0, 1.6])
     errors = (0.03, 0.06, 0.06, 0.12)
     noise = [truth + e * rng.normal(size=(n, 3)) for e in errors]
-    slots = filled([(s, np.full(n, e), np.zeros(n)) for s, e in zip(noise, errors, strict=True)])
-    found = solved(slots, n)
+    slots = filled_slots(
+        [(s, np.full(n, e), np.zeros(n)) for s, e in zip(noise, errors, strict=True)]
+    )
+    found = solve_slots(slots, n)
     assert np.abs(found.scale.mean(axis=0) - truth).max() < 0.003
     best = 1 / np.sqrt(sum(e**-2 for e in errors))
     assert found.scale.std(axis=0).max() < 1.25 * best  # loss of efficiency of the robust estimator
@@ -48,14 +50,14 @@ def test_outlier_photo_is_downweighted():
     good = [(1 + 0.04 * rng.normal(size=(n, 3)), np.full(n, 0.05), np.zeros(n)) for _ in range(4)]
     shadow = (np.full((n, 3), 0.1), np.full(n, 0.05), np.zeros(n))
     plain = np.mean([s[0] for s in (*good, shadow)])
-    found = solved(filled([*good, shadow]), n)
+    found = solve_slots(filled_slots([*good, shadow]), n)
     assert abs(found.scale.mean() - 1) < 0.02 < abs(plain - 1)
-    agreeing = solved(filled(good), n)  # the disagreement shows in the standard error
+    agreeing = solve_slots(filled_slots(good), n)  # the disagreement shows in the standard error
     assert np.median(found.spread) > 2 * np.median(agreeing.spread)
 
 
 def test_texel_without_samples_has_no_estimate():
-    found = solved(TexelSlots.empty(5), 5)
+    found = solve_slots(TexelSlots.empty(5), 5)
     assert np.isnan(found.scale).all() and (found.weight == 0).all()
     assert (found.gloss == 0).all() and np.isinf(found.gloss_error).all()
 
@@ -74,7 +76,7 @@ def test_samples_of_other_material_are_ignored():
 def test_most_precise_samples_are_kept_when_slots_are_full():
     n, count = 50, 3 * SLOTS
     errors = np.random.default_rng(2).permutation(np.linspace(0.05, 1.0, count))
-    slots = filled([(np.full((n, 3), e), np.full(n, e), np.zeros(n)) for e in errors])
+    slots = filled_slots([(np.full((n, 3), e), np.full(n, e), np.zeros(n)) for e in errors])
     kept = np.sort(slots.error[:, 0].astype(float))
     assert np.allclose(kept, np.sort(errors)[:SLOTS], rtol=2e-3)
     assert (slots.count == count).all()
@@ -90,7 +92,7 @@ def test_gloss_is_estimated_from_highlights_independently_of_colour():
         error = np.full(n, 0.05 + 0.1 * abs(q))
         value = body + truth * q + error * rng.normal(size=n)
         samples.append((np.repeat(value[:, None], 3, axis=1), error, np.full(n, q)))
-    found = solved(filled(samples), n)
+    found = solve_slots(filled_slots(samples), n)
     known = np.isfinite(found.gloss_error)
     assert known.mean() > 0.9
     assert np.corrcoef(found.gloss[known], truth[known])[0, 1] > 0.8
@@ -101,7 +103,7 @@ def test_gloss_is_estimated_from_highlights_independently_of_colour():
 def test_gloss_is_unchanged_without_highlight():
     n = 100
     samples = [(np.full((n, 3), v), np.full(n, 0.05), np.zeros(n)) for v in (0.9, 1.0, 1.1)]
-    found = solved(filled(samples), n)
+    found = solve_slots(filled_slots(samples), n)
     assert (found.gloss == 0).all()
 
 

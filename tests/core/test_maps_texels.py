@@ -14,7 +14,7 @@ from patina.core.maps.dilate import dilated, margin_of
 from patina.core.scan import Mesh
 
 
-def flat(uv, faces):
+def flat_mesh(uv, faces):
     """A flat mesh whose points are its texture coordinates in scan units."""
     points = np.concatenate([uv, np.zeros((len(uv), 1))], axis=1)
     return Mesh(points, np.asarray(faces, np.int32), uv=uv[faces].astype(np.float32))
@@ -22,12 +22,12 @@ def flat(uv, faces):
 
 def test_rectangle_covers_its_area_with_correct_surface_points():
     uv = np.array([[0.25, 0.25], [0.75, 0.25], [0.75, 0.5], [0.25, 0.5]])
-    texels = rasterise(flat(uv, [[0, 1, 2], [0, 2, 3]]), 64)
+    texels = rasterise(flat_mesh(uv, [[0, 1, 2], [0, 2, 3]]), 64)
     assert len(texels) == 32 * 16 and texels.overlapped == 0 and texels.outside == 0
     row, column = np.divmod(texels.place, 64)
     assert (row.min(), row.max()) == (32, 47)  # v = 0.25 … 0.5 from below: rows count from the top
     assert (column.min(), column.max()) == (16, 47)
-    mesh = flat(uv, [[0, 1, 2], [0, 2, 3]])
+    mesh = flat_mesh(uv, [[0, 1, 2], [0, 2, 3]])
     points = texels.points(mesh, slice(None))
     assert np.allclose(points[:, 0], (column + 0.5) / 64, atol=1e-6)
     assert np.allclose(points[:, 1], 1 - (row + 0.5) / 64, atol=1e-6)
@@ -43,15 +43,15 @@ def test_each_texel_centre_lies_in_exactly_one_triangle(seed, size, on_centres):
         points = (np.floor(points * size) + 0.5) / size
     points = np.unique(np.concatenate([points, [[0, 0], [1, 0], [1, 1], [0, 1]]]), axis=0)
     faces = Delaunay(points).simplices
-    texels = rasterise(flat(points, faces), size)
+    texels = rasterise(flat_mesh(points, faces), size)
     assert np.array_equal(np.sort(texels.place), np.arange(size * size))
     assert texels.overlapped == 0
 
 
 def test_mirrored_uv_islands_are_covered_equally():
     uv = np.array([[0.1, 0.1], [0.9, 0.2], [0.4, 0.8]])
-    one = rasterise(flat(uv, [[0, 1, 2]]), 128)
-    other = rasterise(flat(uv, [[0, 2, 1]]), 128)
+    one = rasterise(flat_mesh(uv, [[0, 1, 2]]), 128)
+    other = rasterise(flat_mesh(uv, [[0, 2, 1]]), 128)
     assert np.array_equal(one.place, other.place)
     area = 0.5 * abs(np.cross(uv[1] - uv[0], uv[2] - uv[0])) * 128**2
     assert abs(len(one) - area) < 0.01 * area
@@ -59,7 +59,7 @@ def test_mirrored_uv_islands_are_covered_equally():
 
 def test_overlapping_faces_are_counted_and_first_face_is_used():
     uv = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0], [0.5, 0], [0, 0.5]], float)
-    mesh = flat(uv, [[0, 1, 2], [0, 2, 3], [4, 5, 6]])
+    mesh = flat_mesh(uv, [[0, 1, 2], [0, 2, 3], [4, 5, 6]])
     texels = rasterise(mesh, 32)
     assert len(texels) == 32 * 32
     assert 0.9 * 128 < texels.overlapped < 1.1 * 128  # one eighth of the texture
@@ -71,7 +71,7 @@ def test_texture_with_more_rows_than_one_block(monkeypatch):
 
     rng = np.random.default_rng(1)
     points = np.concatenate([rng.random((30, 2)), [[0, 0], [1, 0], [1, 1], [0, 1]]])
-    mesh = flat(points, Delaunay(points).simplices)
+    mesh = flat_mesh(points, Delaunay(points).simplices)
     whole = rasterise(mesh, 64)
     monkeypatch.setattr(module, "BAND", 64 * 7)
     monkeypatch.setattr(module, "TEXELS_AT_ONCE", 50)
@@ -90,12 +90,12 @@ def test_mesh_without_texture_coordinates_error_says_what_to_do():
 def test_coordinates_outside_texture_are_rejected_with_their_count(shift):
     uv = np.array([[0, 0], [1, 0], [0, 1]], float) + shift
     with pytest.raises(InputError, match=r"cover no texel.*1 of 1 faces"):
-        rasterise(flat(uv, [[0, 1, 2]]), 64)
+        rasterise(flat_mesh(uv, [[0, 1, 2]]), 64)
 
 
 def test_thousand_overlapping_layers_are_rejected_early():
     uv = np.array([[0, 0], [1, 0], [1, 1]], float)
-    mesh = flat(uv, np.tile([[0, 1, 2]], (1000, 1)))
+    mesh = flat_mesh(uv, np.tile([[0, 1, 2]], (1000, 1)))
     with pytest.raises(InputError, match="cover the texture"):
         rasterise(mesh, 8192)
 

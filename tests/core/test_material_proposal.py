@@ -51,7 +51,7 @@ def halves(normal):
     return (normal[:, 2] > 0.1 + 0.15 * np.sin(3 * np.arctan2(normal[:, 1], normal[:, 0]))) * 1
 
 
-def proposed(path: Path, count: int | None = None):
+def run_proposal(path: Path, count: int | None = None):
     job = ProposalJob(read_capture(path), count)
     job.drain()
     assert job.result is not None
@@ -84,7 +84,7 @@ def test_three_colours_are_separated(tmp_path: Path, count) -> None:
         ((0.2, 0.2, 0.2), 0.1, 9),
     ]
     path = made.make_capture(tmp_path, photos=9, brdf=painted(paints, caps))
-    result = proposed(path, count)
+    result = run_proposal(path, count)
     found = result.proposal
     assert found.count == 3
     seen = found.confidence > 0
@@ -98,7 +98,7 @@ def test_three_colours_are_separated(tmp_path: Path, count) -> None:
 def test_two_glosses_of_one_colour_are_separated(tmp_path: Path) -> None:
     paints = [((0.12, 0.09, 0.05), 0.0, 1), ((0.12, 0.09, 0.05), 0.35, 25)]
     path = made.make_capture(tmp_path, photos=9, brdf=painted(paints, halves))
-    result = proposed(path)
+    result = run_proposal(path)
     labels, true = result.proposal.labels, truth(result, halves)
     assert result.proposal.count == 2
     # where some photo has half vector and normal within 25° the lobe is visible; elsewhere the two
@@ -120,7 +120,7 @@ def test_two_glosses_of_one_colour_are_separated(tmp_path: Path) -> None:
 def test_light_and_dark_shades_of_one_colour_are_separated(tmp_path: Path) -> None:
     paints = [((0.20, 0.16, 0.12), 0.1, 20), ((0.10, 0.08, 0.06), 0.1, 20)]
     path = made.make_capture(tmp_path, photos=9, brdf=painted(paints, halves))
-    result = proposed(path)
+    result = run_proposal(path)
     assert result.proposal.count == 2
     seen = result.proposal.confidence > 0
     assert accuracy(result.proposal.labels, truth(result, halves), seen) > 0.97
@@ -135,7 +135,7 @@ def test_single_material_is_not_split(tmp_path: Path, exponent: int) -> None:
     rng = np.random.default_rng(2)
     rough = made.CENTRE + (vertices - made.CENTRE) * (1 + rng.normal(0, 2e-3, (len(vertices), 1)))
     made.write_ply(tmp_path / "mesh.ply", rough, faces)
-    found = proposed(path).proposal
+    found = run_proposal(path).proposal
     assert found.count == 1
     assert (found.labels == 0).all()
 
@@ -152,14 +152,14 @@ def test_unexplained_shadow_is_not_a_material(tmp_path: Path) -> None:
     dark = (np.indices(bright.shape)[1] < np.median(columns)) & bright
     pixels[dark] *= 0.15  # some stray light remains
     made.write_exr(tmp_path / "lit_1.exr", pixels)
-    assert proposed(path).proposal.count == 1
+    assert run_proposal(path).proposal.count == 1
 
 
 def test_requested_number_of_materials(tmp_path: Path) -> None:
     path = made.make_capture(tmp_path, photos=6)
-    one = proposed(path, 1).proposal
+    one = run_proposal(path, 1).proposal
     assert one.count == 1 and not one.splits
-    assert proposed(path, 2).proposal.count <= 2
+    assert run_proposal(path, 2).proposal.count <= 2
 
 
 def test_capture_without_lit_surface_is_reported(tmp_path: Path) -> None:
@@ -167,7 +167,7 @@ def test_capture_without_lit_surface_is_reported(tmp_path: Path) -> None:
     for i in (1, 2):
         made.write_exr(tmp_path / f"lit_{i}.exr", np.zeros((made.HEIGHT, made.WIDTH, 3)))
     with pytest.raises(InputError, match="lit"):
-        proposed(path)
+        run_proposal(path)
 
 
 def test_empty_cells_are_reported() -> None:
@@ -224,7 +224,7 @@ def test_demo_capture_matches_painted_masks(root: Path) -> None:
     from patina.core.inputs.material_pixels import material_pixels
 
     path = root / "assets" / "demo" / "demo.capture.toml"
-    result = proposed(path)
+    result = run_proposal(path)
     assert result.proposal.count == 2
     capture, right, all_of_them = read_capture(path), 0, 0
     for place in range(len(capture.photos)):
@@ -242,5 +242,5 @@ def test_demo_capture_matches_painted_masks(root: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["bunny_red", "bunny_bronze", "bunny_fabric"])
 def test_real_scans_of_one_material_are_not_split(shared: Path, name: str) -> None:
-    found = proposed(shared / "data" / "scans" / name / "scan.capture.toml").proposal
+    found = run_proposal(shared / "data" / "scans" / name / "scan.capture.toml").proposal
     assert found.count == 1, found.splits

@@ -365,7 +365,7 @@ def test_unsupported_gltf_extensions_are_rejected_by_name(
             read_mesh(saved(tmp_path, "m.glb", writer.glb()))
 
 
-def star(radii: list[float]) -> np.ndarray:
+def star_polygon(radii: list[float]) -> np.ndarray:
     angle = 2 * np.pi * np.arange(len(radii)) / len(radii)
     return np.array(radii)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
@@ -376,7 +376,7 @@ def test_concave_polygons_are_triangulated_inside(radii: list[float], turn: int)
     """The triangles of a star-shaped polygon have its orientation, and their areas add up to its
     area.
     """
-    corners = star(radii)
+    corners = star_polygon(radii)
     lifted = np.roll(np.concatenate([corners, np.zeros((len(corners), 1))], axis=1), turn, axis=1)
     flat = plane_coordinates(lifted[None])
     x, y = corners.T
@@ -386,7 +386,7 @@ def test_concave_polygons_are_triangulated_inside(radii: list[float], turn: int)
     areas = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     assert areas.min() > -1e-9
     assert areas.sum() == pytest.approx(area, rel=1e-9)
-    assert is_convex(plane_coordinates(star([1.0] * len(radii))[None] @ np.eye(2, 3)))[0]
+    assert is_convex(plane_coordinates(star_polygon([1.0] * len(radii))[None] @ np.eye(2, 3)))[0]
 
 
 def test_concave_quad_is_not_triangulated_as_fan(tmp_path: Path) -> None:
@@ -403,7 +403,7 @@ def test_concave_quad_is_not_triangulated_as_fan(tmp_path: Path) -> None:
 @given(st.lists(st.lists(st.floats(0.2, 1.0), min_size=3, max_size=20), min_size=1, max_size=9))
 def test_concave_faces_of_many_sizes(stars: list[list[float]]) -> None:
     """The triangles of each face are consecutive and have its area."""
-    rings = [star(radii) + np.array([3.0 * i, 0]) for i, radii in enumerate(stars)]
+    rings = [star_polygon(radii) + np.array([3.0 * i, 0]) for i, radii in enumerate(stars)]
     flat = np.concatenate(rings)
     sizes = np.array([len(ring) for ring in rings])
     vertices = np.concatenate([flat, np.zeros((len(flat), 1))], axis=1)

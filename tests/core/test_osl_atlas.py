@@ -48,7 +48,7 @@ def _through_textures(brdf: PrincipalBRDF, angles: Angles, coefficients) -> np.n
     return mapping.unlog_weighted(logarithm, mapping.cos_map(angles))
 
 
-def _relative(read: np.ndarray, exact: np.ndarray, angles: Angles) -> np.ndarray:
+def _relative_error(read: np.ndarray, exact: np.ndarray, angles: Angles) -> np.ndarray:
     weight = mapping.cos_map(angles)[:, None]
     return np.abs(read - exact) * weight / (exact * weight + mapping.EPSILON)
 
@@ -59,7 +59,7 @@ def test_shader_textures_reproduce_brdf(angles: Angles, count: int) -> None:
     c = np.random.default_rng(2).normal(0, np.sqrt(basis.coefficient_variance), (3, count))
     # component by component, at every direction: no table of partial sums in between
     exact = basis.evaluate(c, angles).astype(float)
-    error = _relative(_through_textures(PrincipalBRDF(basis, c), angles, c), exact, angles)
+    error = _relative_error(_through_textures(PrincipalBRDF(basis, c), angles, c), exact, angles)
     assert error.max() < 1e-4
 
 
@@ -70,7 +70,9 @@ def test_changed_coefficient_gives_another_brdf_of_basis(angles: Angles) -> None
     moved = c.copy()
     moved[:, :8] += np.random.default_rng(4).normal(0, 0.06, (3, 8))
     exact = basis.evaluate(moved, angles).astype(float)
-    error = _relative(_through_textures(PrincipalBRDF(basis, c), angles, moved), exact, angles)
+    error = _relative_error(
+        _through_textures(PrincipalBRDF(basis, c), angles, moved), exact, angles
+    )
     assert np.sqrt(np.mean(error**2)) < 5e-4 and error.max() < 5e-3
 
 

@@ -96,7 +96,7 @@ def test_all_file_formats_give_same_metadata(files: list[Path]) -> None:
         assert found.missing == ()
 
 
-def of(tmp_path: Path, main=None, exif=None, gps=None) -> Exif:
+def exif_of(tmp_path: Path, main=None, exif=None, gps=None) -> Exif:
     path = tmp_path / "p.tif"
     made.write_tiff(path, PIXELS, main, exif=exif or {}, gps=gps or {})
     return read_exif(path)
@@ -105,7 +105,7 @@ def of(tmp_path: Path, main=None, exif=None, gps=None) -> Exif:
 def test_relative_exposure_is_proportional_to_light(tmp_path: Path) -> None:
     def relative(time, aperture, iso) -> float:
         exif = {0x829A: made.rationals(time), 0x829D: made.rationals(aperture), 0x8827: (3, [iso])}
-        return of(tmp_path, exif=exif).relative_exposure
+        return exif_of(tmp_path, exif=exif).relative_exposure
 
     base = relative((1, 100), (4, 1), 100)
     assert base == pytest.approx(0.01 / 16)
@@ -117,7 +117,7 @@ def test_relative_exposure_is_proportional_to_light(tmp_path: Path) -> None:
 @pytest.mark.parametrize("tag", [0x829A, 0x829D])
 @pytest.mark.parametrize("value", [(0, 0), (1, 0), (0, 1)])
 def test_zero_denominators_count_as_missing(tmp_path: Path, tag: int, value) -> None:
-    found = of(tmp_path, exif={**EXIF, tag: made.rationals(value)})
+    found = exif_of(tmp_path, exif={**EXIF, tag: made.rationals(value)})
     assert found.relative_exposure is None
     assert found.missing == ({0x829A: "exposure time", 0x829D: "f-number"}[tag],)
 
@@ -129,7 +129,7 @@ def test_apex_values_are_used_as_fallback(tmp_path: Path) -> None:
         0x8827: (3, [65535]),
         0x8831: (4, [102400]),
     }
-    found = of(tmp_path, exif=exif)
+    found = exif_of(tmp_path, exif=exif)
     assert (found.exposure_time, found.f_number, found.iso) == (1 / 128, 8, 102400)
 
 
@@ -139,7 +139,7 @@ def test_edit_time_is_not_photo_time(tmp_path: Path) -> None:
         0x9004: made.ascii_tag("2019:01:01 00:00:00"),  # time of digitisation
         0x9010: made.ascii_tag("-05:00"),  # time zone of the edit
     }
-    found = of(tmp_path, main, exif)
+    found = exif_of(tmp_path, main, exif)
     assert found.datetime_original is None and found.offset_original is None
     assert found.utc is None
 
@@ -148,7 +148,7 @@ def test_edit_time_is_not_photo_time(tmp_path: Path) -> None:
     "text", ["0000:00:00 00:00:00", "    :  :     :  :  ", "2018:02:30 10:00:00", "", "x" * 19]
 )
 def test_invalid_times_are_ignored(tmp_path: Path, text: str) -> None:
-    assert of(tmp_path, exif={0x9003: made.ascii_tag(text)}).datetime_original is None
+    assert exif_of(tmp_path, exif={0x9003: made.ascii_tag(text)}).datetime_original is None
 
 
 @pytest.mark.parametrize(
@@ -159,7 +159,7 @@ def test_invalid_times_are_ignored(tmp_path: Path, text: str) -> None:
     ],
 )  # fmt: skip
 def test_time_zone_offsets(tmp_path: Path, text: str, hours) -> None:
-    found = of(tmp_path, exif={0x9011: made.ascii_tag(text)}).offset_original
+    found = exif_of(tmp_path, exif={0x9011: made.ascii_tag(text)}).offset_original
     assert found == (None if hours is None else timedelta(hours=hours))
 
 
@@ -176,13 +176,13 @@ def test_time_zone_offsets(tmp_path: Path, text: str, hours) -> None:
     ],
 )
 def test_invalid_places_are_ignored(tmp_path: Path, change: dict) -> None:
-    found = of(tmp_path, gps=GPS | change)
+    found = exif_of(tmp_path, gps=GPS | change)
     wrong = found.gps_utc if max(change) >= 7 else found.latitude
     assert wrong is None and found.longitude == pytest.approx(151.2)
 
 
 def test_place_in_decimal_degrees(tmp_path: Path) -> None:
-    found = of(tmp_path, gps=GPS | {2: made.rationals((338570000, 10000000), (0, 0), (0, 0))})
+    found = exif_of(tmp_path, gps=GPS | {2: made.rationals((338570000, 10000000), (0, 0), (0, 0))})
     assert found.latitude == pytest.approx(-33.857, abs=1e-9)
 
 

@@ -227,7 +227,7 @@ def cmyk_jpeg(path: Path) -> None:
     path.write_bytes(bytes(data))
 
 
-def renamed(name: str) -> Callable[[Path], None]:
+def copied_as(name: str) -> Callable[[Path], None]:
     def make(path: Path) -> None:
         other = path.with_name("other" + name)
         if name == ".png":
@@ -269,10 +269,10 @@ def broken_exr(path: Path) -> None:
     ("name", "make", "message"),
     [
         ("p.jpg", cmyk_jpeg, "CMYK"),
-        ("p.jpg", renamed(".png"), "the suffix .jpg but its format is png"),
-        ("p.png", renamed(".jpg"), "the suffix .png but its format is jpeg"),
-        ("p.tif", renamed(".jpg"), "the suffix .tif but its format is jpeg"),
-        ("p.exr", renamed(".jpg"), "the suffix .exr but its format is jpeg"),
+        ("p.jpg", copied_as(".png"), "the suffix .jpg but its format is png"),
+        ("p.png", copied_as(".jpg"), "the suffix .png but its format is jpeg"),
+        ("p.tif", copied_as(".jpg"), "the suffix .tif but its format is jpeg"),
+        ("p.exr", copied_as(".jpg"), "the suffix .exr but its format is jpeg"),
         ("p.hdr", lambda path: path.write_bytes(b"not at all"), "not HDR"),
         ("p.jpg", lambda path: path.write_bytes(b""), "not JPEG"),
         ("p.tif", tiff_of(5, channels=4), "CMYK"),
@@ -295,7 +295,7 @@ def test_unsupported_images_are_rejected(tmp_path: Path, name: str, make, messag
     assert "\n" not in str(raised.value) and name in str(raised.value)
 
 
-def seeds(folder: Path) -> dict[str, Path]:
+def write_seed_files(folder: Path) -> dict[str, Path]:
     """One small file of every format and of the layouts that take different code paths."""
     exif = made.tiff_bytes({274: (3, [6])}, exif={0x829A: made.rationals((1, 50))})
     app = (made.app1_exif(exif), made.app2_icc(made.icc_profile(made.curv(563), made.ADOBE_D50)))
@@ -320,13 +320,13 @@ NAMES = [
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    found = seeds(tmp_path_factory.mktemp("seeds"))
+def valid_files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    found = write_seed_files(tmp_path_factory.mktemp("seeds"))
     assert sorted(found) == NAMES
     return found
 
 
-def attempt(path: Path) -> bool:
+def check_all_readers(path: Path) -> bool:
     """Run every reader: pixels of the header's size, or a one-line error, in bounded time.
 
     Returns whether pixels came.
@@ -350,14 +350,14 @@ def attempt(path: Path) -> bool:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_truncated_files(
-    whole: dict[str, Path], tmp_path: Path, name: str, capfd: pytest.CaptureFixture[str]
+    valid_files: dict[str, Path], tmp_path: Path, name: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    data = whole[name].read_bytes()
+    data = valid_files[name].read_bytes()
     rng = random.Random(name)
     for _ in range(50):
         (tmp_path / name).write_bytes(data[: rng.randrange(len(data) - 2)])
         # the end of a strip that the last row does not need may be missing
-        assert not attempt(tmp_path / name)
+        assert not check_all_readers(tmp_path / name)
     assert capfd.readouterr().err == ""
 
 
@@ -372,13 +372,13 @@ def test_truncated_files(
 )
 @example(places=[(0.02, False, 255)])
 @example(places=[(0.5, True, 0), (0.0, True, 255)])
-def test_flipped_bytes(whole: dict[str, Path], tmp_path: Path, name: str, places) -> None:
-    data = bytearray(whole[name].read_bytes())
+def test_flipped_bytes(valid_files: dict[str, Path], tmp_path: Path, name: str, places) -> None:
+    data = bytearray(valid_files[name].read_bytes())
     for part, in_head, value in places:
         reach = min(len(data), 400) if in_head else len(data)
         data[int(part * reach)] = value
     (tmp_path / name).write_bytes(bytes(data))
-    attempt(tmp_path / name)
+    check_all_readers(tmp_path / name)
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from patina.core.result import read_result
 from tests import make_result as made
 
 
-def one(folder: Path, **changes) -> Path:
+def write_one_material(folder: Path, **changes) -> Path:
     description = made.description(made.material("bronze", made.BRONZE, **changes))
     return made.write_result(folder, description)
 
@@ -35,7 +35,7 @@ def test_written_result_is_read_back(tmp_path: Path) -> None:
 
 
 def test_scene_is_found_next_to_result(tmp_path: Path) -> None:
-    folder = one(tmp_path)
+    folder = write_one_material(tmp_path)
     (folder / "scene.blend").write_bytes(b"")
     assert read_result(folder).scene == folder / "scene.blend"
 
@@ -87,7 +87,7 @@ WRONG = [
 )
 def test_invalid_entry_is_named(tmp_path: Path, change: dict, key: str) -> None:
     with pytest.raises(InputError) as raised:
-        read_result(one(tmp_path, **change))
+        read_result(write_one_material(tmp_path, **change))
     assert f"materials[0].{key}" in str(raised.value)
     assert "result.json" in str(raised.value) and "\n" not in str(raised.value)
 

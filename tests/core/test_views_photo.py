@@ -168,15 +168,15 @@ def test_every_criterion_occurs(opened: Opened, views: list[PhotoView], painted:
 def test_first_violated_criterion_is_reported(views: list[PhotoView]) -> None:
     view = views[0]
 
-    def at(row: int, column: int) -> Criterion:
+    def criterion_at(row: int, column: int) -> Criterion:
         inside = row - view.box[0].start, column - view.box[1].start
         return Criterion(view.criteria[inside])
 
-    assert at(40, 44) == Criterion.SHADOW_MASK  # the highlight mask is white here too
-    assert at(45, 52) == Criterion.HIGHLIGHT_MASK
-    assert at(55, 70) == Criterion.IGNORE_MASK
-    assert at(85, 70) == Criterion.NO_MATERIAL
-    assert at(2, 2) == Criterion.NO_SURFACE
+    assert criterion_at(40, 44) == Criterion.SHADOW_MASK  # the highlight mask is white here too
+    assert criterion_at(45, 52) == Criterion.HIGHLIGHT_MASK
+    assert criterion_at(55, 70) == Criterion.IGNORE_MASK
+    assert criterion_at(85, 70) == Criterion.NO_MATERIAL
+    assert criterion_at(2, 2) == Criterion.NO_SURFACE
 
 
 def test_attached_and_cast_shadows_are_distinguished(

@@ -88,7 +88,7 @@ def main(out: Path) -> None:
             if done.returncode:
                 raise SystemExit(done.stderr)
             print(done.stdout)
-        result = truth.made(folder, size=SIZE)
+        result = truth.run_maps_job(folder, size=SIZE)
         print("\n".join(figures(folder, result)))
         write(out, panels(folder, result))
 

@@ -52,7 +52,7 @@ def painted(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def made(folder: Path, capture: str = "painted.capture.toml", size: int = SIZE, **more):
+def run_maps_job(folder: Path, capture: str = "painted.capture.toml", size: int = SIZE, **more):
     """Maps by the fit on paint-corrected samples that the command saved."""
     fitted = read_result(folder / "maps")
     job = MapsJob(read_capture(folder / capture), fitted, MapsSettings(size, refits=0), **more)
@@ -63,7 +63,7 @@ def made(folder: Path, capture: str = "painted.capture.toml", size: int = SIZE, 
 
 @pytest.fixture(scope="module")
 def result(painted: Path):
-    return made(painted)
+    return run_maps_job(painted)
 
 
 def resolved(texels) -> np.ndarray:
@@ -186,7 +186,7 @@ def test_highlights_are_not_baked_in(painted, result):
 
 
 def test_texture_sizes_agree(painted, result):
-    fine = made(painted, size=2 * SIZE)
+    fine = run_maps_job(painted, size=2 * SIZE)
     image = fine.texels.image(base_color(fine, 0))
     seen = fine.texels.image(fine.maps.photos >= 3)
     coarse = image.reshape(SIZE, 2, SIZE, 2, 3).mean(axis=(1, 3))
@@ -229,8 +229,8 @@ def test_mesh_without_texture_coordinates_is_unwrapped(painted):
     (painted / "bare" / "mesh.obj").rename(painted / "bare.obj")
     (painted / "bare.capture.toml").write_text(text.replace("mesh.obj", "bare.obj"))
     with pytest.raises(InputError, match="no texture coordinates"):
-        made(painted, "bare.capture.toml")
-    found = made(painted, "bare.capture.toml", size=512, unwrap=unwrapped)
+        run_maps_job(painted, "bare.capture.toml")
+    found = run_maps_job(painted, "bare.capture.toml", size=512, unwrap=unwrapped)
     assert found.unwrapped and found.texels.overlapped < 0.01 * len(found.texels)
     # the painted colour at the same surface points, by the nearest texel of the mesh's own
     # coordinates
@@ -249,7 +249,7 @@ def test_result_of_another_capture_is_rejected(painted):
     other = painted / "other.capture.toml"
     other.write_text(text + '\n[[material]]\nname = "gold"\n')
     with pytest.raises(InputError, match=r"materials surface; expected 'gold'"):
-        made(painted, "other.capture.toml")
+        run_maps_job(painted, "other.capture.toml")
 
 
 def test_written_images_match_estimates(result, tmp_path):

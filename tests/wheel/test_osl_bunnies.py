@@ -20,7 +20,14 @@ from patina.scene.export import relight  # noqa: E402
 from patina.scene.material import material_nodes  # noqa: E402
 from tests.projected import projected  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
-from tests.wheel.world_light import VIEW, directions, lambert, reflected, wear, world  # noqa: E402
+from tests.wheel.world_light import (  # noqa: E402
+    VIEW,
+    assign_material,
+    directions,
+    lambert,
+    reflected,
+    world,
+)
 
 SIZE = 48  # of the environment images
 SEEDS = 4
@@ -41,20 +48,20 @@ def bunny(shared) -> Mesh:
     return Mesh(vertices / np.linalg.norm(vertices, axis=1).max(), mesh.faces)
 
 
-def put(mesh: Mesh, thing: bpy.types.Object | None = None) -> bpy.types.Object:
+def put(mesh: Mesh, bunny_object: bpy.types.Object | None = None) -> bpy.types.Object:
     """Add the mesh as a smooth object of the scene, or replace the mesh of another object."""
     data = bpy.data.meshes.new("bunny")
     data.from_pydata(mesh.vertices, [], mesh.faces)
     data.shade_smooth()
-    if thing is not None:
-        thing.data = data
-        return thing
-    thing = bpy.data.objects.new("bunny", data)
-    bpy.context.scene.collection.objects.link(thing)
-    return thing
+    if bunny_object is not None:
+        bunny_object.data = data
+        return bunny_object
+    bunny_object = bpy.data.objects.new("bunny", data)
+    bpy.context.scene.collection.objects.link(bunny_object)
+    return bunny_object
 
 
-def seen_at_pixels(rays: RayScene, thing: bpy.types.Object) -> tuple[np.ndarray, ...]:
+def seen_at_pixels(rays: RayScene, bunny_object: bpy.types.Object) -> tuple[np.ndarray, ...]:
     """(n, 2) pixels that show the mesh, (n, 3) its points there and Blender's smooth normals."""
     u = ((np.arange(SIZE) + 0.5) / SIZE * 2 - 1) * cycles_sphere.HALF_WIDTH
     x, y = np.meshgrid(u, -u)
@@ -62,8 +69,8 @@ def seen_at_pixels(rays: RayScene, thing: bpy.types.Object) -> tuple[np.ndarray,
     hits = rays.first_hits(starts, np.broadcast_to(-VIEW, starts.shape))
     hit = hits.face >= 0
     hits = type(hits)(*(a[hit] for a in hits))
-    smooth = np.empty(3 * len(thing.data.vertices), np.float32)
-    thing.data.vertex_normals.foreach_get("vector", smooth)
+    smooth = np.empty(3 * len(bunny_object.data.vertices), np.float32)
+    bunny_object.data.vertex_normals.foreach_get("vector", smooth)
     corners = smooth.reshape(-1, 3)[rays.mesh.faces[hits.face]].astype(float)
     shares = np.stack([1 - hits.u - hits.v, hits.u, hits.v], axis=1)[..., None]
     normals = np.sum(shares * corners, axis=1)
@@ -104,11 +111,11 @@ def test_bunny_under_environment_image(made, name, bunny, tmp_path):
     if name not in WORLDS:
         pytest.skip(f"this bpy has no world {name!r}")
     brdf = projected(made, 60)
-    thing = put(bunny, cycles_sphere.new_scene(size=SIZE, samples=1024, osl=True))
+    bunny_object = put(bunny, cycles_sphere.new_scene(size=SIZE, samples=1024, osl=True))
     # a box filter covers the pixel whatever its width; the bunny is not smooth across one
     bpy.context.scene.cycles.pixel_filter_type = "BLACKMAN_HARRIS"
     sky = world(WORLDS[name])
-    wear(brdf, thing)
+    assign_material(brdf, bunny_object)
     bpy.ops.mesh.primitive_uv_sphere_add(
         segments=256, ring_count=128, radius=BALL[1], location=BALL[0]
     )
@@ -120,7 +127,7 @@ def test_bunny_under_environment_image(made, name, bunny, tmp_path):
 
     rays = RayScene.build(bunny)
     towards, solid = directions(sky)
-    pixels, points, normals = seen_at_pixels(rays, thing)
+    pixels, points, normals = seen_at_pixels(rays, bunny_object)
     facing = np.flatnonzero((normals @ VIEW > 0.3) & ~behind_ball(points, VIEW))
     rows, expected, shadowed = [], [], []
     for k in np.random.default_rng(3).permutation(facing):
@@ -168,16 +175,16 @@ def test_interreflection_of_two_bunnies_matches_diffuse(bunny, tmp_path):
     own = cycles_sphere.diffuse(albedo)
     images = {}
     for measured in (False, True):
-        for thing in pair:
-            thing.data.materials.clear()
-            thing.data.materials.append(own)
+        for bunny_object in pair:
+            bunny_object.data.materials.clear()
+            bunny_object.data.materials.append(own)
         if measured:
-            wear(brdf, *pair)
+            assign_material(brdf, *pair)
         images[measured] = cycles_sphere.render(tmp_path)
     bpy.context.scene.cycles.max_bounces = 0
-    for thing in pair:
-        thing.data.materials.clear()
-        thing.data.materials.append(own)
+    for bunny_object in pair:
+        bunny_object.data.materials.clear()
+        bunny_object.data.materials.append(own)
     direct = cycles_sphere.render(tmp_path)
     # alone in a white environment each would be `albedo`; interreflection lies between it and
     # `direct`

@@ -21,7 +21,7 @@ from patina.scene.export import relight  # noqa: E402
 from patina.scene.material import material_nodes  # noqa: E402
 from tests.projected import projected  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
-from tests.wheel.world_light import VIEW, lambert, reflected, wear, world  # noqa: E402
+from tests.wheel.world_light import VIEW, assign_material, lambert, reflected, world  # noqa: E402
 
 WORLDS = relight.shipped_worlds()
 PIXELS = 24  # that are compared, in every environment
@@ -45,7 +45,7 @@ def test_sphere_under_environment_image(made, name, tmp_path):
     brdf = brdf_of(made)
     sphere = cycles_sphere.new_scene(size=32, samples=1024, osl=True)
     sky = world(WORLDS[name])
-    node = wear(brdf, sphere)
+    node = assign_material(brdf, sphere)
     assert {s.identifier: s for s in node.inputs}["world"].default_value != ""
     images = []
     for seed in (1, 2):
@@ -70,7 +70,7 @@ def test_white_furnace(tmp_path):
     sphere = cycles_sphere.new_scene(size=40, samples=256, osl=True)
     bpy.context.scene.cycles.filter_width = 1.0
     cycles_sphere.sky(1.0)
-    wear(brdf, sphere)
+    assign_material(brdf, sphere)
     image = cycles_sphere.render(tmp_path)
     normal, inside = cycles_sphere.normals()
     kept = inside & (normal @ VIEW > 0.1)
@@ -86,7 +86,7 @@ def test_reflected_light_does_not_exceed_incident_light(tmp_path):
     sphere = cycles_sphere.new_scene(size=40, samples=256, osl=True)
     bpy.context.scene.cycles.filter_width = 1.0
     cycles_sphere.sky(1.0)
-    wear(brdf, sphere)
+    assign_material(brdf, sphere)
     image = cycles_sphere.render(tmp_path)
     normal, inside = cycles_sphere.normals()
     assert image[inside & (normal @ VIEW > 0.2)].mean() == pytest.approx(1.0, abs=0.01)
@@ -104,12 +104,12 @@ def test_interreflection_matches_diffuse_of_same_albedo(tmp_path):
     own = cycles_sphere.diffuse(albedo)
     images = []
     for measured in (False, True):
-        for thing in (sphere, floor):
+        for shape in (sphere, floor):
             if measured:
-                wear(brdf, thing)
+                assign_material(brdf, shape)
             else:
-                thing.data.materials.clear()
-                thing.data.materials.append(own)
+                shape.data.materials.clear()
+                shape.data.materials.append(own)
         images.append(cycles_sphere.render(tmp_path))
     normal, inside = cycles_sphere.normals()
     low = inside & (normal @ VIEW > 0.3) & (normal[..., 1] < -0.2)  # faces the floor
@@ -124,7 +124,7 @@ def test_paint_scales_diffuse_part_only(tmp_path):
     light = np.array([0.6, 0.2, 0.77]) / np.linalg.norm([0.6, 0.2, 0.77])
     sphere = cycles_sphere.new_scene(size=80, osl=True)
     cycles_sphere.sun(light, 2.0)
-    node = wear(brdf, sphere)
+    node = assign_material(brdf, sphere)
     body = split_body(brdf.evaluate)
     paint = np.array([0.3, 1.0, 1.5])
     sockets = {s.identifier: s for s in node.inputs}

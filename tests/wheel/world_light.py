@@ -24,13 +24,13 @@ def lambert(angles: Angles) -> np.ndarray:
     return np.full((angles.theta_h.size, 3), 1 / np.pi)
 
 
-def wear(brdf: PrincipalBRDF, *things: bpy.types.Object) -> bpy.types.Node:
+def assign_material(brdf: PrincipalBRDF, *objects: bpy.types.Object) -> bpy.types.Node:
     """Assign the measured material to objects; return its script node."""
     files = osl_files.ensure_files(brdf)
     fit = fit_principled(brdf.evaluate, coat=False, nodes=(12, 6, 4))
     material = material_nodes.create_material("measured", brdf, fit, files)
     assert material_nodes.NO_OSL_REASON not in material
-    for thing in things:
+    for thing in objects:
         thing.data.materials.clear()
         thing.data.materials.append(material)
     (node,) = osl_files.script_nodes(material)
