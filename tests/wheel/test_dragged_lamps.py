@@ -21,7 +21,8 @@ from patina.core.inputs import capture_data  # noqa: E402
 from patina.core.inputs.lights import Lights  # noqa: E402
 from patina.core.light import DistantLight, MountedLight, NearLight  # noqa: E402
 from patina.core.scan import Scan  # noqa: E402
-from patina.scene.photos import dragged_lamps, lamps, photo_list  # noqa: E402
+from patina.scene.photos import dragged_lamps, photo_list  # noqa: E402
+from patina.scene.photos.lamps import shine_only  # noqa: E402
 from patina.scene.scan.scan_collection import create_scan_collection  # noqa: E402
 from tests import make_capture as made  # noqa: E402
 
@@ -124,7 +125,7 @@ def listed_photos() -> Iterator[None]:
 
 def _step_through(built: Built) -> None:
     for camera in (*built.cameras, *built.cameras[::-1]):
-        lamps.shine_only(built.scene, camera)
+        shine_only(built.scene, camera)
         bpy.context.view_layer.update()
 
 
@@ -145,7 +146,7 @@ def test_lamp_is_at_light_position(built: Built) -> None:
     assert np.allclose(np.array(built.lamps["lamp"].matrix_world.translation) + origin,
                        built.capture.lights[2].position, atol=1e-6, rtol=0)  # fmt: skip
     flash = MountedLight("flash", OFFSET)
-    lamps.shine_only(built.scene, built.cameras[3])
+    shine_only(built.scene, built.cameras[3])
     bpy.context.view_layer.update()
     camera = capture_data.camera_of(built.capture, built.scan, 3)
     here = np.array(built.lamps["flash"].matrix_world.translation) + origin
@@ -185,7 +186,7 @@ def test_dragged_lamp_is_used(built: Built, update: bool) -> None:
 
 
 def test_flash_dragged_on_one_camera_moves_on_all(built: Built) -> None:
-    lamps.shine_only(built.scene, built.cameras[3])
+    shine_only(built.scene, built.cameras[3])
     built.lamps["flash"].location = (0.1, 0.2, -0.3)
     _step_through(built)
     assert np.allclose(built.now()[0]["flash"].mounted, (0.1, -0.2, 0.3), atol=1e-6)
@@ -251,7 +252,7 @@ def test_unusual_edits_do_not_crash(built: Built) -> None:
     lamps["sun"].data.type = "AREA"
     lamps["ball"].scale = (0, 0, 0)
     assert built.now()[1] == ["lamp"]
-    lamps.shine_only(scene, built.cameras[3])
+    shine_only(scene, built.cameras[3])
     bpy.data.objects.remove(built.cameras[3])
     assert built.now()[1] == ["lamp"]  # the flash lost its camera
     empty = bpy.data.objects.new("rig", None)
