@@ -14,11 +14,10 @@ from setuptools.command.build_py import build_py
 
 ROOT = Path(__file__).resolve().parent
 ROOT_MODULES = ("__init__", "api")  # the other files of the root are scripts
-NEEDS_BLENDER = {("patina.commands", "export_open")}
 
 
 class BuildPackage(build_py):
-    """Excludes the scripts of the root and the modules that import bpy."""
+    """Excludes the scripts of the root."""
 
     def find_package_modules(self, package: str, package_dir: str) -> list[tuple[str, str, str]]:
         """Return (package, module, file) of every module that is installed."""
@@ -26,8 +25,7 @@ class BuildPackage(build_py):
         return [
             (owner, module, file)
             for owner, module, file in found
-            if (owner, module) not in NEEDS_BLENDER
-            and (owner != "patina" or module in ROOT_MODULES)
+            if owner != "patina" or module in ROOT_MODULES
         ]
 
 
