@@ -180,7 +180,7 @@ def test_formats_of_panel_are_default() -> None:
     bpy.ops.patina.export(directory=str(out), folder="a")
     assert (out / "a" / "surface_table.exr").is_file()
     state.formats = set()
-    assert "at least one format" in error_message(directory=str(out), folder="b")
+    assert "expected at least one; choose a format" in error_message(directory=str(out), folder="b")
 
 
 def test_failure_of_second_blender_is_one_line() -> None:
