@@ -50,5 +50,5 @@ def test_invalid_environment_gives_one_line_error(tmp_path):
     assert "\n" not in str(raised.value)
     (tmp_path / "text.hdr").write_text("not a picture")
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    with pytest.raises(InputError, match="picture"):
+    with pytest.raises(InputError, match="environment image; expected"):
         relight.light_with(bpy.context.scene, tmp_path / "text.hdr")
