@@ -31,12 +31,12 @@ def paint_evidence(
     drop_evidence(thing)
     if len(thing.data.vertices) != len(vertices):
         return False
-    before = found.before.shown.mean(axis=1)
+    before = found.before.predicted.mean(axis=1)
     level = np.maximum(before, 0.05 * np.percentile(before, 90))
     residual = (pixels.observed.mean(axis=1) - before) / level
     colours = {RESIDUAL: residual}
     for trial in found.accepted:
-        shown = trial.fitted.shown.mean(axis=1)
+        shown = trial.fitted.predicted.mean(axis=1)
         colours[trial.effect.cause] = (shown - before) / level
     mesh = thing.data
     distance, near = cKDTree(pixels.point).query(vertices, min(NEIGHBOURS, len(pixels)))

@@ -97,7 +97,7 @@ def test_select_photos_keeps_lines_and_lights(ball: patina.Capture) -> None:
 
 
 @pytest.mark.parametrize(
-    ("photos", "message"), [(["no.exr"], "no photo"), ([9], "9"), ([], "left")]
+    ("photos", "message"), [(["no.exr"], "no photo"), ([9], "9"), ([], "no photo is selected")]
 )
 def test_invalid_photo_selection_is_named(ball: patina.Capture, photos: list, message: str) -> None:
     with pytest.raises(InputError, match=message):
@@ -109,7 +109,7 @@ def test_light_of_unknown_intensity_is_rejected(
 ) -> None:
     lights = tuple(replace(light, name=f"{light.name}x", strength=None) for light in ball.lights)
     photos = tuple(replace(photo, light=f"{photo.light}x") for photo in ball.photos)
-    with pytest.raises(InputError, match="how strong"):
+    with pytest.raises(InputError, match="strength relative to the fitted lights is unknown"):
         patina.predict(replace(ball, lights=lights, photos=photos), fitted, photos=[0])
 
 
@@ -128,7 +128,7 @@ def test_export_writes_what_the_command_line_reads(
     read = read_result(tmp_path)
     ours = fitted.materials[0].fit.brdf.coefficients
     assert np.array_equal(read.materials[0].brdf.coefficients, ours)
-    with pytest.raises(InputError, match="expected of"):
+    with pytest.raises(InputError, match="expected one of"):
         patina.export(fitted, tmp_path, ["nonsense"])
 
 
