@@ -127,6 +127,11 @@ def fit_sphere(camera: Camera, pixels: Array, weights: Array | None = None) -> S
         centre = middle + a / 2 * across + b / 2 * down
         ahead = 2 * radius - (camera.pose.rotation @ centre + camera.pose.translation)[2]
         return Sphere(centre + ahead * axis, radius, None)
+    if not np.isfinite(directions).all():
+        raise InputError(
+            "the sphere's outline reaches beyond the image area for which the lens distortion is "
+            "defined; expected a sphere inside it"
+        )
     a, *_ = np.linalg.lstsq(directions * root[:, None], root, rcond=None)
     length = float(np.linalg.norm(a))
     if not length > 1.0:

@@ -281,6 +281,7 @@ circle_coordinate = st.floats(-500, 800)
 @settings(max_examples=25, deadline=None)
 @example(160.0, 120.0, 60.0, 0, "fisheye", True)
 @example(0.0, 0.0, 119.0, 1, "distorted", True)
+@example(274.0, 274.0, 266.0, 0, "distorted", True)
 def test_any_circle_gives_a_direction_or_an_input_error(x, y, radius, seed, name, noise):
     pixels = np.zeros((HEIGHT, WIDTH, 3))
     if noise:
