@@ -25,6 +25,7 @@ TEST_TOOLS = [
     "usd-core==26.11",  # these three validate exported files
     "MaterialX==1.39.5",
     "mitsuba==3.9.1",
+    "matplotlib==3.10.7",  # draws the charts of the experiments
     "ruff==0.13.3",
     "mypy==1.18.2",
     "import-linter==2.17",
@@ -141,7 +142,7 @@ def test_python() -> Path:
     wanted = "\n".join(TEST_TOOLS)
     with one_at_a_time(folder.name):
         if not (stamp.exists() and stamp.read_text(encoding="utf-8") == wanted):
-            say("installing pytest, hypothesis, ruff, mypy … (about 35 MB, once) ...")
+            say("installing pytest, ruff, mypy, matplotlib … (about 160 MB, once) ...")
             pip_install(folder, TEST_TOOLS)
             stamp.write_text(wanted, encoding="utf-8")
     return python
