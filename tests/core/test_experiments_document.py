@@ -1,14 +1,13 @@
-"""Tables, charts and the marked sections of the document, from hand-written records."""
+"""Tables and the marked sections of the document, from hand-written records."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 
-from tools.experiments import document, figures, goal_table, records, runs, svg, tables
+from tools.experiments import document, goal_table, records, runs, tables
 
 
 def record(estimator: str, material: str, log_rms: float, **more: object) -> records.Record:
@@ -130,19 +129,6 @@ def test_document_has_every_marked_section_and_picture(
                 ElementTree.parse(picture)
 
 
-def test_chart_coordinates_and_labels() -> None:
-    chart = svg.Chart("t < 1", "x", "y", (1.0, 100.0), (0.0, 2.0), x_log=True)
-    assert chart.x(10.0) == pytest.approx((chart.x(1.0) + chart.x(100.0)) / 2)
-    assert chart.y(1.0) == pytest.approx((chart.y(0.0) + chart.y(2.0)) / 2)
-    assert chart.y(2.0) < chart.y(0.0)  # pixel rows run downwards
-    chart.line([1, 10, 100], [0.0, 1.0, 2.0], svg.COLOURS[0])
-    chart.whisker(10, 0.5, 1.5, svg.INK)
-    sheet = svg.sheet([chart.drawing()], 1, (300, 220), svg.legend([("a & b", "#000", "bar")]))
-    root = ElementTree.fromstring(sheet)
-    texts = [e.text for e in root.iter("{http://www.w3.org/2000/svg}text")]
-    assert "t < 1" in texts and "a & b" in texts and {"1", "10", "100", "0", "2"} <= set(texts)
-
-
 def test_sweep_table_shows_medians_in_order() -> None:
     found = [
         {"sweep": "photos", "where": "knot", "value": v, "label": f"{v:g}", "material": m,
@@ -152,16 +138,3 @@ def test_sweep_table_shows_medians_in_order() -> None:
     table = tables.sweep(found, "photos").splitlines()
     assert [c.strip() for c in table[0].split("|")[3:6]] == ["2", "8", "16"]
     assert "0.600, 0.500" in table[2]
-    ElementTree.fromstring(figures.sweep(found, ["photos"], {"photos": "lit photos"}))
-
-
-def test_half_circle_radius_is_the_cube_root_of_the_brdf() -> None:
-    from tools.experiments.half_circle import BASE, RADIUS, WIDTH, half_circle, slice_angles
-
-    theta, _ = slice_angles(np.radians(45))
-    markup = half_circle("x", [(np.full((len(theta), 3), 0.125), "")], 45, 1.0)
-    root = ElementTree.fromstring(f"<g>{markup}</g>")
-    line = next(root.iter("polyline")).get("points") or ""
-    points = np.array([[float(x) for x in p.split(",")] for p in line.split()])
-    radius = np.hypot(points[:, 0] - WIDTH / 2, points[:, 1] - BASE)
-    np.testing.assert_allclose(radius, RADIUS / 2, atol=0.1)

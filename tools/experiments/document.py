@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
+from matplotlib.figure import Figure
+
 from ..common import ROOT, say
 from . import appearance, figures, goal_table, store, tables
 from .ablation import SCENES
@@ -113,16 +115,18 @@ def _polar(records: list[Record]) -> str:
     out = []
     for scene in SCENES:
         if where(records, scene=scene):
-            file = figures.write(f"polar-{scene}.svg", figures.polar(records, scene))
-            out.append(_picture(file.name, f"Polar slices, six materials, {scene}"))
+            drawing = figures.polar(records, scene)
+            out.append(
+                _picture(drawing, f"polar-{scene}.svg", f"Polar slices, six materials, {scene}")
+            )
     return "\n\n".join(out)
 
 
 def _ablation(records: list[Record]) -> str:
-    file = figures.write("ablation.svg", figures.ablation(records))
+    drawing = figures.ablation(records)
     return "\n\n".join(
         [
-            _picture(file.name, "Ablation: bars of five variants for six materials"),
+            _picture(drawing, "ablation.svg", "Ablation: bars of five variants for six materials"),
             tables.ablation_claims(records),
             "Around the specular direction, relative L2, mean ± standard deviation:",
             tables.ablation(records, "specular_l2"),
@@ -133,8 +137,9 @@ def _ablation(records: list[Record]) -> str:
 
 
 def _similarity(records: list[Record]) -> str:
-    file = figures.write("similarity.svg", figures.similarity(records))
-    picture = _picture(file.name, "Cosine similarity against log-relative RMS")
+    picture = _picture(
+        figures.similarity(records), "similarity.svg", "Cosine similarity against log-relative RMS"
+    )
     return f"{picture}\n\n{tables.similarity(records)}"
 
 
@@ -143,12 +148,13 @@ def _sweep(name: str, records: list[Record]) -> str:
     if not sweeps:
         return ""
     drawing = figures.sweep(records, sweeps, X_LABELS)
-    file = figures.write(f"{name.replace(' ', '-')}.svg", drawing)
-    parts = [_picture(file.name, f"Error against {name}")]
+    parts = [_picture(drawing, f"{name.replace(' ', '-')}.svg", f"Error against {name}")]
     for sweep in sweeps:
         parts += [f"{sweep[0].upper()}{sweep[1:]}:", tables.sweep(records, sweep)]
     return "\n\n".join(parts)
 
 
-def _picture(name: str, words: str) -> str:
-    return f"![{words}]({IMAGES}/{name})"
+def _picture(drawing: Figure, name: str, title: str) -> str:
+    """Write a figure; return the Markdown that shows it."""
+    figures.write(name, drawing, title)
+    return f"![{title}]({IMAGES}/{name})"

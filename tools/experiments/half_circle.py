@@ -3,68 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from xml.sax.saxutils import escape
 
 import numpy as np
+from matplotlib.projections.polar import PolarAxes
 from numpy.typing import NDArray
 
 from patina.core.views.polar import slice_angles
-from patina.core.views.subject import COLOURS, round_up
+from patina.core.views.subject import round_up
 
-from .svg import FAINT
+from .chart_style import BLUE, GREEN, ORANGE, VERMILION
 
-RADIUS, WIDTH = 138.0, 310.0
-BASE = 168.0  # y of the surface, pixels from the top
+CHANNELS = {"red": VERMILION, "green": GREEN, "blue": BLUE}
+"""Channel → colour of its curves."""
+TRUTH = {"linestyle": "-", "linewidth": 2.0, "alpha": 0.45}
+FIT = {"linestyle": (0, (3.5, 1.5)), "linewidth": 1.0}
+LIGHT = {"linestyle": ":", "linewidth": 1.2, "color": ORANGE}
+RINGS = (1.0, 0.2, 0.02)
+"""Values of ρ that have a ring, relative to the outer ring."""
 
 
 def half_circle(
-    title: str, curves: Sequence[tuple[NDArray[np.float64], str]], incidence: float, top: float
-) -> str:
-    """Return an SVG group of curves ((n, 3) ρ at the directions of slice_angles, dash).
+    axes: PolarAxes,
+    curves: Sequence[tuple[NDArray[np.float64], dict]],
+    incidence: float,
+    top: float,
+) -> None:
+    """Draw curves ((n, 3) ρ at the directions of slice_angles, line style) into polar axes.
 
-    The radius is the cube root of ρ. The outer ring is ``top``, rounded up to 1, 2 or 5 times a
-    power of ten, so that panels of one material can share it. Light comes from the left at
-    ``incidence`` degrees.
+    The radius is the cube root of ρ in units of the outer ring. The outer ring is ``top``, rounded
+    up to 1, 2 or 5 times a power of ten, so that panels of one material can share it. Light comes
+    from the left at ``incidence`` degrees.
     """
     theta, _ = slice_angles(np.radians(incidence))
-    ring, centre = round_up(top), WIDTH / 2
-    out = [f'<text x="8" y="13" class="t">{escape(title)}</text>']
-    for part in (1.0, 0.1, 0.01):
-        r = RADIUS * np.cbrt(part)
-        out.append(
-            f'<path d="M{centre - r:.1f} {BASE}A{r:.1f} {r:.1f} 0 0 1 {centre + r:.1f} {BASE}" '
-            f'fill="none" stroke="{FAINT}"/><text x="{centre + r:.1f}" y="{BASE + 13}" '
-            f'text-anchor="middle">{ring * part:.3g}</text>'
-        )
-    out.append(
-        f'<path d="M{centre - RADIUS} {BASE}H{centre + RADIUS}M{centre} {BASE}V{BASE - RADIUS}" '
-        f'stroke="{FAINT}" fill="none"/>'
-    )
-    i = np.radians(incidence)
-    x, y = centre - RADIUS * np.sin(i), BASE - RADIUS * np.cos(i)
-    out.append(
-        f'<path d="M{x:.1f} {y:.1f}L{centre} {BASE}" stroke="#e0a000" stroke-width="1.5" '
-        'stroke-dasharray="2 3"/>'
-    )
-    for values, dash in curves:
-        radius = RADIUS * np.cbrt(np.maximum(values, 0) / ring)
-        extra = f' stroke-dasharray="{dash}"' if dash else ' stroke-opacity="0.55"'
-        for channel, colour in enumerate(COLOURS):
-            xs = centre + radius[:, channel] * np.sin(theta)
-            ys = BASE - radius[:, channel] * np.cos(theta)
-            keep = _simplified(xs, ys)
-            path = " ".join(f"{xs[k]:.1f},{ys[k]:.1f}" for k in keep)
-            out.append(
-                f'<polyline points="{path}" fill="none" stroke="{colour}" '
-                f'stroke-width="{1.3 if dash else 2.2}" stroke-linejoin="round"{extra}/>'
-            )
-    return "".join(out)
-
-
-def _simplified(xs: NDArray, ys: NDArray) -> list[int]:
-    """Return indices of points at least 1.5 pixels apart: the file is ten times smaller."""
-    keep = [0]
-    for k in range(1, len(xs) - 1):
-        if np.hypot(xs[k] - xs[keep[-1]], ys[k] - ys[keep[-1]]) >= 1.5:
-            keep.append(k)
-    return [*keep, len(xs) - 1]
+    ring = round_up(top)
+    axes.set_theta_zero_location("N")
+    axes.set_theta_direction(-1)
+    axes.set_thetamin(-90)
+    axes.set_thetamax(90)
+    axes.set_rlim(0, 1)
+    axes.set_thetagrids([-45, 0, 45], ["−45°", "0°", "45°"])
+    axes.set_rgrids([float(np.cbrt(r)) for r in RINGS], [f"{ring * r:.3g}" for r in RINGS])
+    axes.tick_params(axis="x", pad=-2)  # matplotlib adds 7 points to this
+    axes.tick_params(axis="y", pad=1)
+    axes.grid(True, axis="both", clip_on=False)  # nothing is outside the outer ring
+    axes.patch.set_visible(False)
+    axes.plot([-np.radians(incidence)] * 2, [0.0, 1.0], clip_on=False, **LIGHT)
+    for values, style in curves:
+        radius = np.cbrt(np.maximum(values, 0) / ring)
+        for channel, colour in enumerate(CHANNELS.values()):
+            axes.plot(theta, radius[:, channel], color=colour, clip_on=False, **style)
