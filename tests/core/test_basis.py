@@ -238,7 +238,7 @@ class TestMerlFolder:
     ) -> None:
         stages: list[str] = []
         trained = cached_basis(
-            folder, lambda stage, _: stages.append(stage), self.sums(folder), tmp_path
+            folder, lambda stage, _: stages.append(stage), self.file_checksums(folder), tmp_path
         )
         assert trained.columns == 9 and "principal components" in stages
         table = merl_file.read(folder / "a.binary")
@@ -251,7 +251,7 @@ class TestMerlFolder:
         assert np.sqrt(np.mean(error**2)) < 0.03
         stages.clear()
         reloaded = cached_basis(
-            folder, lambda stage, _: stages.append(stage), self.sums(folder), tmp_path
+            folder, lambda stage, _: stages.append(stage), self.file_checksums(folder), tmp_path
         )
         assert reloaded.version == storage.load(next(tmp_path.glob("*.npz"))).version
         assert reloaded.version == trained.version, (
@@ -262,7 +262,7 @@ class TestMerlFolder:
     def test_error_names_missing_truncated_or_altered_files(
         self, folder: Path, tmp_path: Path
     ) -> None:
-        checksums_of_files = self.sums(folder)
+        checksums_of_files = self.file_checksums(folder)
         with pytest.raises(InputError, match=r"missing.*zzz\.binary"):
             cached_basis(folder, expected={**checksums_of_files, "zzz.binary": "0"}, cache=tmp_path)
         with pytest.raises(InputError, match=r"b\.binary.*genuine"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.concurrency.steps import drained
 from patina.core.concurrency.thread_pool import thread_pool
 from patina.core.diagnose.effects import EFFECTS
-from patina.core.diagnose.effects.base.parameters import parameter_columns
+from patina.core.diagnose.effects.base.image_formation import ChangesShading
 from patina.core.diagnose.effects.camera_response import CameraResponse
 from patina.core.diagnose.effects.cast_shadow import CastShadow
 from patina.core.diagnose.effects.clipping import Clipping
@@ -325,14 +325,31 @@ def test_held_out_regions_cost_more_than_fitted_ones():
     assert held_out.cost.sum() < 1.3 * fitted.cost
 
 
-class DenseNormalError(NormalError):
-    """The same effect, solved as if every parameter could affect every pixel."""
+@dataclass(frozen=True)
+class DenseNormalError(ChangesShading):
+    """The same effect without patches: solved as if every parameter could affect every pixel."""
 
-    patch = None
+    inner: NormalError
+    cause = "normal_error"
+    deciding_photo = ""
+
+    @classmethod
+    def of(cls, context: DiagnosisContext) -> DenseNormalError:
+        return cls(NormalError.of(context))
 
     @property
-    def feels(self):
-        return parameter_columns(self.parts, len(self.prior))
+    def parameters(self):
+        return self.inner.parameters
+
+    @property
+    def parameter_index(self):
+        return self.inner.parameter_index
+
+    def shading(self, state, x):
+        return self.inner.shading(state, x)
+
+    def sentence(self, x, error):
+        return self.inner.sentence(x, error)
 
 
 def test_eliminating_patch_parameters_gives_the_same_optimum():
