@@ -7,7 +7,6 @@ trefoil with strong self-occlusion and self-shadowing, like the paper's dragon.
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from patina.core.basis.merl_folder import user_cache
+from patina.core.files import atomic_path
 from patina.core.scan import Mesh
 
 from .. import demo_shape
@@ -96,7 +96,6 @@ def true_shape(name: str, cell: float = CELL) -> Mesh:
     surface = demo_shape.mesh_of(FIELDS[name](), cell)
     triangles = surface.triangles.astype(np.int32)
     stored.parent.mkdir(parents=True, exist_ok=True)
-    partial = stored.with_name(stored.name + ".part.npz")
-    np.savez(partial, points=surface.points, triangles=triangles)
-    os.replace(partial, stored)
+    with atomic_path(stored, ".part.npz") as partial:
+        np.savez(partial, points=surface.points, triangles=triangles)
     return Mesh(surface.points, triangles)

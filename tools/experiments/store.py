@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
+
+from patina.core.files import write_text_atomic
 
 from ..common import cache_dir
 
@@ -19,9 +20,7 @@ def save(name: str, results: Any, quick: bool) -> None:
     """Write results; an interrupted call leaves no incomplete file."""
     file = path(name, quick)
     file.parent.mkdir(parents=True, exist_ok=True)
-    partial = file.with_name(file.name + ".part")
-    partial.write_text(json.dumps(results, indent=0) + "\n", "utf-8")
-    os.replace(partial, file)
+    write_text_atomic(file, json.dumps(results, indent=0) + "\n")
 
 
 def load(name: str, quick: bool = False) -> Any | None:
