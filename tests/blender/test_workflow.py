@@ -207,13 +207,13 @@ def test_check_names_light_drift_and_fit_can_include_or_skip_it() -> None:
     )
     bpy.ops.patina.import_capture(filepath=str(path))
     assert not bpy.ops.patina.refit.poll()  # not checked yet
-    choose = extension("core.diagnose.pixels.pixel_selection").choose_pixels
+    select = extension("core.diagnose.pixels.pixel_selection").select_pixels
     # numpy of some Blender versions is slow
-    usual, choose.__defaults__ = choose.__defaults__, (3000,)
+    usual, select.__defaults__ = select.__defaults__, (3000,)
     try:
         assert bpy.ops.patina.check() == {"FINISHED"}
     finally:
-        choose.__defaults__ = usual
+        select.__defaults__ = usual
     stored = extension("scene.session.scene_properties").stored_result
     kind, mine = extension("scene.session.scene_properties").DIAGNOSIS, str(path.resolve())
     diagnosis, fit = stored(mine, kind), stored(mine)
