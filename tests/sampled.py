@@ -29,8 +29,8 @@ def sampled(path: Path) -> tuple[SampleTable, list[SurfaceView]]:
         view = view_surface(rays, camera)
         lighting = light_surface(rays, view, light, camera)
         keep = trusted_pixels(view, lighting, Margins())
-        radiance = photos.read(place).radiance
-        tables.append(sample_photo(view, lighting, radiance, keep))
+        photo = photos.read_with_noise(place)
+        tables.append(sample_photo(view, lighting, photo.radiance, keep, noise=photo.noise))
         views.append(view)
     return SampleTable.join(tables), views
 

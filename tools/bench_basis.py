@@ -15,6 +15,8 @@ NIELSEN_5 = (
     (144.8, 2.5, 73.8),
     (80.4, 12.9, 51.6),
 )
+# ρ·cosMap + ε, lower limits of the bins in which the basis' error is measured
+LEVELS = (0.001, 0.0015, 0.002, 0.003, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 
 
 def run(data: Path) -> None:
@@ -66,6 +68,7 @@ def run(data: Path) -> None:
     print("|---|---|---|---|---|---|---|")
     names, weights = nbrdf.load(data / "brdf" / "nbrdf_validation.npz")
     rows_out = []
+    squares = [np.zeros(len(LEVELS)), np.zeros(len(LEVELS))]
     for name, w in zip(names, weights, strict=True):
         truth = TabulatedBRDF.from_function(lambda angles, w=w: nbrdf.evaluate(w, angles))
         valid = truth.valid
@@ -76,8 +79,36 @@ def run(data: Path) -> None:
         for k in (5, 20, 40):
             fit = PrincipalBRDF(basis, basis.project(rho, angles, k))
             found.append(metrics.compare(fit.table(), truth))
+        _add_squares(squares, fit.evaluate(angles), rho, angles)
         figures = [f.log_relative_rms for f in found] + [f.cube_root_rms for f in found]
         rows_out.append(figures)
         print(f"| {name} | " + " | ".join(f"{x:.3f}" for x in figures) + " |", flush=True)
     median = np.median(rows_out, axis=0)
     print("| **median** | " + " | ".join(f"{x:.3f}" for x in median) + " |\n")
+    print("error by level ρ·cosMap + ε of these materials, k=40\n")
+    print("| level from | RMS error of its logarithm | noise model of the fit |")
+    print("|---|---|---|")
+    for level, error, model in _errors_by_level(squares):
+        print(f"| {level:.4g} | {error:.3f} | {model:.3f} |")
+
+
+def _add_squares(squares, found, rho, angles) -> None:  # type: ignore[no-untyped-def]
+    """Add (sums of squared errors of ln(ρ·cosMap + ε), counts) by bins of the level."""
+    from patina.core.basis import mapping
+
+    weight = mapping.cos_map(angles)[:, None]
+    level = np.maximum(rho, 0) * weight + mapping.EPSILON
+    error = np.log((np.maximum(found, 0) * weight + mapping.EPSILON) / level)
+    place = np.clip(np.searchsorted(LEVELS, level.ravel(), side="right") - 1, 0, None)
+    squares[0] += np.bincount(place, error.ravel() ** 2, len(LEVELS))
+    squares[1] += np.bincount(place, minlength=len(LEVELS))
+
+
+def _errors_by_level(squares):  # type: ignore[no-untyped-def]
+    """(lower limit of the level, RMS error, standard deviation of the noise model) of each bin."""
+    from patina.core.noise.basis_error import basis_variance
+
+    for k, level in enumerate(LEVELS):
+        upper = LEVELS[k + 1] if k + 1 < len(LEVELS) else 3 * level
+        model = np.sqrt(basis_variance(np.array(np.sqrt(level * upper))))
+        yield level, np.sqrt(squares[0][k] / max(squares[1][k], 1)), float(model)

@@ -75,6 +75,7 @@ def sample_plainly(rays: Any, camera: Any, light: Any, radiance: np.ndarray, mar
         cos_o=cos_o[keep].astype(single),
         rho=(light_seen / (irradiance * cos_i[keep, None])).astype(single),
         radiance=light_seen,
+        variance=np.zeros_like(light_seen),
         point=point[keep],
         normal=n.astype(single),
         view=v.astype(single),

@@ -51,7 +51,7 @@ def highest_intensity(table: SampleTable) -> tuple[int, SampleTable]:
         theta_h=np.zeros(1, np.float32), theta_d=angles.theta_d.astype(np.float32),
         phi_d=angles.phi_d.astype(np.float32),
         cos_i=cos_i.astype(np.float32), cos_o=cos_i.astype(np.float32),
-        rho=rho.astype(np.float32), radiance=one.radiance, point=one.point,
+        rho=rho.astype(np.float32), radiance=one.radiance, variance=one.variance, point=one.point,
         normal=half.astype(np.float32),
         view=one.view, curvature=one.curvature, light=one.light, irradiance=one.irradiance,
         weight=one.weight, response=one.response,

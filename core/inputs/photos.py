@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from ..calibrate.chart import ChartTone, chart_tone
 from ..capture import Capture
 from ..errors import InputError, PatinaError
+from ..noise import MergedNoise, PixelNoise
 from ..photo import read_encoded
 from ..photo.bracket import merge_bracket
 from ..photo.exif import Exif, read_exif
-from ..photo.noise import estimate_noise
+from ..photo.noise_estimate import estimate_noise
 from ..photo.photo import read_photo
 from ..photo.transfer import Transfer
 
@@ -25,13 +26,13 @@ class LitPhoto:
     """One photo as radiance.
 
     radiance: (h, w, 3) float32 linear, divided by the exposure. usable: (h, w) not clipped; in a
-    bracket, not clipped in at least one exposure. variance: (h, w, 3) of the radiance, None where
-    it was not estimated. notes: how the pixels were read, sentences.
+    bracket, not clipped in at least one exposure. noise: of the radiance, None where it was not
+    estimated. notes: how the pixels were read, sentences.
     """
 
     radiance: NDArray[np.float32]
     usable: NDArray[np.bool_]
-    variance: NDArray[np.float32] | None = None
+    noise: PixelNoise | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -65,7 +66,7 @@ class LitPhotos:
         return self._read(place)
 
     def read_with_noise(self, place: int) -> LitPhoto:
-        """The same with the variance of every pixel, also for a single exposure."""
+        """The same with the noise, also of a single exposure."""
         return self._read(place, noise=True)
 
     def _read(self, place: int, noise: bool = False) -> LitPhoto:
@@ -74,14 +75,13 @@ class LitPhotos:
             curve = self.curve(place)
             if len(photo.files) == 1:
                 one = read_photo(photo.files[0], curve, photo.saturation)
-                variance = estimate_noise(one).variance(one.radiance) if noise else None
+                exposure = self.exposures[place][0]
+                found = estimate_noise(one).per_exposure(exposure) if noise else None
                 radiance = one.radiance
-                if self.exposures[place][0] != 1.0:
-                    radiance /= np.float32(self.exposures[place][0])
-                    if variance is not None:
-                        variance /= np.float32(self.exposures[place][0] ** 2)
+                if exposure != 1.0:
+                    radiance /= np.float32(exposure)
                 curve_note = () if one.info.levels is None else (one.info.sentence,)
-                return LitPhoto(radiance, ~one.clipped, variance, (*curve_note, *one.info.notes))
+                return LitPhoto(radiance, ~one.clipped, found, (*curve_note, *one.info.notes))
             merged = merge_bracket(
                 [partial(read_photo, file, curve, photo.saturation) for file in photo.files],
                 self.exposures[place],
@@ -90,7 +90,7 @@ class LitPhotos:
         except InputError as error:
             raise self.capture.error(str(error), "photo", place, "file") from error
         notes = (f"{len(photo.files)} exposures merged.", *merged.warnings)
-        return LitPhoto(merged.radiance, merged.valid, merged.variance, notes)
+        return LitPhoto(merged.radiance, merged.valid, MergedNoise(merged.variance), notes)
 
     def read_other(self, file: Path, exposure: float | None = None) -> LitPhoto:
         """A photo of a sphere or a white target, in the unit of the lit photos. Raises

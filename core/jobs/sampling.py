@@ -107,7 +107,7 @@ def take_samples(
     def open_shot(place: int) -> _Shot:
         camera = capture_data.camera_of(capture, scan, place)
         masks = capture_data.photo_masks(capture, place)
-        photo = photos.read(place)
+        photo = photos.read_with_noise(place)
         light = lights.of(capture, place)
         return _Shot(capture, scan, rays, light, place, PixelRays.of(camera), photo, masks)
 
@@ -176,7 +176,9 @@ def _band(shot: _Shot, window: Window) -> _Band:
         pixels = where[material.name]
         inner = inner_pixels(view, pixels, margins)
         tables.append(
-            sample_photo(view, lighting, shot.photo.radiance, keep & inner, photo=shot.place)
+            sample_photo(
+                view, lighting, shot.photo.radiance, keep & inner, shot.place, shot.photo.noise
+            )
         )
         faces.append(view.face[pixels & wanted])
     return _Band(

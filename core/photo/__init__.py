@@ -4,14 +4,13 @@ from .bracket import Merged, merge_bracket
 from .clipping import black, clipped
 from .exif import Exif, read_exif
 from .image import image_size, read_encoded, read_mask, write_exr, write_png
-from .noise import Noise, estimate_noise
+from .noise_estimate import estimate_noise
 from .photo import Photo, PhotoInfo, read_photo, read_radiance
 from .transfer import Transfer
 
 __all__ = [
     "Exif",
     "Merged",
-    "Noise",
     "Photo",
     "PhotoInfo",
     "Transfer",

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .noise import Noise, estimate_noise
+from ..noise import PhotoNoise
+from .noise_estimate import estimate_noise
 from .photo import Photo
 
 Source = Photo | Callable[[], Photo]
@@ -29,7 +30,8 @@ RATIO_MIN_SNR, RATIO_MIN_PIXELS, RATIO_MAX_ERROR = 5.0, 200, 0.05
 # a pixel disagrees beyond so many standard deviations plus this share of the signal; share of
 # disagreeing pixels to report
 MOVED_SIGMA, MOVED_RELATIVE, MOVED_MAX_SHARE = 6.0, 0.1, 0.02
-MIN_RELATIVE_STD = 1e-4  # of the signal: smallest standard deviation that is assumed
+# of the signal: smallest standard deviation, so that photos without noise have finite weights
+MIN_RELATIVE_STD = 1e-4
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class Merged:
 def merge_bracket(
     photos: Sequence[Source],
     exposures: Sequence[float],
-    noise: Sequence[Noise] | None = None,
+    noise: Sequence[PhotoNoise] | None = None,
     names: Sequence[str] | None = None,
 ) -> Merged:
     """Merge photos (or functions that read them) taken with relative ``exposures`` > 0.
@@ -92,7 +94,7 @@ class _First:
 
     estimate: NDArray[np.float32]
     longest: NDArray[np.uint16]
-    noise: tuple[Noise, ...]
+    noise: tuple[PhotoNoise, ...]
     factors: tuple[float, ...]
 
 
@@ -106,13 +108,13 @@ class _Weighted:
 def _first_estimate(
     photos: Sequence[Source],
     exposures: Sequence[float],
-    noise: Sequence[Noise] | None,
+    noise: Sequence[PhotoNoise] | None,
     order: list[int],
 ) -> _First:
     """Sum of unclipped pixels over sum of their exposures: unbiased, and optimal where there is
     only shot noise. Also compares each exposure with the next longer one."""
     total = weight = longest = None
-    noises: dict[int, Noise] = {}
+    noises: dict[int, PhotoNoise] = {}
     steps: dict[int, float] = {}
     before: tuple[int, NDArray, NDArray] | None = None
     for place, i in enumerate(order):
@@ -153,7 +155,7 @@ def _exposure_ratio(
     longer: tuple[int, NDArray, NDArray],
     shorter: tuple[int, NDArray, NDArray],
     exposures: Sequence[float],
-    noises: dict[int, Noise],
+    noises: dict[int, PhotoNoise],
 ) -> float:
     """Median of (shorter / its exposure) / (longer / its exposure). Pixels are selected by the
     value in the longer exposure; selecting by the shorter one's noisy value would bias the

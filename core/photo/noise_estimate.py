@@ -14,7 +14,6 @@ texture grows with the step too, the estimate is too high.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.stats import chi2
 
+from ..noise import PhotoNoise
 from .photo import Photo
 
 BLOCK_SIZES = (16, 8)  # pixels; the smaller where too few larger blocks are without clipped pixels
@@ -33,24 +33,6 @@ CORRELATED_GROWTH = 1.3  # ratio of variances at successive steps that counts as
 # block counts: for the larger block size; to trust a larger step; for a fit; used at most
 LARGE_BLOCKS, STEP_BLOCKS, MIN_BLOCKS, MAX_BLOCKS = 300, 100, 30, 20_000
 BINS, MIN_BIN_BLOCKS, BIN_TOLERANCE = 24, (6, 12), 0.3  # brightness bins; blocks per bin; in ln
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Noise model var(L) = read² + shot · L per channel, in the photo's linear units (not divided
-    by the exposure). shot: (3,); read: (3,); step: distance in pixels from which noise is
-    independent; blocks: number of blocks that the fit used (0: no estimate was possible, the values
-    are those of quantisation alone)."""
-
-    shot: NDArray[np.float64]
-    read: NDArray[np.float64]
-    step: int = 1
-    blocks: int = 0
-
-    def variance(self, light: NDArray) -> NDArray[np.float32]:
-        """(…, 3) variance of pixels whose true value is ``light`` (…, 3)."""
-        shot, read = self.shot.astype(np.float32), self.read.astype(np.float32)
-        return np.asarray(np.maximum(light, 0) * shot + read**2, np.float32)
 
 
 @dataclass(frozen=True)
@@ -66,7 +48,7 @@ class _Line:
         return self.read2 + self.shot * np.maximum(light, 0.0)
 
 
-def estimate_noise(photo: Photo) -> Noise:
+def estimate_noise(photo: Photo) -> PhotoNoise:
     """The noise model of one photo, from its blocks with the least texture.
 
     Clipped and black pixels are excluded. The variance is never below that of quantisation
@@ -88,7 +70,7 @@ def estimate_noise(photo: Photo) -> Noise:
     known = support > 0
     if known.any():  # a channel without an estimate gets the largest of the others
         shot[~known], read2[~known] = shot[known].max(), read2[known].max()
-    return Noise(shot, np.sqrt(read2), used, int(support[known].min()) if known.any() else 0)
+    return PhotoNoise(shot, np.sqrt(read2), used, int(support[known].min()) if known.any() else 0)
 
 
 def _channel(
@@ -129,18 +111,18 @@ def _blocks(photo: Photo, step: int, size: int) -> tuple[NDArray, NDArray]:
         rest = (down[:, : -2 * step] - 2 * down[:, step:-step] + down[:, 2 * step :]) / 6
         lost = lost[: -2 * step] | lost[step:-step] | lost[2 * step :]
         lost = lost[:, : -2 * step] | lost[:, step:-step] | lost[:, 2 * step :]
-        bad = _blocked(lost, size, np.any)
+        bad = _block_sums(lost, size) > 0
         inner = strip[step : step + size, step : step + columns * size]
-        light.append(_blocked(inner, size, np.mean)[~bad])
-        spread.append(_blocked(rest**2, size, np.mean)[~bad])
+        light.append(_block_sums(inner, size)[~bad] / size**2)
+        spread.append(_block_sums(rest**2, size)[~bad] / size**2)
     return np.concatenate(light).astype(float), np.concatenate(spread).astype(float)
 
 
-def _blocked(strip: NDArray, size: int, how: Callable[..., NDArray]) -> NDArray:
-    """One value for each block of a strip: ``how`` reduces the pixels of a block to one value, such
-    as their mean."""
-    parts = strip[:size].reshape(size, -1, size, *strip.shape[2:])
-    return np.asarray(how(parts, axis=(0, 2)))
+def _block_sums(strip: NDArray, size: int) -> NDArray:
+    """(n, …) sum of the pixels of each block of a strip (size, n · size, …). The rows are added
+    first, because long contiguous rows are added fastest."""
+    rows = strip[:size].sum(axis=0)
+    return np.asarray(rows.reshape(-1, size, *strip.shape[2:]).sum(axis=1))
 
 
 def _fit(light: NDArray, spread: NDArray, freedom: float) -> _Line:

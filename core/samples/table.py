@@ -18,8 +18,8 @@ class SampleTable:
     - photo: (n,) int16 index of the photo; pixel: (n,) int32 flat index in it.
     - theta_h, theta_d, phi_d: (n,) float32, radians, relative to the scanned normal.
     - cos_i, cos_o: (n,) float32. rho: (n, 3) float32, L / (E · cos θi), 1/sr.
-    - radiance: (n, 3) float32, in the photo's units. irradiance: (n, 3) float32 at normal
-      incidence.
+    - radiance: (n, 3) float32, in the photo's units; variance: (n, 3) float32 of it by the photo's
+      noise, 0 where that was not estimated. irradiance: (n, 3) float32 at normal incidence.
     - light: (n, 3) float32 unit vector surface → light.
     - point: (n, 3) float64, on the surface, scan units; normal, view: (n, 3) float32 unit vectors.
     - curvature: (n,) float32 image-space mean curvature, 1/pixel, NaN where unknown.
@@ -38,6 +38,7 @@ class SampleTable:
     cos_o: NDArray[np.float32]
     rho: NDArray[np.float32]
     radiance: NDArray[np.float32]
+    variance: NDArray[np.float32]
     point: NDArray[np.float64]
     normal: NDArray[np.float32]
     view: NDArray[np.float32]
@@ -98,8 +99,8 @@ class SampleTable:
         return SampleTable(
             photo=np.zeros(0, np.int16), pixel=np.zeros(0, np.int32),
             theta_h=flat, theta_d=flat, phi_d=flat, cos_i=flat, cos_o=flat,
-            rho=vectors, radiance=vectors, point=np.zeros((0, 3)), normal=vectors, view=vectors,
-            curvature=flat, light=vectors, irradiance=vectors, weight=flat,
+            rho=vectors, radiance=vectors, variance=vectors, point=np.zeros((0, 3)), normal=vectors,
+            view=vectors, curvature=flat, light=vectors, irradiance=vectors, weight=flat,
             response=vectors,
         )  # fmt: skip
 

@@ -13,6 +13,7 @@ from ..angles.vectors import dot
 from ..geometry import RayScene, SurfaceView, edges
 from ..geometry.view import cast_shadow
 from ..light import Incidence, Light
+from ..noise import PixelNoise
 from ..scan import Camera
 from .criterion import Criterion, criterion_where
 from .table import SampleTable
@@ -143,12 +144,14 @@ def sample_photo(
     radiance: NDArray[np.float32],
     keep: NDArray[np.bool_],
     photo: int = 0,
+    noise: PixelNoise | None = None,
 ) -> SampleTable:
     """ρ = L / (E · n·l) for the pixels of ``view`` marked in ``keep`` (n,).
 
     radiance: (h, w, 3) of the whole photo, linear, in the units of the light's irradiance / sr.
-    photo: index written to the table. Pixels that almost no light reaches (outside a narrow beam)
-    are skipped: their reflectance cannot be represented in single precision.
+    photo: index written to the table. noise: of the photo, None for none. Pixels that almost no
+    light reaches (outside a narrow beam) are skipped: their reflectance cannot be represented in
+    single precision.
     """
     rows = np.flatnonzero(keep)
     normal, towards = (_gathered(_single(v), rows) for v in (view.normal, view.view))
@@ -158,7 +161,7 @@ def sample_photo(
     if len(rows) and not reached.all():
         kept = np.zeros(len(keep), bool)
         kept[rows] = reached
-        return sample_photo(view, lighting, radiance, keep & kept, photo)
+        return sample_photo(view, lighting, radiance, keep & kept, photo, noise)
     angles = half_difference(normal, light, towards)
     cos_i = lighting.cos_i.take(rows)
     pixel = view.pixel.take(rows)
@@ -177,6 +180,7 @@ def sample_photo(
         cos_o=dot(normal, towards),
         rho=rho,
         radiance=seen,
+        variance=np.zeros_like(seen) if noise is None else noise.at(pixel, seen),
         point=_gathered(view.point, rows),
         normal=normal,
         view=towards,

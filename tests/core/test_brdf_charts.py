@@ -47,8 +47,9 @@ def table_of(theta_h: np.ndarray, theta_d: np.ndarray) -> SampleTable:
     return SampleTable(
         photo=np.zeros(n, np.int16), pixel=np.arange(n, dtype=np.int32),
         theta_h=theta_h.astype(np.float32), theta_d=theta_d.astype(np.float32), phi_d=one,
-        cos_i=one, cos_o=one, rho=three, radiance=three, point=np.zeros((n, 3)), normal=vector,
-        view=vector, curvature=one, light=vector, irradiance=three, weight=one,
+        cos_i=one, cos_o=one, rho=three, radiance=three, variance=0 * three,
+        point=np.zeros((n, 3)), normal=vector, view=vector, curvature=one, light=vector,
+        irradiance=three, weight=one,
         response=np.ones((n, 3), np.float32),
     )  # fmt: skip
 

@@ -30,6 +30,7 @@ from patina.core.fit.measured_result import MeasuredResult
 from patina.core.geometry import RayScene, view_surface
 from patina.core.inputs import capture_data
 from patina.core.light import MountedLight
+from patina.core.noise.basis_error import BASIS_ERROR
 from patina.core.samples import SampleTable, sample_photo
 from patina.core.samples.take import light_surface
 from tests import make_capture as made
@@ -91,6 +92,7 @@ def samples(
         cos_o=cos_o,
         rho=value,
         radiance=value * irradiance * cos_i[:, None],
+        variance=np.zeros((count, 3), np.float32),
         point=point.astype(np.float64),
         normal=normal,
         view=view,
@@ -220,6 +222,8 @@ def model_of(photos: int, cells: int, basis: Basis) -> CellModel:
             rng.integers(1, 40, cells),
             angles,
             np.exp(rng.normal(-2, 0.3, (cells, 3))),
+            np.zeros((cells, 3)),
+            np.ones(cells),
             np.zeros(cells),
         ),
         basis,
@@ -289,19 +293,23 @@ def test_leave_one_photo_out_agrees_with_dense_matrices(coupled: bool) -> None:
 
 @pytest.mark.parametrize("photos", [2, 4])
 def test_leave_one_photo_out_approximates_refit_without_photo(photos: int) -> None:
-    """Photos that disagree by a tenth: one step moves towards the fit to the other photos alone."""
+    """Photos that disagree by a tenth: one step moves most of the way to the fit to the other
+    photos alone. The rest is due to the weights of cells, which the refit computes anew."""
     basis = default_basis()
-    table = samples(4000, photos)
-    colour = np.exp(np.random.default_rng(0).normal(0, 0.1, (photos, 3))).astype(np.float32)
-    table = replace(table, radiance=table.radiance * colour[table.photo])
-    model = CellModel.of(gather(table, 0.0), basis)
     prior = ChannelPrior.of(basis, 20, coupled=False)
-    whole = solve(model, prior, 0.15, None, True, 60, 10.0)
-    for photo, c in whole.without.items():
-        rest = model.select(model.cells.photo != photo)
-        alone = solve(rest, prior, 0.15, whole.coefficients, False, 60, 10.0).coefficients
-        difference, moved = np.linalg.norm(c - alone), np.linalg.norm(whole.coefficients - alone)
-        assert difference < 0.35 * moved  # cell weights are computed anew without the photo
+    remaining = []
+    for seed in range(4):
+        table = samples(4000, photos)
+        colour = np.exp(np.random.default_rng(seed).normal(0, 0.1, (photos, 3)))
+        radiance = table.radiance * colour.astype(np.float32)[table.photo]
+        model = CellModel.of(gather(replace(table, radiance=radiance), 0.0), basis)
+        whole = solve(model, prior, BASIS_ERROR, None, True, 60)
+        for photo, c in whole.without.items():
+            rest = model.select(model.cells.photo != photo)
+            alone = solve(rest, prior, BASIS_ERROR, whole.coefficients, False, 60).coefficients
+            moved = np.linalg.norm(whole.coefficients - alone)
+            remaining.append(np.linalg.norm(c - alone) / moved)
+    assert np.median(remaining) < 0.25 and np.max(remaining) < 0.7
 
 
 def test_arrow_solve_and_marginal_match_dense_matrix() -> None:

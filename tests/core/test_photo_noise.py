@@ -12,8 +12,8 @@ import pytest
 from scipy.ndimage import convolve, gaussian_filter, uniform_filter
 
 from patina.core.errors import InputError
+from patina.core.noise import PhotoNoise
 from patina.core.photo import (
-    Noise,
     Photo,
     PhotoInfo,
     Transfer,
@@ -157,7 +157,7 @@ def test_noise_of_a_scan(shared: Path, name: str) -> None:
 
 SHOT, READ, TOP = 1e-4, 2e-3, 1.0
 EXPOSURES = (0.25, 1.0, 0.0625)
-NOISE = Noise(np.full(3, SHOT), np.full(3, READ))
+NOISE = PhotoNoise(np.full(3, SHOT), np.full(3, READ))
 
 
 def bracket(light: np.ndarray, exposures=EXPOSURES) -> list[Photo]:

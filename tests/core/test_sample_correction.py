@@ -40,7 +40,8 @@ def table_of(context: DiagnosisContext) -> SampleTable:
     own |= {
         "theta_h": angles.theta_h, "theta_d": angles.theta_d, "phi_d": angles.phi_d,
         "cos_i": cos_i, "cos_o": np.sum(pixels.normal * pixels.view, axis=1),
-        "radiance": pixels.observed, "weight": np.ones(len(pixels), np.float32),
+        "radiance": pixels.observed, "variance": pixels.noise,
+        "weight": np.ones(len(pixels), np.float32),
         "response": np.ones((len(pixels), 3), np.float32),
         "rho": pixels.observed / (pixels.irradiance * cos_i[:, None]),
     }  # fmt: skip

@@ -232,6 +232,7 @@ def distinct_samples(photo: int, pixels: np.ndarray) -> SampleTable:
         radiance=vectors * pixels[:, None].astype(np.float32), normal=vectors, view=vectors,
         rho=vectors, light=vectors, irradiance=vectors, point=vectors.astype(float),
         weight=np.ones(n, np.float32), response=np.ones((n, 3), np.float32),
+        variance=0 * vectors,
     )  # fmt: skip
 
 

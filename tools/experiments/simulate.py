@@ -106,13 +106,19 @@ class Sampled:
     def exposed(self, transport: NDArray[np.float32], seed: int | None = 0) -> SampleTable:
         """As :meth:`photograph`, from the result (n, 3) of TruePixels.transport."""
         radiance = transport * self.table.irradiance
+        variance = np.zeros_like(radiance)
         if seed is not None:
             white = np.float32(np.percentile(radiance, WHITE) / FULL_WELL)
-            spread = np.sqrt(radiance * white + np.square(READ_NOISE * white))
+            variance = radiance * white + np.square(READ_NOISE * white)
             noise = np.random.default_rng(seed).standard_normal(radiance.shape, np.float32)
-            radiance = radiance + spread * noise
+            radiance = radiance + np.sqrt(variance) * noise
         rho = radiance / (self.table.irradiance * self.table.cos_i[:, None])
-        return replace(self.table, radiance=radiance.astype(np.float32), rho=rho.astype(np.float32))
+        return replace(
+            self.table,
+            radiance=radiance.astype(np.float32),
+            variance=variance.astype(np.float32),
+            rho=rho.astype(np.float32),
+        )
 
     def select(self, rows: NDArray) -> Sampled:
         """The rows of a boolean mask or an index array."""

@@ -73,6 +73,7 @@ class HighlightBlur:
             found,
             rho=found.rho * ratio,
             radiance=found.radiance * ratio,
+            variance=found.variance * ratio**2,
             response=found.response / ratio,
         )
 

@@ -204,8 +204,8 @@ def _with_photo(pixels: Pixels, photo: LitPhoto) -> Pixels:
     numbers of their held-out regions."""
     flat = photo.radiance.reshape(-1, 3)
     seen = flat.take(pixels.pixel, axis=0)
-    assert photo.variance is not None
-    variance = photo.variance.reshape(-1, 3).take(pixels.pixel, axis=0)
+    assert photo.noise is not None
+    variance = photo.noise.at(pixels.pixel, seen)
     return replace(
         pixels,
         observed=seen,

@@ -1,7 +1,7 @@
 """The expected standard deviation of the residual of a pixel without any cause.
 
-It includes photo noise, the error of the scan's normals as estimated by the fit, the misalignment
-of photos at shadow edges and image edges, and a fraction of the prediction as model error. It is
+It includes the noise model of a pixel (core/noise), the error of the scan's normals as estimated by
+the fit, and the misalignment of photos at shadow edges and image edges. It is
 fixed before any cause is tried, so that the costs of different causes are comparable.
 """
 
@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...angles.vectors import tangents
+from ...noise.pixel_error import bright_parts, pixel_variance
 from ..forward.material_brdfs import MaterialBRDFs
 from ..forward.pixels import Pixels
 from .model import Model
 
 Array = NDArray[np.floating]
 
-RELATIVE_FLOOR = 0.015  # fraction of the prediction
-DARK_FLOOR = 0.004  # fraction of the 90th percentile of the prediction in a photo
 TILT_STEP = 2e-3  # radians, for difference quotients
 POSE_ERROR = 0.15  # pixels, of the camera poses of a good scan
 LEVELS, MIN_PIXELS = 8, 50  # bins of brightness; pixels that a bin needs
@@ -34,11 +33,8 @@ def expected_deviation(pixels: Pixels, brdfs: MaterialBRDFs, normal_deviation: f
     model = Model(pixels, brdfs)
     state = model.shading()
     predicted = model.reflected([state])
-    bright = np.zeros(int(pixels.photo.max()) + 1)
-    for photo in np.unique(pixels.photo):
-        bright[photo] = np.percentile(predicted[pixels.photo == photo].mean(axis=1), 90)
-    variance = pixels.noise.astype(np.float64)
-    variance += (RELATIVE_FLOOR * predicted) ** 2 + (DARK_FLOOR * bright[pixels.photo, None]) ** 2
+    bright = bright_parts(predicted.mean(axis=1), pixels.photo)
+    variance = pixel_variance(pixels.noise, predicted, bright[pixels.photo, None])
     variance += np.square(normal_deviation) * _by_normals(model, predicted)
     variance += POSE_ERROR**2 * np.sum(pixels.slope.astype(np.float64) ** 2, axis=1)
     nearness = np.clip(1 - pixels.edge / EDGE_DISTANCE, 0, 1)[:, None]

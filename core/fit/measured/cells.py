@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...angles import Angles, cosines
+from ...noise.pixel_error import bright_parts
 from ...samples import SampleTable
 
 THETA_D_WIDTH = 2.0  # degrees
@@ -30,14 +31,17 @@ class AngleCells:
 
     photo: (m,) int16. count: (m,) number of samples. angles: their mean angles, radians, φd on [0,
     2π). reflected: (m, 3) mean of L/E (= ρ·cos θi, blurred by the normals' errors), scaled to the
-    cosine at the mean angles. normal_error: (m,) radians, RMS error of the normals along each
-    tangent.
+    cosine at the mean angles. noise: (m, 3) variance of one sample's share of it by the photo's
+    noise. bright: (m,) L/E of the bright parts of the photo. normal_error: (m,) radians, RMS error
+    of the normals along each tangent.
     """
 
     photo: NDArray[np.int16]
     count: NDArray[np.int64]
     angles: Angles
     reflected: NDArray[np.float64]
+    noise: NDArray[np.float64]
+    bright: NDArray[np.float64]
     normal_error: NDArray[np.float64]
 
     def __len__(self) -> int:
@@ -50,6 +54,8 @@ class AngleCells:
             self.count[which],
             Angles(*(a[which] for a in self.angles)),
             self.reflected[which],
+            self.noise[which],
+            self.bright[which],
             self.normal_error[which],
         )
 
@@ -78,14 +84,18 @@ def gather(
     # a cell is represented by its mean angles: remove the variation of cos θi within it
     level = cosines(*angles)[0] / mean(table.cos_i)
     light = table.radiance / table.irradiance
-    reflected = np.stack([mean(light[:, c]) * level for c in range(light.shape[1])], axis=1)
+    reflected = np.stack([mean(light[:, c]) * level for c in range(3)], axis=1)
+    spread = table.variance / table.irradiance**2
+    noise = np.stack([mean(spread[:, c]) * level**2 for c in range(3)], axis=1)
     first = np.zeros(m, np.intp)
     first[where] = np.arange(len(where))
     if np.ndim(normal_error):
         error = np.sqrt(mean(np.square(normal_error)))
     else:
         error = np.full(m, float(normal_error))
-    return AngleCells(table.photo[first], count, angles, reflected, error)
+    photo = table.photo[first]
+    bright = bright_parts(light.mean(axis=1), table.photo)[photo]
+    return AngleCells(photo, count, angles, reflected, noise, bright, error)
 
 
 def unfolded_phi_d(table: SampleTable) -> NDArray[np.float64]:

@@ -14,6 +14,7 @@ from ...basis import Basis, PrincipalBRDF
 from ...basis.log_table import LogTable
 from ...concurrency.steps import drained
 from ...errors import FitError
+from ...noise.basis_error import BASIS_ERROR
 from ...samples import SampleTable
 from .cells import gather
 from .forward import CellModel
@@ -35,15 +36,15 @@ MIN_BAND = 0.03  # standard deviation of ln ρ that is always added
 
 @dataclass(frozen=True)
 class MeasuredSettings:
-    """components: how many of the basis, None for all. floor: log-relative standard deviation of
-    the model error assumed everywhere. normal_deviation: degrees along each tangent, initial
-    standard deviation of the scan's normals. rounds: largest number of normal refinements, 0 for
-    none. coupled: share between the channels what the channels of measured materials share. trust:
-    log-relative standard deviation of the grazing prior (grazing_prior.py) in directions without
-    samples; infinite switches it off."""
+    """components: how many of the basis, None for all. floor: relative standard deviation of the
+    basis' error far from black (core/noise/basis_error.py). normal_deviation: degrees along each
+    tangent, initial standard deviation of the scan's normals. rounds: largest number of normal
+    refinements, 0 for none. coupled: share between the channels what the channels of measured
+    materials share. trust: log-relative standard deviation of the grazing prior (grazing_prior.py)
+    in directions without samples; infinite switches it off."""
 
     components: int | None = None
-    floor: float = 0.15
+    floor: float = BASIS_ERROR
     normal_deviation: float = 1.0
     rounds: int = 8
     coupled: bool = False

@@ -2,9 +2,9 @@
 without each photo.
 
 Gauss–Newton on the residuals in the mapped space. The weights are computed anew at every step from
-each cell's uncertainty: pixel noise, the model error and the normals' error times the slope of the
-BRDF. A Student-t error model limits the influence of outliers, such as shadows that the mesh does
-not explain.
+each cell's uncertainty: the noise model of a pixel (core/noise) divided by the number of samples,
+the error of the basis, and the normals' error times the slope of the BRDF. A Student-t error model
+limits the influence of outliers, such as shadows that the mesh does not explain.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...noise.basis_error import basis_variance
+from ...noise.pixel_error import pixel_variance
 from ...statistics.student_t import weights_of_squares
 from .cell_weights import cells_per_observation
 from .equations import Arrow, PhotoEquations, add_blocks
@@ -23,7 +25,6 @@ from .prior import ChannelPrior
 
 ITERATIONS = 12
 SAMPLES_PER_NORMAL = 30  # so many neighbouring samples share one error of the normal
-READ_NOISE = 3e-3  # of the mapped level: what photos do not resolve near black
 MAX_STEP = 2.0  # largest change of a parameter in one iteration, in prior standard deviations
 CONVERGED = 0.01  # the same: the iteration ends where no parameter changes more
 GAIN_DEVIATION = 0.03  # prior standard deviation of the logarithm of a photo's gain
@@ -58,8 +59,8 @@ def solve(
 ) -> Posterior:
     """The posterior of a model's coefficients, by Gauss–Newton from ``start`` (3, k), or from 0.
 
-    floor: log-relative standard deviation of the model error assumed everywhere. leave_out: compute
-    the coefficients without each photo too. temperature: the likelihood is raised to the power
+    floor: relative standard deviation of the basis' error far from black. leave_out: compute the
+    coefficients without each photo too. temperature: the likelihood is raised to the power
     1/temperature (power_likelihood.py), after the cells' weights by region (cell_weights.py).
     """
     k = len(prior.own)
@@ -114,13 +115,19 @@ def _residuals(
     residual = np.clip(model.observed / level - 1.0, -1.0, 3.0)
     count = model.cells.count[:, None]
     variance = (
-        floor**2
+        basis_variance(level, floor)
         + prediction.spread * np.minimum(1.0, SAMPLES_PER_NORMAL / count)
-        + (READ_NOISE / level) ** 2 / count
-        + 0.05**2 / count
+        + _of_pixel(model, level) / count
     )
     weight = weights_of_squares(residual**2 / variance) / variance
     return residual, weight
+
+
+def _of_pixel(model: CellModel, level: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, 3) relative variance of one sample of each cell."""
+    scale = model.scale[:, None]
+    noise, bright = model.cells.noise * scale**2, model.cells.bright[:, None] * scale
+    return pixel_variance(noise, level, bright) / level**2
 
 
 def _equations(
