@@ -369,7 +369,7 @@ def _finding(cause: Mapping[str, Any]) -> Finding:
         cause=cause["cause"],
         sentence=cause["sentence"],
         accepted=cause["accepted"],
-        contradicted=cause["doubted"],
+        contradicted=cause["contradicted"],
         gain=cause["held_out_gain"],
         standard_error=cause["standard_error"],
         p_value=cause["p_value"],

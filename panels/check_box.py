@@ -48,15 +48,14 @@ def draw_check(
         if switch is not None and cause["accepted"]:
             row.prop(switch, "use", text="")
         bar = row.row()
-        bar.active = cause["accepted"] and not cause.get(
-            "doubted"
-        )  # greyed out otherwise, as in the report
+        # greyed out otherwise, as in the report
+        bar.active = cause["accepted"] and not cause.get("contradicted")
         bar.progress(
             text=label, factor=min(max(_significance(cause) / max(largest, 1e-9), 0), 1), type="BAR"
         )
         if cause["accepted"]:
             row.operator("patina.show_evidence", text="", icon="HIDE_OFF").cause = cause["cause"]
-        if cause["accepted"] or cause.get("doubted"):
+        if cause["accepted"] or cause.get("contradicted"):
             wrapped(box, with_lengths(cause["sentence"]), "BLANK1", IN_BOX)
     if len(causes):
         used = {cause.name for cause in causes if cause.use}

@@ -73,7 +73,7 @@ def _cause(trial: Trial, found: Diagnosis) -> dict[str, Any]:
     return {
         "cause": trial.effect.cause,
         "accepted": accepted,
-        "doubted": found.contradicted.get(trial.effect.cause),
+        "contradicted": found.contradicted.get(trial.effect.cause),
         "sentence": found.sentence(trial),
         "ties": [effect.cause for effect in trial.ties],
         "held_out_gain": trial.gain,

@@ -83,7 +83,7 @@ LOOKS: dict[Criterion, Look] = {
         "unknown. Expose less, or take a bracket.",
     ),
     Criterion.OUTSIDE_BEAM: Look(
-        "missed", "outside the light's beam", (76, 93, 0),
+        "outside_beam", "outside the light's beam", (76, 93, 0),
         "The beam of the lamp gives almost no light here. Turn the lamp, or use a wider one.",
     ),
     Criterion.CURVED: Look(

@@ -13,7 +13,7 @@ from ...core.diagnose.selection.diagnosis import Diagnosis
 Array = NDArray[np.floating]
 
 EVIDENCE = "Patina: "  # prefix of the attributes, followed by the cause or MISSED
-RESIDUAL = "missed"  # attribute of the residual
+RESIDUAL = "residual"  # attribute of the residual
 NEIGHBOURS = 8  # nearest pixels whose median colours a vertex
 FULL_SCALE = 0.10  # relative change of the pixel value with the full colour
 DARKER, SAME, BRIGHTER = np.array([[59, 76, 192], [236, 236, 236], [180, 4, 38]]) / 255

@@ -226,9 +226,9 @@ def test_check_names_light_drift_and_fit_can_include_or_skip_it() -> None:
     assert diagnosis["extended"]["held_out"] < diagnosis["baseline"]["held_out"]
 
     scene, mesh = bpy.context.scene, bpy.context.scene.patina.mesh
-    layer = mesh.data.color_attributes["Patina: missed"]
+    layer = mesh.data.color_attributes["Patina: residual"]
     assert len(layer.data) == len(mesh.data.vertices)
-    for name in ("missed", "light_intensity"):
+    for name in ("residual", "light_intensity"):
         assert bpy.ops.patina.show_evidence(cause=name) == {"FINISHED"}
         assert mesh.data.color_attributes.active_color.name == f"Patina: {name}"
 
