@@ -12,7 +12,7 @@ from ...core.diagnose.selection.diagnosis import Diagnosis
 
 Array = NDArray[np.floating]
 
-EVIDENCE = "Patina: "  # prefix of the attributes, followed by the cause or MISSED
+EVIDENCE = "Patina: "  # prefix of the attributes, followed by the cause or RESIDUAL
 RESIDUAL = "residual"  # attribute of the residual
 NEIGHBOURS = 8  # nearest pixels whose median colours a vertex
 FULL_SCALE = 0.10  # relative change of the pixel value with the full colour

@@ -131,7 +131,8 @@ def _correct_chunk(
         point = model.brdfs.reflected(replace(now, stretch=None))
         drawn *= reflected / np.maximum(point, 1e-30)
     radiance = np.where(clipped, drawn, arrived - added)
-    slope = np.where(clipped | (response <= 0), 1.0, response)
+    # radiance is the recorded value divided by the response; an imputed value keeps its variance
+    divisor = np.where(clipped | (response <= 0), 1.0, response)
     response = np.where(clipped, 0, response)
     lamp = response * radiance
     cos_i = dot(now.normal, now.light)
@@ -151,7 +152,7 @@ def _correct_chunk(
         cos_o=cos_o.astype(np.float32),
         rho=rho.astype(np.float32),
         radiance=radiance.astype(np.float32),
-        variance=(table.variance / slope**2).astype(np.float32),
+        variance=(table.variance / divisor**2).astype(np.float32),
         irradiance=irradiance,
         normal=np.asarray(now.normal, np.float32),
         light=np.asarray(now.light, np.float32),

@@ -1,8 +1,8 @@
 """The expected standard deviation of the residual of a pixel without any cause.
 
 It includes the noise model of a pixel (core/noise), the error of the scan's normals as estimated by
-the fit, and the misalignment of photos at shadow edges and image edges. It is
-fixed before any cause is tried, so that the costs of different causes are comparable.
+the fit, and the misalignment of photos at shadow edges and image edges. It is fixed before any
+cause is tried, so that the costs of different causes are comparable.
 """
 
 from __future__ import annotations

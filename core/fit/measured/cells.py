@@ -31,9 +31,9 @@ class AngleCells:
 
     photo: (m,) int16. count: (m,) number of samples. angles: their mean angles, radians, φd on [0,
     2π). reflected: (m, 3) mean of L/E (= ρ·cos θi, blurred by the normals' errors), scaled to the
-    cosine at the mean angles. noise: (m, 3) variance of one sample's share of it by the photo's
-    noise. bright: (m,) L/E of the bright parts of the photo. normal_error: (m,) radians, RMS error
-    of the normals along each tangent.
+    cosine at the mean angles. noise: (m, 3) variance of L/E of one sample by the photo's noise,
+    on the same scale. bright: (m,) L/E of the bright parts of the photo. normal_error: (m,)
+    radians, RMS error of the normals along each tangent.
     """
 
     photo: NDArray[np.int16]
