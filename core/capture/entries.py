@@ -64,7 +64,9 @@ class LightEntry:
     strength: (3,) irradiance of a distant light, or intensity of a near one. angle: radians,
     angular diameter of a distant source; radius: of a near source, scan units; beam: radians, angle
     from the axis at which half of the intensity is left. refine: the given values are start values
-    of an optimisation. charted: the colour chart of [tone] gives the strength."""
+    of an optimisation. guess: nobody measured the direction or position, it is a placeholder.
+    standard_error: of the direction (radians), or of the position or offset (scan units), where it
+    was found from photos. charted: the colour chart of [tone] gives the strength."""
 
     name: str
     direction: Array | None = None
@@ -78,6 +80,8 @@ class LightEntry:
     radius: float = 0.0
     beam: float | None = None
     refine: bool = False
+    guess: bool = False
+    standard_error: float | None = None
     charted: bool = False
 
     @property

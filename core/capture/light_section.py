@@ -51,7 +51,17 @@ def read_light(section: Section) -> LightEntry:
         radius=radius,
         beam=beam,
         refine=section.flag("refine", False),
+        guess=section.flag("guess", False),
+        standard_error=_standard_error(section, distant),
     )
+    if entry.sphere is not None or entry.sun is not None:
+        for key in ("guess", "standard_error"):
+            if key in section:
+                raise section.error(
+                    f"the {location} gives the direction; expected no {key}: remove it", key
+                )
+    if entry.guess and entry.standard_error is not None:
+        raise section.error("a guess has no standard error; remove one of the two", "guess")
     mirror = entry.sphere is not None and entry.sphere.reflectance is not None
     if sum((entry.white is not None, entry.strength is not None, mirror)) > 1:
         raise section.error(
@@ -70,6 +80,15 @@ def _direction(section: Section) -> NDArray[np.float64]:
     if length < 1e-9:
         raise section.error("found a vector of length 0; expected a direction", "direction")
     return direction / length
+
+
+def _standard_error(section: Section, distant: bool) -> float | None:
+    """Radians for a direction, scan units for a position or offset."""
+    if "standard_error" not in section:
+        return None
+    if distant:
+        return float(np.radians(section.number("standard_error", 0.0, 0.0, 180.0)))
+    return section.number("standard_error", 0.0, 0.0, MAX_RADIUS)
 
 
 def _strength(section: Section, key: str, distant: bool) -> NDArray[np.float64] | None:

@@ -25,9 +25,10 @@ TABLES = ("sphere", "sun", "white")
 def write_lights(capture: Capture, lights: Sequence[LightEntry], out: Path) -> None:
     """Write a copy of the capture's file with ``lights`` in place of its own, one for one.
 
-    Written are direction, position, mounted, irradiance or intensity, angle and radius; the entries
-    that these replace (sphere, sun, white) become comments. out may be the capture's own file. It
-    is written atomically, after it has been read back and compared. Raises PatinaError.
+    Written are direction, position, mounted, irradiance or intensity, angle, radius, guess and
+    standard_error; the entries that these replace (sphere, sun, white) become comments. out may
+    be the capture's own file. It is written atomically, after it has been read back and compared.
+    Raises PatinaError.
     """
     try:
         text = capture.file.read_bytes().decode("utf-8")
@@ -110,10 +111,21 @@ def _changes(old: LightEntry, new: LightEntry) -> dict[str, str | None]:
         changes["angle"] = None if new.angle is None else repr(float(np.degrees(new.angle)))
     if not _same(old.radius, new.radius):
         changes["radius"] = repr(float(new.radius))
+    if old.guess != new.guess:
+        changes["guess"] = "true" if new.guess else None
+    if not _same(old.standard_error, new.standard_error):
+        changes["standard_error"] = _standard_error(new)
     for key in TABLES:
         if getattr(old, key) is not None and getattr(new, key) is None:
             changes[key] = None
     return changes
+
+
+def _standard_error(entry: LightEntry) -> str | None:
+    error = entry.standard_error
+    if error is None:
+        return None
+    return repr(float(np.degrees(error) if entry.distant else error))
 
 
 def _check(partial: Path, capture: Capture, lights: Sequence[LightEntry], out: Path) -> None:

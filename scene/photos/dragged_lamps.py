@@ -135,6 +135,8 @@ def _kind(entry: LightEntry) -> str:
 
 def _entry(entry: LightEntry, lamp: bpy.types.Object, hand: LampEdits, origin: Array) -> LightEntry:
     new: dict[str, Any] = {}
+    if hand.moved:
+        new.update(guess=False, standard_error=None)
     if hand.moved and entry.mounted is not None:
         new["mounted"] = hand.now.place * FROM_CAMERA
     elif hand.moved and entry.position is not None:

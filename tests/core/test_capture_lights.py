@@ -75,6 +75,13 @@ LIGHT_MISTAKES = {
         [f"direction = [0x{'f' * 5000}, 0, 0]"], "a number too large|three numbers",
     ),
     "a text that is none": (["direction = [0, 0, 1]", f"refine = 0x{'f' * 5000}"], "too large"),
+    "a guess with an error": (
+        ["direction = [0, 0, 1]", "guess = true", "standard_error = 1"], "no standard error",
+    ),
+    "a guessed sphere": (
+        ['sphere = {photo = "lit_1.exr", camera = "view_01"}', "guess = true"],
+        "the sphere gives the direction",
+    ),
     "refine": (["direction = [0, 0, 1]", "refine = 1"], "true or false"),
 }  # fmt: skip
 

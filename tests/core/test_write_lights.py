@@ -126,6 +126,19 @@ def test_unchanged_lights_give_identical_file(tmp_path: Path) -> None:
     assert np.allclose(read_capture(path).lights[0].direction, AXIS)
 
 
+def test_found_direction_replaces_guess(tmp_path: Path) -> None:
+    path = made.make_capture(tmp_path)
+    text = path.read_text("utf-8").replace("direction =", "guess = true\ndirection =", 1)
+    path.write_text(text, "utf-8")
+    capture = read_capture(path)
+    assert capture.lights[0].guess
+    found = replace(capture.lights[0], guess=False, standard_error=float(np.radians(0.5)))
+    write_lights(capture, (found, *capture.lights[1:]), path)
+    back = read_capture(path).lights[0]
+    assert not back.guess
+    assert back.standard_error == pytest.approx(np.radians(0.5))
+
+
 def test_last_line_without_line_break(tmp_path: Path) -> None:
     path = _captured(tmp_path)
     head, lights = path.read_text().replace("\n# the end", "").split("[[light]]  # the first")
