@@ -21,6 +21,7 @@ COMMANDS = {
     "maps": "maps",
     "solve": "solve",
     "localise": "localise",
+    "find-lights": "find_lights",
     "demo": "demo",
     "basis": "basis",
     "build-basis": "build_basis",

@@ -25,8 +25,8 @@ TABLES = ("sphere", "sun", "white")
 def write_lights(capture: Capture, lights: Sequence[LightEntry], out: Path) -> None:
     """Write a copy of the capture's file with ``lights`` in place of its own, one for one.
 
-    Written are direction, position, mounted, irradiance or intensity, angle, radius, guess and
-    standard_error; the entries that these replace (sphere, sun, white) become comments. out may
+    Written are direction, position, mounted, irradiance or intensity, angle, radius, beam, guess
+    and standard_error; the entries that these replace (sphere, sun, white) become comments. out may
     be the capture's own file. It is written atomically, after it has been read back and compared.
     Raises PatinaError.
     """
@@ -109,6 +109,8 @@ def _changes(old: LightEntry, new: LightEntry) -> dict[str, str | None]:
     }
     if not _same(old.angle, new.angle):
         changes["angle"] = None if new.angle is None else repr(float(np.degrees(new.angle)))
+    if not _same(old.beam, new.beam):
+        changes["beam"] = None if new.beam is None else repr(float(np.degrees(new.beam)))
     if not _same(old.radius, new.radius):
         changes["radius"] = repr(float(new.radius))
     if old.guess != new.guess:

@@ -15,7 +15,7 @@ from ..calibrate.refine import Refined, refine_lights
 from ..calibrate.seen import CalibrationPixels, draw_pixels
 from ..capture import Capture, ChartEntry, LightEntry, SphereEntry, SunEntry, WhiteEntry
 from ..errors import InputError, PatinaError
-from ..geometry import RayScene, view_surface
+from ..geometry import RayScene
 from ..light import DistantLight, Light, MountedLight, NearLight
 from ..light.sphere import light_from_sphere
 from ..light.sphere_outline import Circle
@@ -24,10 +24,10 @@ from ..light.sun_time import photo_place, photo_time
 from ..light.white import irradiance_from_white
 from ..photo import read_mask
 from ..photo.image import attributes
-from ..scan import Camera, Scan
+from ..scan import Scan
 from ..scan.scan import find_camera
 from . import capture_data
-from .material_pixels import material_pixels
+from .material_image import material_image
 from .photos import LitPhotos
 
 Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ def refined(
         yield 0.3 * place / len(capture.photos)
         lit = photos.read(place)
         camera = capture_data.camera_of(capture, scan, place)
-        material = _materials(capture, scan, rays, camera, place)
+        material = material_image(capture, scan, rays, camera, place)
         material[~lit.usable] = -1
         seen.append(
             (photo.light, draw_pixels(rays, camera, lit.radiance, material, REFINE_PIXELS, rng))
@@ -113,23 +113,6 @@ def refined(
         lights, by_name=found.lights, moved=found.moved,
         unexplained=(found.before, found.after), notes=tuple(notes),
     )  # fmt: skip
-
-
-def _materials(
-    capture: Capture, scan: Scan, rays: RayScene, camera: Camera, place: int
-) -> NDArray[np.int16]:
-    """(h, w) index of each pixel's material, −1 in masked shadow and where there is none."""
-    shape = camera.height, camera.width
-    only = capture.materials[0]
-    whole = not (only.by_mesh or capture.named_by_masks(only.name) or capture.photos[place].masks)
-    if whole and len(capture.materials) == 1:
-        return np.zeros(shape, np.int16)
-    view = view_surface(rays, camera)
-    where, shadow = material_pixels(capture, scan, view, capture_data.photo_masks(capture, place))
-    found = np.full(shape[0] * shape[1], -1, np.int16)
-    for index, material in enumerate(capture.materials):
-        found[view.pixel[where[material.name] & ~shadow]] = index
-    return found.reshape(shape)
 
 
 def _light(

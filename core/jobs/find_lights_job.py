@@ -1,0 +1,180 @@
+"""Find the unknown lights of a capture from its photos, as a job."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..basis import Basis, default_basis
+from ..capture import Capture, LightEntry
+from ..concurrency.job import Job, Step
+from ..errors import PatinaError
+from ..geometry import RayScene
+from ..inputs import capture_data
+from ..inputs.lights import Lights, find_lights
+from ..inputs.material_image import material_image
+from ..inputs.photos import LitPhotos
+from ..light import DistantLight, MountedLight, NearLight
+from ..light_search import FoundLamp, LampPhoto, UnknownLamp, draw_lamp_pixels, find_lamps
+from ..light_search.brdf_dictionary import BrdfDictionary
+from ..light_search.search import FINE_PIXELS
+from ..scan import Scan
+
+READING, SEARCHING = "reading photos", "searching lights"
+READ_SHARE = 0.1  # of the job's time
+MIN_PIXELS_OF_PHOTO = 150
+
+
+@dataclass(frozen=True)
+class FoundLights:
+    """entries: all lights of the capture, those searched with their found values; lamps: by name,
+    of those searched; notes: sentences about them."""
+
+    entries: tuple[LightEntry, ...]
+    lamps: dict[str, FoundLamp]
+    notes: tuple[str, ...]
+
+
+class FindLightsJob(Job):
+    """Finds ``names`` of the capture's lights, without names all that are marked ``guess``. Sets
+    ``result``. The other lights keep their values; their photos help to know the materials."""
+
+    def __init__(
+        self, capture: Capture, names: Collection[str] = (), basis: Basis | None = None
+    ) -> None:
+        """Raises PatinaError for a name that the capture does not have, and where there is nothing
+        to find."""
+        super().__init__()
+        have = [entry.name for entry in capture.lights]
+        unknown = [name for name in names if name not in have]
+        if unknown:
+            raise PatinaError(
+                f"found no light {unknown[0]!r} in the capture; expected one of {', '.join(have)}"
+            )
+        self.names = frozenset(names or (e.name for e in capture.lights if e.guess))
+        if not self.names:
+            raise PatinaError(
+                "no light of the capture is marked as a guess; name the lights to find, or set "
+                "guess = true for them"
+            )
+        self.capture = capture
+        self.basis = basis
+        self.result: FoundLights | None = None
+
+    def run(self) -> Iterator[Step]:
+        """Read random pixels of every photo, then search."""
+        yield Step(READING, 0.0)
+        capture = self.capture
+        scan = capture_data.open_scan(capture)
+        photos = LitPhotos.open(capture)
+        lights = find_lights(_without_locations(capture, self.names), scan, photos)
+        rays = RayScene.build(scan.mesh)
+        parts: dict[str, list[LampPhoto]] = {}
+        rng = np.random.default_rng(0)
+        for place, photo in enumerate(capture.photos):
+            yield Step(READING, READ_SHARE * place / len(capture.photos))
+            parts.setdefault(photo.light, []).append(
+                _pixels(capture, scan, photos, rays, place, rng)
+            )
+        names = [name for name in lights.by_name if name in parts]
+        lamps = [
+            UnknownLamp(lights.by_name[name], tuple(parts[name]), name not in self.names)
+            for name in names
+        ]
+        yield Step(SEARCHING, READ_SHARE)
+        dictionary = BrdfDictionary.of(self.basis or default_basis())
+        steps = find_lamps(lamps, len(capture.materials), rays, dictionary)
+        while True:
+            try:
+                done = next(steps)
+            except StopIteration as stop:
+                found = stop.value
+                break
+            yield Step(SEARCHING, READ_SHARE + (1 - READ_SHARE) * done)
+        by_name = {n: one for n, one in zip(names, found.lamps, strict=True) if one is not None}
+        self.result = _result(capture, lights, by_name, parts)
+
+
+def _without_locations(capture: Capture, names: Collection[str]) -> Capture:
+    """The capture with placeholders in place of the spheres and suns of the lights to find."""
+    entries = [
+        replace(entry, direction=np.array([0.0, 0.0, 1.0]), sphere=None, sun=None, white=None)
+        if entry.name in names and (entry.sphere is not None or entry.sun is not None)
+        else entry
+        for entry in capture.lights
+    ]
+    return replace(capture, lights=tuple(entries))
+
+
+def _pixels(
+    capture: Capture,
+    scan: Scan,
+    photos: LitPhotos,
+    rays: RayScene,
+    place: int,
+    rng: np.random.Generator,
+) -> LampPhoto:
+    """Random pixels of one photo."""
+    light = capture.photos[place].light
+    siblings = sum(photo.light == light for photo in capture.photos)
+    count = max(-(-FINE_PIXELS // siblings), MIN_PIXELS_OF_PHOTO)
+    lit = photos.read(place)
+    camera = capture_data.camera_of(capture, scan, place)
+    material = material_image(capture, scan, rays, camera, place)
+    material[~lit.usable] = -1
+    return draw_lamp_pixels(rays, camera, lit.radiance, material, count, rng)
+
+
+def _result(
+    capture: Capture,
+    lights: Lights,
+    lamps: dict[str, FoundLamp],
+    parts: dict[str, list[LampPhoto]],
+) -> FoundLights:
+    entries, notes = [], list(lights.notes)
+    for entry in capture.lights:
+        lamp = lamps.get(entry.name)
+        entries.append(entry if lamp is None else _entry(entry, lamp))
+        if lamp is not None:
+            notes.append(_sentence(entry.name, lamp, len(parts[entry.name])))
+            if lamp.other is not None:
+                angle = _angle_to(lamp)
+                notes.append(
+                    f"Light {entry.name!r}: a direction {angle:.0f}° away explains the photos "
+                    "almost as well. Check the shadows in a photo, or add photos of this light "
+                    "from other sides."
+                )
+    return FoundLights(tuple(entries), lamps, tuple(notes))
+
+
+def _angle_to(lamp: FoundLamp) -> float:
+    assert isinstance(lamp.light, DistantLight) and lamp.other is not None
+    return float(np.degrees(np.arccos(np.clip(lamp.light.direction @ lamp.other, -1.0, 1.0))))
+
+
+def _entry(entry: LightEntry, lamp: FoundLamp) -> LightEntry:
+    """The entry with the found values."""
+    found = replace(entry, sphere=None, sun=None, guess=False, standard_error=lamp.standard_error)
+    light = lamp.light
+    if isinstance(light, DistantLight):
+        return replace(found, direction=light.direction)
+    if isinstance(light, MountedLight):
+        return replace(found, mounted=light.offset, beam=light.beam)
+    assert isinstance(light, NearLight)
+    return replace(found, position=light.position)
+
+
+def _sentence(name: str, lamp: FoundLamp, photos: int) -> str:
+    source = f"from {photos} photo{'' if photos == 1 else 's'}"
+    error = lamp.standard_error
+    if isinstance(lamp.light, DistantLight):
+        return f"Light {name!r}: direction found {source}, ± {np.degrees(error):.1f}°."
+    if isinstance(lamp.light, MountedLight):
+        right, down, forward = lamp.light.offset
+        return (
+            f"Light {name!r}: flash found {source}, {right:.3g} right, {down:.3g} down and "
+            f"{forward:.3g} forward of the lens, ± {error:.2g} scan units."
+        )
+    return f"Light {name!r}: position found {source}, ± {error:.2g} scan units."
