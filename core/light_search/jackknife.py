@@ -33,6 +33,7 @@ MIN_RELATIVE_ERROR = 0.002  # of a position or an offset, in units of the reach
 
 def standard_errors(
     lights: Sequence[Light],
+    stated: Sequence[Light],
     known: Sequence[bool],
     lamps: Sequence[LampPixels],
     reach: Sequence[float],
@@ -42,8 +43,8 @@ def standard_errors(
 ) -> Generator[float, None, list[float]]:
     """Standard error per axis of each light, radians or scan units; yields the fraction done.
 
-    lights: found or known ones; lamps: pixels of each; reach: median distance from camera to
-    surface; coefficients: (m, k) of the materials.
+    lights: found or known ones; stated: as the search started; lamps: pixels of each; reach:
+    median distance from camera to surface; coefficients: (m, k) of the materials.
     """
     rng = np.random.default_rng(0)
     block = surface_blocks(np.concatenate([lamp.points for lamp in lamps]))
@@ -65,7 +66,7 @@ def standard_errors(
                 for i, lamp in enumerate(kept):
                     if not known[i]:
                         found[i] = minimised_light(
-                            found[i], reach[i], lamp, own, scale, rays, fewer
+                            found[i], stated[i], reach[i], lamp, own, scale, rays, fewer
                         )
             radiance = [
                 lamp.dictionary_radiance(light, rays, fewer)

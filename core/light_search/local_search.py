@@ -10,6 +10,7 @@ from ..calibrate.movable import free_light
 from ..geometry import RayScene
 from ..light import Light
 from .brdf_dictionary import BrdfDictionary
+from .flash_prior import relative_prior
 from .shading import LampPixels, predicted
 
 Array = NDArray[np.floating]
@@ -26,6 +27,7 @@ def cost_with_gain(pixels: LampPixels, radiance: Array, coefficients: Array) -> 
 
 def minimised_light(
     light: Light,
+    stated: Light,
     reach: float,
     pixels: LampPixels,
     coefficients: Array,
@@ -35,15 +37,17 @@ def minimised_light(
 ) -> Light:
     """The light with the smallest cost near ``light`` (Nelder & Mead 1965: the cost has kinks).
 
-    reach: median distance from camera to surface, scan units. scale: of the first simplex, in
-    typical changes of the parameters (calibrate/movable.py).
+    stated: with the offset that a flash's prior is about (flash_prior.py). reach: median distance
+    from camera to surface, scan units. scale: of the first simplex, in typical changes of the
+    parameters (calibrate/movable.py).
     """
     free = free_light(light, reach)
 
     def cost(x: NDArray[np.float64]) -> float:
         moved = free.light(np.clip(x, free.low, free.high))
         radiance = pixels.dictionary_radiance(moved, rays, dictionary)
-        return cost_with_gain(pixels, radiance, coefficients)
+        prior = relative_prior(moved, stated, reach)
+        return (1.0 + prior) * cost_with_gain(pixels, radiance, coefficients)
 
     simplex = np.vstack([free.start, free.start + scale * np.diag(free.size)])
     options = {

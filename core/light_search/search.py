@@ -112,12 +112,19 @@ def find_lamps(
             yield COARSE_SHARE + (FINE_SHARE - COARSE_SHARE) * done
             if not state.lamp.known:
                 state.light = minimised_light(
-                    state.light, state.reach, state.fine, coefficients, scale, rays, dictionary
+                    state.light,
+                    state.lamp.light,
+                    state.reach,
+                    state.fine,
+                    coefficients,
+                    scale,
+                    rays,
+                    dictionary,
                 )
         radiance = [s.fine.dictionary_radiance(s.light, rays, dictionary) for s in states]
         coefficients = shared_materials([s.fine for s in states], radiance, coefficients)
     steps_of_errors = standard_errors(
-        [s.light for s in states], [s.lamp.known for s in states],
+        [s.light for s in states], [s.lamp.light for s in states], [s.lamp.known for s in states],
         [LampPixels.of(s.lamp.photos, JACKKNIFE_PIXELS) for s in states],
         [s.reach for s in states], coefficients, rays, dictionary,
     )  # fmt: skip
