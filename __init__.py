@@ -87,6 +87,7 @@ MODULES: tuple[str, ...] = (
     "operators.check",
     "operators.look_through",
     "operators.save_lights",
+    "operators.find_lights",
     "operators.mark_assets",
     "operators.reset_traits",
     "operators.export",

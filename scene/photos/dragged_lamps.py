@@ -14,6 +14,7 @@ from ...core.capture import Capture, LightEntry
 from ...core.errors import PatinaError
 from ..property_keys import CAPTURE, INTENSITY_KNOWN, LAMP_KIND, LIGHT_NAME, ORIGIN
 from . import lamp_placement
+from .found_lights import found_values
 from .lamp_placement import DISTANT, FROM_CAMERA, MOUNTED, NEAR, Placement
 
 Array = NDArray[np.float64]
@@ -63,7 +64,7 @@ def lamp_edits(scene: bpy.types.Scene, lamp: bpy.types.Object) -> LampEdits | No
         return None
     moved = _differs(kind, now, made)
     if kind != MOUNTED:
-        seen = now.within(_mesh_frame(scene, lamp.get(CAPTURE)))
+        seen = now.within(mesh_frame(scene, lamp.get(CAPTURE)))
         moved = moved and _differs(kind, seen, made)
         now = seen
     strength = (
@@ -137,6 +138,7 @@ def _entry(entry: LightEntry, lamp: bpy.types.Object, hand: LampEdits, origin: A
     new: dict[str, Any] = {}
     if hand.moved:
         new.update(guess=False, standard_error=None)
+        new.update(found_values(lamp, hand.now) or {})
     if hand.moved and entry.mounted is not None:
         new["mounted"] = hand.now.place * FROM_CAMERA
     elif hand.moved and entry.position is not None:
@@ -157,7 +159,7 @@ def _entry(entry: LightEntry, lamp: bpy.types.Object, hand: LampEdits, origin: A
     return replace(entry, **new) if new else entry
 
 
-def _mesh_frame(scene: bpy.types.Scene, capture: str | None) -> Array:
+def mesh_frame(scene: bpy.types.Scene, capture: str | None) -> Array:
     """(4, 4) matrix_world of the capture's mesh; the identity if it was deleted or its scale is
     0."""
     for collection in _collections(scene, capture):
