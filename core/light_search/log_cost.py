@@ -17,6 +17,7 @@ Array = NDArray[np.floating]
 LEVEL_SHARE = 0.3  # of the light is in pixels darker than the level: the level of lit surface, also
 # where most of the photo is in shadow or a highlight holds most of the light
 OFFSET = 0.6  # s in units of the level
+DARK = 0.25  # of s: a darker pixel says nothing about the albedo
 MAX_RESIDUAL = 1.0  # |log residual| from which a pixel counts no more
 MIN_RESIDUAL = 0.05  # |log residual| below which all pixels have the same weight
 GAIN_ROUNDS = 3  # of reweighted least squares
@@ -48,6 +49,12 @@ class Measured:
         """(n,) log(P + s) − log(L + s)."""
         s = self.offset
         return np.asarray(np.log((predicted + s) / (self.radiance + s)), np.float64)
+
+    def log_ratio(self, predicted: Array) -> NDArray[np.float64]:
+        """(n,) log(L / P), NaN where either is dark."""
+        known = (predicted > self.offset * DARK) & (self.radiance > self.offset * DARK)
+        safe = np.where(known, self.radiance, 1.0) / np.where(known, predicted, 1.0)
+        return np.where(known, np.log(safe), np.nan)
 
     def cost(self, predicted: Array) -> float:
         """Mean capped |residual|."""

@@ -12,7 +12,7 @@ Shading, highlights and cast shadows on the scanned mesh all enter the cost (log
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -23,13 +23,14 @@ from ..geometry import RayScene
 from ..light import DistantLight, Light
 from .brdf_dictionary import BrdfDictionary
 from .candidates import candidate_lights
+from .cell_albedo import CellAlbedo, CellGrid, shared_albedo
 from .coarse_search import Candidate, best_candidates
 from .jackknife import PIXELS as JACKKNIFE_PIXELS
 from .jackknife import standard_errors
 from .lamp_photo import LampPhoto
 from .local_search import cost_with_gain, minimised_light
 from .materials import shared_materials
-from .shading import LampPixels
+from .shading import LampPixels, predicted
 
 Array = NDArray[np.float64]
 R = TypeVar("R")
@@ -105,7 +106,14 @@ def find_lamps(
         )
         state.light = state.candidates[0].light
         states.append(state)
-    coefficients = _shared(states)
+    coefficients = _shared(states, [state.candidates[0].own for state in states])
+    grid = CellGrid.around(np.concatenate([state.fine.points for state in states]))
+    albedo = _albedo(states, coefficients, grid, rays, dictionary)
+    if albedo is not None:  # choose the candidates again
+        for state in states:
+            factor = albedo.at(state.coarse.points).astype(np.float32)[:, None]
+            state.candidates = [replace(c, radiance=c.radiance * factor) for c in state.candidates]
+        coefficients = _shared(states, [coefficients])
     for turn, scale in enumerate(FINE_SCALES):
         for place, state in enumerate(states):
             done = (turn + place / len(states)) / len(FINE_SCALES)
@@ -121,11 +129,14 @@ def find_lamps(
                     rays,
                     dictionary,
                 )
+        albedo = _albedo(states, coefficients, grid, rays, dictionary)
+        for state in states:
+            state.fine = state.fine.with_albedo(albedo)
         radiance = [s.fine.dictionary_radiance(s.light, rays, dictionary) for s in states]
         coefficients = shared_materials([s.fine for s in states], radiance, coefficients)
     steps_of_errors = standard_errors(
         [s.light for s in states], [s.lamp.light for s in states], [s.lamp.known for s in states],
-        [LampPixels.of(s.lamp.photos, JACKKNIFE_PIXELS) for s in states],
+        [s.fine.first(JACKKNIFE_PIXELS) for s in states],
         [s.reach for s in states], coefficients, rays, dictionary,
     )  # fmt: skip
     errors = yield from _scaled(steps_of_errors, FINE_SHARE, 1.0)
@@ -165,13 +176,31 @@ def _opened(lamp: UnknownLamp) -> tuple[_State, list[Light]]:
     return _State(lamp, coarse, fine, [], lamp.light, reach), lights
 
 
-def _shared(states: Sequence[_State]) -> Array:
-    """(m, k) coefficients of the shared materials; sets each lamp's best candidate for them."""
-    starts = sorted(states, key=lambda s: s.candidates[0].cost)[:MAX_STARTS]
+def _albedo(
+    states: Sequence[_State],
+    coefficients: Array,
+    grid: CellGrid,
+    rays: RayScene,
+    dictionary: BrdfDictionary,
+) -> CellAlbedo | None:
+    """The albedo of the surface's cells with the present lights and materials."""
+    ratios = []
+    for state in states:
+        even = replace(state.fine, albedo=np.ones(len(state.fine.albedo)))
+        radiance = even.dictionary_radiance(state.light, rays, dictionary)
+        values = predicted(radiance, coefficients, even.material)
+        ratios.append(even.measured.log_ratio(even.measured.gain(values) * values))
+    return shared_albedo(grid, [state.fine.points for state in states], ratios)
+
+
+def _shared(states: Sequence[_State], starts: Sequence[Array]) -> Array:
+    """(m, k) coefficients of the shared materials; sets each lamp's best candidate for them.
+
+    starts: (m, k) each, tried in turn.
+    """
     best: tuple[float, Array, list[Light]] | None = None
-    for start in starts:
-        found = start.candidates[0].own
-        found = found / max(float(found.sum()), 1e-30)
+    for start in starts[:MAX_STARTS]:
+        found = start / max(float(start.sum()), 1e-30)
         for _ in range(SHARED_ROUNDS):
             chosen, total = [], 0.0
             for state in states:

@@ -13,6 +13,7 @@ from ..geometry import RayScene
 from ..geometry.view import cast_shadow
 from ..light import Light
 from .brdf_dictionary import BrdfDictionary
+from .cell_albedo import CellAlbedo
 from .lamp_photo import LampPhoto
 from .log_cost import Measured
 
@@ -24,11 +25,12 @@ RIDGE = 1e-6  # relative, where non-negative least squares does not converge
 @dataclass(frozen=True)
 class LampPixels:
     """The pixels of all photos of one lamp. parts: by photo; measured: (n,) their radiance;
-    material: (n,) index of each pixel's material."""
+    material: (n,) index of each pixel's material; albedo: (n,) relative to its material's."""
 
     parts: tuple[LampPhoto, ...]
     measured: Measured
     material: NDArray[np.int16]
+    albedo: NDArray[np.float64]
 
     @classmethod
     def of(cls, photos: Sequence[LampPhoto], most: int) -> LampPixels:
@@ -36,7 +38,7 @@ class LampPixels:
         parts = tuple(photo.first(max(most // max(len(photos), 1), 1)) for photo in photos)
         radiance = np.concatenate([part.radiance for part in parts])
         material = np.concatenate([part.material for part in parts])
-        return cls(parts, Measured.of(radiance), material)
+        return cls(parts, Measured.of(radiance), material, np.ones(len(radiance)))
 
     def select(self, which: NDArray[np.bool_]) -> LampPixels:
         """The pixels of a mask (n,), with the same offset in the cost."""
@@ -46,7 +48,18 @@ class LampPixels:
             tuple(part.select(mask) for part, mask in zip(self.parts, masks, strict=True)),
             replace(self.measured, radiance=self.measured.radiance[which]),
             self.material[which],
+            self.albedo[which],
         )
+
+    def first(self, most: int) -> LampPixels:
+        """At most ``most`` of the pixels, the same number from each photo."""
+        each = max(most // max(len(self.parts), 1), 1)
+        kept = [np.arange(len(part.material)) < each for part in self.parts]
+        return self.select(np.concatenate(kept))
+
+    def with_albedo(self, albedo: CellAlbedo | None) -> LampPixels:
+        """The same pixels with the albedo of their cells."""
+        return self if albedo is None else replace(self, albedo=albedo.at(self.points))
 
     @property
     def points(self) -> NDArray[np.float64]:
@@ -58,7 +71,7 @@ class LampPixels:
     ) -> NDArray[np.float32]:
         """(n, k) radiance of the BRDFs, for a light of mean irradiance or intensity 1."""
         out = [_photo_radiance(part, light, rays, dictionary) for part in self.parts]
-        return np.concatenate(out)
+        return np.concatenate(out) * self.albedo[:, None].astype(np.float32)
 
 
 def _photo_radiance(
