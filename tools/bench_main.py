@@ -16,6 +16,7 @@ BENCHES = (
     "sampling",
     "fit",
     "light",
+    "find_light",
     "real",
     "solve",
     "noise",
