@@ -34,14 +34,17 @@ class SortedFiles:
 
 @dataclass(frozen=True)
 class LampText:
-    """The lamp of a new capture as TOML. location_line: gives its direction or position."""
+    """The lamp of a new capture as TOML. location_line: gives its direction or position, and states
+    whether that is a guess."""
 
     location_line: str
 
     @classmethod
-    def flash(cls, offset: Sequence[float]) -> LampText:
+    def flash(cls, offset: Sequence[float], guess: bool = False) -> LampText:
         """A flash on the camera. offset: right, down, forward of the lens, scan units."""
-        return cls(f"mounted = {_numbers(offset)}  # right, down, forward of the lens")
+        return cls(
+            f"mounted = {_numbers(offset)}  # right, down, forward of the lens{_mark(guess)}"
+        )
 
     @classmethod
     def sun(cls) -> LampText:
@@ -49,9 +52,25 @@ class LampText:
         return cls("sun = {}  # from the photos' time and place")
 
     @classmethod
-    def distant(cls, direction: Sequence[float]) -> LampText:
+    def distant(cls, direction: Sequence[float], guess: bool = False) -> LampText:
         """A distant lamp. direction: (3,) from the surface to the lamp, scan frame."""
-        return cls(f"direction = {_numbers(direction)}  # from the surface to the lamp")
+        return cls(
+            f"direction = {_numbers(direction)}  # from the surface to the lamp{_mark(guess)}"
+        )
+
+    @classmethod
+    def near(cls, position: Sequence[float], guess: bool = False) -> LampText:
+        """A near lamp. position: (3,) scan frame."""
+        return cls(f"position = {_numbers(position)}  # of the lamp{_mark(guess)}")
+
+
+@dataclass(frozen=True)
+class PhotoText:
+    """A lit photo of a new capture. camera: label in the scan; light: name of its lamp."""
+
+    file: Path
+    camera: str
+    light: str
 
 
 def sort_files(paths: Iterable[Path]) -> SortedFiles:
@@ -127,16 +146,33 @@ def write_new_capture(
             "rename them, or use the command `localise` to find their viewpoints",
             file=cameras,
         )
+    rows = [PhotoText(photo, found.label, "lamp") for photo, found in labels.items() if found]
+    write_capture(out, cameras, mesh, rows, [("lamp", lamp)], images, chunk)
+
+
+def write_capture(
+    out: Path,
+    cameras: Path,
+    mesh: Path,
+    photos: Sequence[PhotoText],
+    lamps: Sequence[tuple[str, LampText]],
+    images: Path | None = None,
+    chunk: str | None = None,
+) -> None:
+    """Write a capture file. The file appears only after it has been read back. Raises InputError.
+
+    lamps: (name, lamp). images: folder of the scan's own photos. chunk: of a project with several.
+    """
     scan = {"cameras": cameras, "mesh": mesh, "images": images}
     lines = ["[scan]", *(f"{k} = {_path(p, out)}" for k, p in scan.items() if p is not None)]
     if chunk is not None:
         lines.append(f"chunk = {_text(chunk)}")
-    lines += ["", "[[light]]", 'name = "lamp"', lamp.location_line, ""]
-    for photo, camera in labels.items():
-        assert camera is not None  # photos without a camera raise an error above
-        lines += ["[[photo]]", f"file = {_path(photo, out)}", f"camera = {_text(camera.label)}"]
-        lines += ['light = "lamp"', ""]
-    _write(out, "\n".join(lines))
+    for name, lamp in lamps:
+        lines += ["", "[[light]]", f"name = {_text(name)}", lamp.location_line]
+    for photo in photos:
+        lines += ["", "[[photo]]", f"file = {_path(photo.file, out)}"]
+        lines += [f"camera = {_text(photo.camera)}", f"light = {_text(photo.light)}"]
+    _write(out, "\n".join([*lines, ""]))
 
 
 def _write(out: Path, text: str) -> None:
@@ -158,6 +194,11 @@ def _path(path: Path, out: Path) -> str:
 def _text(text: str) -> str:
     """A TOML string; JSON strings are a subset of TOML's."""
     return json.dumps(text, ensure_ascii=False)
+
+
+def _mark(guess: bool) -> str:
+    """The line that marks a placeholder."""
+    return "\nguess = true" if guess else ""
 
 
 def _numbers(values: Sequence[float]) -> str:

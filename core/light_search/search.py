@@ -90,12 +90,17 @@ class _State:
 
 
 def find_lamps(
-    lamps: Sequence[UnknownLamp], materials: int, rays: RayScene, dictionary: BrdfDictionary
+    lamps: Sequence[UnknownLamp],
+    materials: int,
+    rays: RayScene,
+    dictionary: BrdfDictionary,
+    with_errors: bool = True,
 ) -> Generator[float, None, FoundLamps]:
     """Find all lamps of a capture together; a generator that yields the fraction done.
 
-    materials: their number m; a pixel's index is in LampPhoto.material. Raises PatinaError where a
-    lamp's photos show too little of the mesh.
+    materials: their number m; a pixel's index is in LampPhoto.material. with_errors False: without
+    standard errors (NaN), in two thirds of the time. Raises PatinaError where a lamp's photos show
+    too little of the mesh.
     """
     states = []
     for place, lamp in enumerate(lamps):
@@ -134,12 +139,15 @@ def find_lamps(
             state.fine = state.fine.with_albedo(albedo)
         radiance = [s.fine.dictionary_radiance(s.light, rays, dictionary) for s in states]
         coefficients = shared_materials([s.fine for s in states], radiance, coefficients)
-    steps_of_errors = standard_errors(
-        [s.light for s in states], [s.lamp.light for s in states], [s.lamp.known for s in states],
-        [s.fine.first(JACKKNIFE_PIXELS) for s in states],
-        [s.reach for s in states], coefficients, rays, dictionary,
-    )  # fmt: skip
-    errors = yield from _scaled(steps_of_errors, FINE_SHARE, 1.0)
+    errors = [float("nan")] * len(states)
+    if with_errors:
+        steps_of_errors = standard_errors(
+            [s.light for s in states], [s.lamp.light for s in states],
+            [s.lamp.known for s in states],
+            [s.fine.first(JACKKNIFE_PIXELS) for s in states],
+            [s.reach for s in states], coefficients, rays, dictionary,
+        )  # fmt: skip
+        errors = yield from _scaled(steps_of_errors, FINE_SHARE, 1.0)
     found: list[FoundLamp | None] = []
     for state, values, error in zip(states, radiance, errors, strict=True):
         cost = cost_with_gain(state.fine, values, coefficients)

@@ -1,0 +1,119 @@
+"""Find the scan camera of each lit photo."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+
+from numpy.typing import NDArray
+
+from ..errors import PatinaError
+from ..photo import Photo, Transfer, read_exif, read_photo
+from ..scan import Camera
+from ..scan.scan import find_camera
+from . import match_names
+from .draft import Draft
+from .opened_scan import OpenedScan
+from .photo_content import Picture, fits_size, match_content, outline, outside_share
+
+MAX_WRONG_OUTSIDE = 0.05  # of a photo's lit pixels outside the mesh, for a camera by number or time
+
+
+class _Outlines:
+    """Outlines of the mesh from every camera, computed once per size of picture."""
+
+    def __init__(self, opened: OpenedScan) -> None:
+        self.opened = opened
+        self.cache: dict[tuple[int, int], list[NDArray]] = {}
+
+    def __call__(self, shape: tuple[int, int]) -> list[NDArray]:
+        """(h, w) bool for each camera."""
+        if shape not in self.cache:
+            self.cache[shape] = [
+                outline(camera, shape, self.opened.rays) for camera in self.opened.scan.cameras
+            ]
+        return self.cache[shape]
+
+
+def matched(draft: Draft, opened: OpenedScan) -> Generator[float, None, Draft]:
+    """The draft with a camera for each photo that has none: by name, else by number or time if the
+    photo's content agrees, else by its content. Yields the fraction done."""
+    cameras = opened.scan.cameras
+    files = [photo.file for photo in draft.photos if photo.camera is None]
+    named = match_names.by_name(files, cameras)
+    rest = [file for file in files if file not in named]
+    stated, how = match_names.by_number(rest, cameras), "by number"
+    if not stated:
+        stated, how = _timed(rest, draft.images, cameras), "by time"
+    found = {file: (label, "by name") for file, label in named.items()}
+    outlines = _Outlines(opened)
+    for place, file in enumerate(stated):  # one photo that disagrees refutes the order of all
+        yield 0.2 * place / len(stated)
+        photo = _read(file)
+        if photo is not None and not _agrees(photo, stated[file], cameras, outlines):
+            stated = {}
+            break
+    found |= {file: (label, how) for file, label in stated.items()}
+    rest = [file for file in rest if file not in stated]
+    for place, file in enumerate(rest):
+        yield 0.2 + 0.8 * place / len(rest)
+        photo = _read(file)
+        if photo is None:
+            continue
+        match = yield from match_content(
+            photo.radiance, ~photo.clipped, cameras, outlines, opened.rays, opened.dictionary
+        )
+        if match is not None:
+            found[file] = match.label, "by content"
+    others_named = bool(named)  # photos among named ones are something else
+    photos = tuple(
+        replace(photo, camera=found[photo.file][0], how=found[photo.file][1])
+        if photo.file in found
+        else replace(photo, used=photo.used and (photo.camera is not None or not others_named))
+        for photo in draft.photos
+    )
+    return replace(draft, photos=photos)
+
+
+def _read(file: Path) -> Photo | None:
+    """The photo; None where it cannot be read, which was reported when the files were sorted."""
+    try:
+        return read_photo(file, Transfer.named("auto"))
+    except PatinaError:
+        return None
+
+
+def _agrees(photo: Photo, label: str, cameras: Sequence[Camera], outlines: _Outlines) -> bool:
+    """Whether the photo may be from this camera. A photo without a dark background may."""
+    picture = Picture.of(photo.radiance)
+    index = next(i for i, camera in enumerate(cameras) if camera.label == label)
+    height, width = photo.radiance.shape[:2]
+    if not fits_size(cameras[index], width, height):
+        return False
+    if not picture.dark_background:
+        return True
+    return outside_share(picture, outlines(picture.shape)[index]) < MAX_WRONG_OUTSIDE
+
+
+def _timed(
+    files: Sequence[Path], images: Path | None, cameras: Sequence[Camera]
+) -> dict[Path, str]:
+    """Photos by the order of time, where the scan's own photos are there."""
+    if images is None:
+        return {}
+    own: dict[str, datetime | None] = {}
+    for path in sorted(images.iterdir()):
+        camera = find_camera(cameras, path.name)
+        if camera is not None:
+            own[camera.label] = time_of(path)
+    return match_names.by_time({file: time_of(file) for file in files}, own)
+
+
+def time_of(file: Path) -> datetime | None:
+    """Time of a photo by its EXIF, None without one."""
+    try:
+        return read_exif(file).datetime_original
+    except PatinaError:
+        return None
