@@ -82,10 +82,14 @@ The open capture is not changed"""
                 properties = self._scan(context.scene)
             except PatinaError as error:
                 return report_and_cancel(self, error)
-            properties["photos_directory"] = self.directory
-            properties["photos"] = [{"name": one.name} for one in self.files]
-            way = "EXEC_DEFAULT" if "cameras" in properties else "INVOKE_DEFAULT"
-            return call_operator(self, bpy.ops.patina.new_capture, way, **properties)
+            photos = [{"name": one.name} for one in self.files]
+            if "cameras" not in properties:  # the rest of a new capture is added in the panel
+                return call_operator(
+                    self, bpy.ops.patina.add_files, _execution_context(),
+                    directory=self.directory, files=photos,
+                )  # fmt: skip
+            properties["photos_directory"], properties["photos"] = self.directory, photos
+            return call_operator(self, bpy.ops.patina.new_capture, "EXEC_DEFAULT", **properties)
         self.report({"INFO"}, "Nothing was imported.")
         return {"CANCELLED"}
 
@@ -129,7 +133,7 @@ class PATINA_FH_cameras(ViewportDropHandler, bpy.types.FileHandler):
 
     bl_idname = "PATINA_FH_cameras"
     bl_label = "Patina: Cameras of a Scan"
-    bl_import_operator = "patina.new_capture"
+    bl_import_operator = "patina.add_files"
     bl_file_extensions = ";".join(sorted(CAMERAS))
 
 

@@ -11,6 +11,7 @@ from ..core.errors import PatinaError
 from ..core.inputs import capture_data
 from ..core.inputs.lights import find_lights
 from ..core.inputs.photos import LitPhotos
+from ..scene.scan.enclosing_objects import hide_enclosing
 from ..scene.scan.scan_collection import create_scan_collection, find_earlier_import
 from ..scene.session.folders import rectified_folder
 from .report_errors import report_and_cancel
@@ -72,6 +73,9 @@ def import_into_scene(
         return report_and_cancel(operator, error)
     context.scene.patina.capture = str(path)
     context.scene.patina.mesh = made.mesh
+    hidden = hide_enclosing(context.scene, made.mesh)
+    if hidden:
+        operator.report({"INFO"}, f"Hidden, because they enclose the scan: {', '.join(hidden)}.")
     for selected in context.selected_objects:
         selected.select_set(False)
     made.mesh.select_set(True)

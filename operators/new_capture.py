@@ -1,4 +1,5 @@
-"""Scan stage: write a new capture file from cameras, a mesh and lit photos, and import it."""
+"""Scan stage: write a new capture file from cameras, a mesh and lit photos, and import it. For
+scripts: in a window the capture is set up in the panel (operators/draft)."""
 
 from __future__ import annotations
 
@@ -7,7 +8,6 @@ from pathlib import Path
 import bpy
 
 from ..core.capture.new_capture import (
-    CAMERAS,
     LampText,
     free_name,
     mesh_in_folder,
@@ -20,7 +20,7 @@ from ..core.scan.formats import read_reconstruction
 from ..scene.scan.scan_collection import create_reconstruction
 from ..scene.session.folders import rectified_folder
 from .import_capture import import_into_scene
-from .report_errors import report_and_cancel
+from .report_errors import call_operator, report_and_cancel
 
 
 class PATINA_OT_new_capture(bpy.types.Operator):
@@ -28,7 +28,7 @@ class PATINA_OT_new_capture(bpy.types.Operator):
 the mesh if the folder holds several. Without photos, only cameras and sparse points are imported"""
 
     bl_idname = "patina.new_capture"
-    bl_label = "New Capture"
+    bl_label = "New Capture from Files"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE", "HIDDEN"})  # type: ignore[valid-type]
@@ -92,27 +92,13 @@ the mesh if the folder holds several. Without photos, only cameras and sparse po
         max=1.0,
     )
 
-    def draw(self, context: bpy.types.Context) -> None:
-        """Draw the options in the side panel of the file browser."""
-        layout = self.layout
-        layout.use_property_split = True
-        for name in ("cameras", "mesh", "images", "chunk", "light"):
-            layout.prop(self, name)
-        if self.light == "FLASH":
-            layout.prop(self, "offset")
-        elif self.light == "DISTANT":
-            layout.prop(self, "direction")
-
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        dropped = Path(self.filepath) if self.filepath else None
-        if dropped is not None and dropped.suffix.lower() in CAMERAS:
-            self.cameras = str(model_of(dropped))
-        if self.cameras and not self.mesh:
-            self.mesh = str(mesh_in_folder(Path(self.cameras)) or "")
-        self.files.clear()
-        self.filepath = ""
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
+        """Set the capture up in the panel, where nothing chosen is lost."""
+        return call_operator(
+            self, bpy.ops.patina.add_files, "INVOKE_DEFAULT",
+            filepath=self.filepath, directory=self.directory,
+            files=[{"name": one.name} for one in self.files],
+        )  # fmt: skip
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
@@ -174,9 +160,12 @@ the mesh if the folder holds several. Without photos, only cameras and sparse po
         return {"FINISHED"}
 
     def _lamp(self) -> LampText:
+        given = self.properties.is_property_set
         if self.light == "FLASH":
-            return LampText.flash(self.offset)
-        return LampText.sun() if self.light == "SUN" else LampText.distant(self.direction)
+            return LampText.flash(self.offset, guess=not given("offset"))
+        if self.light == "SUN":
+            return LampText.sun()
+        return LampText.distant(self.direction, guess=not given("direction"))
 
     def _images(self) -> Path | None:
         return _path(self.images) if self.images else None

@@ -9,8 +9,10 @@ from ..scene.material.fallback import osl_hindrance
 from ..scene.material.measured_materials import measured_materials, measured_of
 from ..scene.photos.photo_list import looked_at
 from ..scene.property_keys import NO_OSL_REASON
+from ..scene.session.running_job import running
 from ..scene.session.scene_properties import DIAGNOSIS, capture_path, stored_result
 from .check_box import draw_check
+from .draft_box import draw_draft
 from .lamp_box import draw_lamp
 from .mask_box import draw_masks
 from .measured_box import draw_measured, icon_of
@@ -25,14 +27,21 @@ class PATINA_PT_scan(StagePanel, bpy.types.Panel):
     bl_label = "Scan"
     stage = "scan"
 
+    def draw(self, context: bpy.types.Context) -> None:
+        if context.scene.patina_draft.is_open and running(context.scene) is None:
+            draw_draft(self.layout, context.scene)
+        else:
+            super().draw(context)
+
     def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         mesh = context.scene.patina.mesh
         if mesh is None or mesh.name not in context.scene.objects:
-            layout.operator("patina.new_capture", icon="FILE_NEW")
+            layout.operator("patina.add_files", icon="FILE_NEW")
             layout.operator("patina.solve_photos", icon="CAMERA_DATA")
             layout.operator("patina.import_demo", icon="MONKEY")
         else:
             layout.operator("patina.import_capture", icon="IMPORT")
+            layout.operator("patina.add_files", icon="FILE_NEW")
 
 
 class PATINA_PT_photos(StagePanel, bpy.types.Panel):

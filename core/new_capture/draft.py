@@ -25,6 +25,9 @@ class LampKind(Enum):
     NEAR = "near"  # at a position that is found from the photos unless it is stated
 
 
+NEAR_KINDS = {LampKind.FLASH, LampKind.NEAR}  # their strength falls off with distance
+
+
 @dataclass(frozen=True)
 class DraftPhoto:
     """file: of a lit photo. camera: label, None without one. how: the camera was found, in words.
@@ -51,7 +54,8 @@ class DraftLamp:
 @dataclass(frozen=True)
 class Draft:
     """cameras, mesh: files, None while unknown. images: folder of the scan's own photos. found:
-    sentences on what was recognised. problems: sentences on what is wrong."""
+    sentences on what was recognised. problems: sentences on what is wrong.
+    camera_labels: of the scan."""
 
     cameras: Path | None = None
     mesh: Path | None = None
@@ -60,6 +64,7 @@ class Draft:
     lamps: tuple[DraftLamp, ...] = ()
     found: tuple[str, ...] = ()
     problems: tuple[str, ...] = ()
+    camera_labels: tuple[str, ...] = ()
 
     @property
     def missing(self) -> str | None:
@@ -74,6 +79,12 @@ class Draft:
         lost = [photo.file.name for photo in used if photo.camera is None]
         if lost:
             return f"{len(lost)} photos have no camera: {listed(lost)}. Localise or remove them"
+        kinds = {self.lamps[photo.lamp].kind for photo in used if photo.lamp < len(self.lamps)}
+        if kinds & NEAR_KINDS and kinds - NEAR_KINDS:
+            return (
+                "A lamp near the object or on the camera and one far away have no common scale. "
+                "Make two captures, or set all lamps to one of the two"
+            )
         return None
 
     def write(self, out: Path) -> None:

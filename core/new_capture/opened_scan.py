@@ -36,6 +36,7 @@ def opened_scan(draft: Draft) -> tuple[OpenedScan | None, Draft]:
         scan = read_scan(draft.cameras, draft.mesh, draft.images)
     except PatinaError as error:
         return None, replace(draft, problems=(*draft.problems, str(error)))
+    draft = replace(draft, camera_labels=tuple(camera.label for camera in scan.cameras))
     rays = RayScene.build(scan.mesh)
     places = np.linspace(0, len(scan.cameras) - 1, min(len(scan.cameras), CHECKED_CAMERAS))
     seen = [

@@ -50,7 +50,7 @@ def error_message(operator, **settings) -> str:
 def test_each_file_type_has_one_operator() -> None:
     assert drop("ball.capture.toml") == "patina.import_capture"
     for name in ("cameras.xml", "cameras.bin", "images.txt", "a.psx", "transforms.json"):
-        assert drop(name) == "patina.new_capture"
+        assert drop(name) == "patina.add_files"
     assert drop("a.jpg", "b.CR2", "c.exr", "d.png") == "patina.drop_photos"
 
 

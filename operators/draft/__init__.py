@@ -1,0 +1,1 @@
+"""Set up a new capture: add files, group photos by lamp, create it."""

@@ -1,0 +1,101 @@
+"""The new capture: what was recognised, its photos and lamps, and what is missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from ..core.new_capture import LampKind
+from ..scene.scan.capture_draft import PatinaDraft, PatinaDraftPhoto, draft_of
+from .wrapped import wrapped
+
+ROWS = 5
+CREATE_SCALE = 1.4  # height of the button to press next, in button heights
+VALUE_LABELS = {
+    LampKind.DISTANT.value: "Direction",
+    LampKind.FLASH.value: "Right, Down, Forward of Lens",
+    LampKind.NEAR.value: "Position",
+}
+
+
+class PATINA_UL_draft_photos(bpy.types.UIList):
+    """One row per photo: whether it is used, its name, its camera and its lamp."""
+
+    bl_idname = "PATINA_UL_draft_photos"
+
+    def draw_item(
+        self,
+        context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        data: PatinaDraft,
+        item: PatinaDraftPhoto,
+        icon: int,
+        active: PatinaDraft,
+        property_name: str,
+    ) -> None:
+        row = layout.row(align=True)
+        row.prop(item, "use", text="")
+        names = row.row(align=True)
+        names.active = item.use
+        names.label(text=item.name)
+        if item.use:
+            names.label(
+                text=item.camera or "No camera", icon="CAMERA_DATA" if item.camera else "ERROR"
+            )
+            names.label(text=item.lamp)
+
+
+def draw_draft(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Draw the draft and its buttons."""
+    state = scene.patina_draft
+    draft = draft_of(scene)
+    for problem in draft.problems:
+        wrapped(layout, problem, "ERROR")
+    for sentence in draft.found:
+        wrapped(layout, sentence, "CHECKMARK")
+    for name, path in (("Cameras", draft.cameras), ("Mesh", draft.mesh)):
+        row = layout.row()
+        row.label(
+            text=f"{name}: {Path(path).name if path else 'none yet'}",
+            icon="BLANK1" if path else "RADIOBUT_OFF",
+        )
+    layout.operator("patina.add_files", text="Add or Replace Files…", icon="FILE_FOLDER")
+    if draft.cameras is None:
+        layout.operator("patina.solve_photos", icon="CAMERA_DATA")
+    if len(state.photos):
+        _draw_photos(layout, state)
+    if draft.missing is not None:
+        wrapped(layout, draft.missing, "INFO")
+    row = layout.row()
+    row.scale_y = CREATE_SCALE
+    row.operator("patina.create_capture", icon="CHECKMARK")
+    layout.operator("patina.cancel_draft", icon="X")
+
+
+def _draw_photos(layout: bpy.types.UILayout, state: PatinaDraft) -> None:
+    layout.template_list(
+        PATINA_UL_draft_photos.bl_idname, "", state, "photos", state, "active_photo", rows=ROWS
+    )
+    photo = state.photos[min(state.active_photo, len(state.photos) - 1)]
+    column = layout.column(align=True)
+    column.prop_search(photo, "camera", state, "labels", icon="CAMERA_DATA")
+    if photo.how:
+        column.label(text=f"Matched {photo.how}", icon="BLANK1")
+    column.prop_search(photo, "lamp", state, "lamps", icon="LIGHT")
+    row = layout.row(align=True)
+    row.operator("patina.draft_lamps", text="One Lamp").way = "ONE"
+    row.operator("patina.draft_lamps", text="One per Photo").way = "EACH"
+    row.operator("patina.draft_lamps", text="", icon="ADD").way = "ADD"
+    lamp = state.lamps.get(photo.lamp)
+    if lamp is None:
+        return
+    column = layout.column(align=True)
+    column.prop(lamp, "kind", text="")
+    if lamp.kind in (LampKind.FLASH.value, LampKind.NEAR.value):
+        column.prop(lamp, "stated")
+    if lamp.kind == LampKind.DISTANT.value or (lamp.stated and lamp.kind in VALUE_LABELS):
+        column.prop(lamp, "values", text=VALUE_LABELS[lamp.kind])
+
+
+register, unregister = bpy.utils.register_classes_factory((PATINA_UL_draft_photos,))
