@@ -76,6 +76,7 @@ MODULES: tuple[str, ...] = (
     "scene.material.trait_update",
     "scene.material.file_cache",
     "scene.views.view_properties",
+    "scene.views.evidence_overlay",
     "scene.export.export_choice",
     "operators.import_capture",
     "operators.new_capture",

@@ -16,7 +16,8 @@ from ..scene.material.prepared_materials import PreparedJob
 from ..scene.session.last_diagnosis import keep_check, kept_check
 from ..scene.session.running_job import set_running
 from ..scene.session.scene_properties import DIAGNOSIS, capture_path, store_result
-from ..scene.views.evidence import paint_evidence, show_evidence
+from ..scene.views.evidence import paint_evidence
+from ..scene.views.evidence_overlay import toggle_evidence
 from .fit import can_fit, fit_job, show_result
 from .stepped import Stepped
 
@@ -122,7 +123,7 @@ def _label(cause: str) -> str:
 
 class PATINA_OT_show_evidence(bpy.types.Operator):
     """Colour the scanned mesh by the change that this cause makes in the photos: blue where they \
-get darker, red where they get brighter"""
+get darker, red where they get brighter. Press again to return to the earlier shading"""
 
     bl_idname = "patina.show_evidence"
     bl_label = "Show Where"
@@ -139,15 +140,11 @@ get darker, red where they get brighter"""
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        if not show_evidence(context.scene.patina.mesh, self.cause):
+        if toggle_evidence(context.scene.patina.mesh, self.cause) is None:
             self.report(
                 {"WARNING"}, f"The mesh has no colours for {_label(self.cause)}. Run Check again."
             )
             return {"CANCELLED"}
-        for area in context.screen.areas if context.screen else ():
-            if area.type == "VIEW_3D":
-                shading = area.spaces.active.shading
-                shading.type, shading.color_type, shading.light = "SOLID", "VERTEX", "FLAT"
         return {"FINISHED"}
 
 

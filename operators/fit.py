@@ -20,6 +20,7 @@ from ..scene.photos.lamps import with_dragged_lamps
 from ..scene.scan.apply_result import apply_result_steps
 from ..scene.scan.face_slots import with_painted_slots
 from ..scene.session.last_fit import keep_fit
+from ..scene.session.overlay_shading import leave_overlay
 from ..scene.session.preferences import preferences
 from ..scene.session.running_job import set_running
 from .stepped import Stepped
@@ -58,8 +59,10 @@ def fit_job(operator: bpy.types.Operator, scene: bpy.types.Scene) -> FitJob:
 def show_result(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> Iterator[None]:
     """Assign the materials to the mesh, one piece per yield, and report their warnings."""
     job = operator._job
+    leave_overlay()
     notes = yield from apply_result_steps(scene, result, job.stages, job.prepared)
     yield
+    scene.patina_photos.mesh_over = 1.0  # the fitted material is shown, not the photo over it
     keep_fit(result)
     trim_cache()
     for material in result.materials:

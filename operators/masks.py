@@ -23,6 +23,7 @@ from ..scene.paint.mask_images import (
 )
 from ..scene.photos.lamps import with_dragged_lamps
 from ..scene.scan.face_slots import show_proposal
+from ..scene.session.overlay_shading import leave_overlay
 from ..scene.session.running_job import set_running
 from .stepped import Stepped
 
@@ -87,6 +88,7 @@ class PATINA_OT_propose_materials(_CaptureJob, bpy.types.Operator):
     def _take(self, scene: bpy.types.Scene) -> None:
         found = self._job.result.proposal
         names = material_names(found.count)
+        leave_overlay()  # it would hide the proposal
         show_proposal(scene.patina.mesh, self._capture, found.labels, found.confidence, names)
         scene.patina.use_slots = found.count > 1
         if found.count == 1:

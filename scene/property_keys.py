@@ -8,6 +8,7 @@ SAMPLE_POINTS = "patina_samples"  # on the material: rows of MeasuredPoints
 INTERVAL_BAND = "patina_interval"  # on the material: values of a Band
 EARLIER_COEFFICIENTS = "patina_earlier_coefficients"  # on the material: of the previous fit
 EARLIER_BASIS = "patina_earlier_basis"  # on the material: basis of these
+EVIDENCE_COLOURS = "Patina: "  # prefix of colour attributes of the mesh, followed by the cause
 SHOWN_SLOTS = "patina_shown"  # face attribute: slots whose colours were drawn last
 LOBE_GROUP_LAYOUT = "patina_lobe_group"  # on a node group: version of its nodes
 LIGHT_NAME = "patina_light"  # on a lamp or a camera: the light's name in its capture
