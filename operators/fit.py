@@ -9,6 +9,7 @@ from pathlib import Path
 import bpy
 
 from ..core.capture import read_capture
+from ..core.counted import counted
 from ..core.errors import InputError
 from ..core.jobs import CaptureResult, FitJob
 from ..core.samples import Margins
@@ -97,7 +98,7 @@ class PATINA_OT_fit(Stepped, bpy.types.Operator):
             self.report({"WARNING"}, "The scene no longer exists; the materials were not applied.")
             return
         yield from show_result(self, scene, result)
-        self.report({"INFO"}, f"Materials measured: {len(result.materials)}.")
+        self.report({"INFO"}, f"{counted(len(result.materials), 'material')} measured.")
 
 
 register, _unregister_classes = bpy.utils.register_classes_factory((PATINA_OT_fit,))

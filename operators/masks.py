@@ -9,6 +9,7 @@ import bpy
 
 from ..core.capture import Capture, read_capture
 from ..core.concurrency.job import Job, Step
+from ..core.counted import counted
 from ..core.errors import InputError, PatinaError
 from ..core.masks.proposal import MOST_MATERIALS
 from ..core.masks.proposal_job import ProposalJob
@@ -95,7 +96,8 @@ class PATINA_OT_propose_materials(_CaptureJob, bpy.types.Operator):
             self.report({"INFO"}, "One material found; the photos show no difference.")
         else:
             self.report(
-                {"INFO"}, f"{found.count} materials proposed. Paint over faces that are wrong."
+                {"INFO"},
+                f"{counted(found.count, 'material')} proposed. Paint over faces that are wrong.",
             )
 
 

@@ -17,6 +17,15 @@ from ..scene.session.folders import rectified_folder
 from .report_errors import call_operator
 from .stepped import Stepped
 
+LENS_LABELS = {
+    "SIMPLE_RADIAL": "Simple Radial",
+    "RADIAL": "Radial",
+    "OPENCV": "OpenCV",
+    "OPENCV_FISHEYE": "OpenCV Fisheye",
+    "SIMPLE_PINHOLE": "Simple Pinhole",
+    "PINHOLE": "Pinhole",
+}  # lens models of COLMAP
+
 
 class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
     """Find the cameras of the photos in a folder, and sparse points of the surface"""
@@ -46,7 +55,7 @@ class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
     lens: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Lens",
         description="Distortion model of the lens",
-        items=[(name, name.replace("_", " ").title(), "") for name in LENSES],
+        items=[(name, label, "") for name, label in LENS_LABELS.items()],
         default=LENSES[0],
     )
     threads: bpy.props.IntProperty(  # type: ignore[valid-type]

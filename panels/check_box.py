@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 
+from ..core.diagnose.effects.labels import cause_label
 from ..scene.session.lengths import with_lengths
 from ..scene.session.overlay_shading import overlay_shown
 from ..scene.views.evidence import RESIDUAL
@@ -49,7 +50,7 @@ def draw_check(
     for cause in ranked[:MAX_CAUSES]:
         box = layout.box()
         row = box.row()
-        label = cause["cause"].replace("_", " ").title()
+        label = cause_label(cause["cause"])
         switch = causes.get(cause["cause"])
         if switch is not None and cause["accepted"]:
             row.prop(switch, "use", text="")

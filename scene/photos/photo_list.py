@@ -39,6 +39,9 @@ def _look(state: PatinaPhotos, context: bpy.types.Context) -> None:
     if 0 <= state.active < len(state.photos):
         leave_overlay()
         look_at(state.id_data, state.photos[state.active])
+        for area in context.screen.areas if context.screen else ():
+            if area.type == "VIEW_3D":
+                area.spaces.active.region_3d.view_perspective = "CAMERA"
 
 
 def _expose(state: PatinaPhotos, context: bpy.types.Context) -> None:

@@ -10,6 +10,7 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
+from ...core.diagnose.effects.labels import cause_label
 from ..property_keys import EVIDENCE_COLOURS
 from ..session.handlers import attach, detach
 from ..session.overlay_shading import enter_overlay, leave_overlay, overlay_shown, shows_overlay
@@ -37,9 +38,9 @@ def legend(cause: str) -> tuple[str, tuple[str, str, str]]:
     """(title, labels of the left end, the middle and the right end) of the colour scale."""
     percent = f"{100 * FULL_SCALE:.0f} %"
     if cause == RESIDUAL:
-        title = "Residual: photo compared with prediction"
+        title = "Residual: photos compared with prediction"
         return title, (f"{percent} darker", "equal", f"{percent} brighter")
-    title = f"{cause.replace('_', ' ').capitalize()}: change of the photo"
+    title = f"{cause_label(cause)}: change of the photos"
     return title, (f"{percent} darker", "none", f"{percent} brighter")
 
 

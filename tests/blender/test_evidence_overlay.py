@@ -120,6 +120,6 @@ def test_legend_states_scale_and_unit() -> None:
     overlay = extension("scene.views.evidence_overlay")
     evidence = extension("scene.views.evidence")
     title, ends = overlay.legend("camera_pose")
-    assert "Camera pose" in title and ends == ("10 % darker", "none", "10 % brighter")
+    assert "Wrong Camera Poses" in title and ends == ("10 % darker", "none", "10 % brighter")
     colours = overlay.scale_colours(3)
     assert np.allclose(colours, [evidence.DARKER, evidence.SAME, evidence.BRIGHTER])
