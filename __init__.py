@@ -63,6 +63,7 @@ MODULES: tuple[str, ...] = (
     "scene.session.scene_properties",
     "scene.session.session_state",
     "scene.photos.photo_list",
+    "scene.scan.orientation",
     "scene.paint.paint_properties",
     "scene.paint.swatches",
     "scene.paint.canvas",

@@ -14,6 +14,7 @@ from .check_box import draw_check
 from .lamp_box import draw_lamp
 from .mask_box import draw_masks
 from .measured_box import draw_measured, icon_of
+from .orientation_row import draw_orientation
 from .photo_rows import PATINA_UL_photos, draw_photos
 from .stage import StagePanel
 from .traits_box import status_label
@@ -33,6 +34,7 @@ class PATINA_PT_scan(StagePanel, bpy.types.Panel):
             layout.operator("patina.import_demo", icon="MONKEY")
         else:
             layout.operator("patina.import_capture", icon="IMPORT")
+        draw_orientation(layout, context.scene)
 
 
 class PATINA_PT_photos(StagePanel, bpy.types.Panel):

@@ -17,12 +17,14 @@ from ...core.inputs import capture_data
 from ...core.inputs.lights import Lights
 from ...core.photo.image import image_size
 from ...core.scan import Camera, Reconstruction, Scan
+from ...core.scan.up_axis import find_up
 from ..photos import cameras, rectified_photo
 from ..photos.lamps import create_lamp
 from ..photos.photo_list import LitPhoto, list_photos, mark_lit
 from ..property_keys import CAPTURE, ORIGIN, RESOLUTION
 from . import meshes
 from .face_slots import reassign_slots
+from .orientation import orient, store_found
 from .origin import frame_origin
 
 log = logging.getLogger(__name__)
@@ -82,6 +84,8 @@ def create_scan_collection(
     for lamp in lamps.values():
         lamp[CAPTURE] = str(capture.file)
     list_photos(scene, listed)
+    store_found(top, find_up(scan.cameras, scan.mesh))
+    orient(scene, top, scene.patina_orientation.up_axis)
     return ScanCollection(top, mesh, made, lamps)
 
 
@@ -113,6 +117,8 @@ def create_reconstruction(
         meshes.create_points_object(f"{name} points", found.points - origin, found.colours, top)
     made = _cameras(found.cameras, own, origin, centre, camera_collection)
     cameras.look_through(scene, next(iter(made.values())))
+    store_found(top, find_up(found.cameras))
+    orient(scene, top, scene.patina_orientation.up_axis)
 
 
 def _collections(
