@@ -73,9 +73,9 @@ class Stepped:
         self._started_at, self._time_left = time.perf_counter(), RemainingTime()
         self._timer = context.window_manager.event_timer_add(self.TICK, window=context.window)
         context.window_manager.modal_handler_add(self)
-        set_running(
-            Running(self._scene, self.PANEL, "Starting", 0.0)
-        )  # the first step may take long
+        state = Running(self._scene, self.PANEL, "Starting", 0.0)  # the first step may take long
+        set_running(state)
+        _show_status(context, state)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

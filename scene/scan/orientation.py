@@ -39,8 +39,7 @@ ITEMS = (
 
 
 def _changed(state: PatinaOrientation, context: bpy.types.Context) -> None:
-    for collection in scan_collections(state.id_data):
-        orient(state.id_data, collection, state.up_axis)
+    set_upright(state.id_data)
 
 
 class PatinaOrientation(bpy.types.PropertyGroup):
@@ -57,7 +56,8 @@ class PatinaOrientation(bpy.types.PropertyGroup):
 
 
 def store_found(collection: bpy.types.Collection, found: UpAxis | None) -> None:
-    """Store the up axis that was found on the collection of a scan."""
+    """Store the up axis that was found on the collection of a new scan."""
+    collection[APPLIED_UP] = AXES["Z"].tolist()
     if found is not None:
         collection[FOUND_UP] = [*found.direction, found.standard_error, found.agreement]
 
@@ -74,6 +74,12 @@ def found_up(collection: bpy.types.Collection) -> UpAxis | None:
 def scan_collections(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
     """The collections of imported scans in a scene."""
     return [c for c in scene.collection.children_recursive if APPLIED_UP in c]
+
+
+def set_upright(scene: bpy.types.Scene) -> None:
+    """Turn the scans of a scene so that the axis that the user has chosen points up."""
+    for collection in scan_collections(scene):
+        orient(scene, collection, scene.patina_orientation.up_axis)
 
 
 def orient(scene: bpy.types.Scene, collection: bpy.types.Collection, axis: str) -> None:

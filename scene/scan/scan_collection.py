@@ -24,7 +24,7 @@ from ..photos.photo_list import LitPhoto, list_photos, mark_lit
 from ..property_keys import CAPTURE, ORIGIN, RESOLUTION
 from . import meshes
 from .face_slots import reassign_slots
-from .orientation import orient, store_found
+from .orientation import store_found
 from .origin import frame_origin
 
 log = logging.getLogger(__name__)
@@ -45,7 +45,8 @@ class ScanCollection:
 def create_scan_collection(
     scene: bpy.types.Scene, capture: Capture, scan: Scan, found: Lights, rectified: Path
 ) -> ScanCollection:
-    """Create the objects of a capture in ``scene``. Call it only after all files were read.
+    """Create the objects of a capture in ``scene``, in the scan's frame (set_upright turns them
+    afterwards). Call it only after all files were read.
 
     rectified: folder for resampled photos of distorted lenses. Raises PatinaError if a lit photo
     cannot be read.
@@ -85,7 +86,6 @@ def create_scan_collection(
         lamp[CAPTURE] = str(capture.file)
     list_photos(scene, listed)
     store_found(top, find_up(scan.cameras, scan.mesh))
-    orient(scene, top, scene.patina_orientation.up_axis)
     return ScanCollection(top, mesh, made, lamps)
 
 
@@ -118,7 +118,6 @@ def create_reconstruction(
     made = _cameras(found.cameras, own, origin, centre, camera_collection)
     cameras.look_through(scene, next(iter(made.values())))
     store_found(top, find_up(found.cameras))
-    orient(scene, top, scene.patina_orientation.up_axis)
 
 
 def _collections(
