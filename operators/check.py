@@ -7,6 +7,8 @@ from collections.abc import Iterator
 
 import bpy
 
+from ..core.counted import counted
+from ..core.diagnose.effects.labels import cause_label
 from ..core.diagnose.selection.effect_subset import correctable_effects
 from ..core.jobs import CaptureResult
 from ..core.jobs.check_job import CheckJob
@@ -16,7 +18,8 @@ from ..scene.material.prepared_materials import PreparedJob
 from ..scene.session.last_diagnosis import keep_check, kept_check
 from ..scene.session.running_job import set_running
 from ..scene.session.scene_properties import DIAGNOSIS, capture_path, store_result
-from ..scene.views.evidence import paint_evidence, show_evidence
+from ..scene.views.evidence import paint_evidence
+from ..scene.views.evidence_overlay import toggle_evidence
 from .fit import can_fit, fit_job, show_result
 from .stepped import Stepped
 
@@ -68,7 +71,7 @@ the causes, and fit again with these causes included in the model"""
                 f"{mesh.name} no longer has the vertices of the scan, so it was not coloured.",
             )
         for trial in found.reported:
-            self.report({"WARNING"}, f"{_label(trial.effect.cause)}: {found.sentence(trial)}")
+            self.report({"WARNING"}, f"{cause_label(trial.effect.cause)}: {found.sentence(trial)}")
         if not found.causes:
             self.report({"INFO"}, "No known cause found.")
 
@@ -110,19 +113,14 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
 def _show(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> Iterator[None]:
     """Assign the materials to the mesh, and report which effects the fit included."""
     yield from show_result(operator, scene, result)
-    used = ", ".join(_label(effect.cause) for effect in result.effects)
+    used = ", ".join(cause_label(effect.cause).lower() for effect in result.effects)
     model = f"with {used} included in the model" if used else "without additional causes"
-    operator.report({"INFO"}, f"Materials fitted: {len(result.materials)}, {model}.")
-
-
-def _label(cause: str) -> str:
-    """The name of a cause as the sidebar shows it."""
-    return cause.replace("_", " ")
+    operator.report({"INFO"}, f"{counted(len(result.materials), 'material')} fitted, {model}.")
 
 
 class PATINA_OT_show_evidence(bpy.types.Operator):
     """Colour the scanned mesh by the change that this cause makes in the photos: blue where they \
-get darker, red where they get brighter"""
+get darker, red where they get brighter. Press again to return to the earlier shading"""
 
     bl_idname = "patina.show_evidence"
     bl_label = "Show Where"
@@ -139,15 +137,12 @@ get darker, red where they get brighter"""
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        if not show_evidence(context.scene.patina.mesh, self.cause):
+        if toggle_evidence(context.scene.patina.mesh, self.cause) is None:
             self.report(
-                {"WARNING"}, f"The mesh has no colours for {_label(self.cause)}. Run Check again."
+                {"WARNING"},
+                f"The mesh has no colours for {cause_label(self.cause)}. Run Check again.",
             )
             return {"CANCELLED"}
-        for area in context.screen.areas if context.screen else ():
-            if area.type == "VIEW_3D":
-                shading = area.spaces.active.shading
-                shading.type, shading.color_type, shading.light = "SOLID", "VERTEX", "FLAT"
         return {"FINISHED"}
 
 

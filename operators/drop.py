@@ -13,6 +13,7 @@ import bpy
 
 from ..core.capture import read_capture
 from ..core.capture.new_capture import CAMERAS, PHOTOS
+from ..core.counted import counted
 from ..core.errors import PatinaError
 from ..scene.session.running_job import running
 from ..scene.session.scene_properties import capture_path
@@ -61,9 +62,7 @@ The open capture is not changed"""
         layout = self.layout
         count = len(self.files)
         where = Path(self.directory).name
-        layout.label(
-            text=f"{count} photo{'s' * (count != 1)} from {where}; nothing is imported yet"
-        )
+        layout.label(text=f"{counted(count, 'photo')} from {where}; nothing is imported yet")
         if context.scene.patina.capture:
             name = Path(capture_path(context.scene)).name
             layout.label(text=f"{name} is not changed; a capture file lists its own photos")

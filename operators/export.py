@@ -9,7 +9,7 @@ import bpy
 from ..core.errors import InputError
 from ..scene.export.export_choice import FORMATS
 from ..scene.export.export_job import ExportJob
-from ..scene.session.folders import cache_folder
+from ..scene.session.folders import cache_folder, export_folder, within_extension
 from ..scene.session.running_job import set_running
 from ..scene.session.scene_properties import capture_path, stored_result
 from .report_errors import call_operator
@@ -74,7 +74,7 @@ The materials are those of the last fit; glTF and USD include the scanned mesh a
             self.formats = context.scene.patina_export.formats
         if not self.directory:
             self._picked = True
-            self.directory = str(Path(bpy.data.filepath or capture_path(context.scene)).parent)
+            self.directory = str(export_folder(capture_path(context.scene)))
             self.folder = self.folder or _default_name(context.scene)
             context.window_manager.fileselect_add(self)
             return {"RUNNING_MODAL"}
@@ -85,6 +85,13 @@ The materials are those of the last fit; glTF and USD include the scanned mesh a
             raise InputError("no folder given; choose the folder to write into", key="directory")
         formats = self.formats or context.scene.patina_export.formats
         parent = Path(bpy.path.abspath(self.directory))
+        if within_extension(parent):
+            raise InputError(
+                "is inside the folder of the extension, which an update deletes; choose another "
+                "folder",
+                file=parent,
+                key="directory",
+            )
         out = parent / (self.folder or _default_name(context.scene))
         self._job = ExportJob(context.scene, sorted(formats), out, cache_folder())
         self._scene = context.scene.name  # by name: a reference does not survive undo

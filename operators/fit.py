@@ -9,6 +9,7 @@ from pathlib import Path
 import bpy
 
 from ..core.capture import read_capture
+from ..core.counted import counted
 from ..core.errors import InputError
 from ..core.jobs import CaptureResult, FitJob
 from ..core.samples import Margins
@@ -20,6 +21,7 @@ from ..scene.photos.lamps import with_dragged_lamps
 from ..scene.scan.apply_result import apply_result_steps
 from ..scene.scan.face_slots import with_painted_slots
 from ..scene.session.last_fit import keep_fit
+from ..scene.session.overlay_shading import leave_overlay
 from ..scene.session.preferences import preferences
 from ..scene.session.running_job import set_running
 from .stepped import Stepped
@@ -58,8 +60,10 @@ def fit_job(operator: bpy.types.Operator, scene: bpy.types.Scene) -> FitJob:
 def show_result(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> Iterator[None]:
     """Assign the materials to the mesh, one piece per yield, and report their warnings."""
     job = operator._job
+    leave_overlay()
     notes = yield from apply_result_steps(scene, result, job.stages, job.prepared)
     yield
+    scene.patina_photos.mesh_over = 1.0  # the fitted material is shown, not the photo over it
     keep_fit(result)
     trim_cache()
     for material in result.materials:
@@ -94,7 +98,7 @@ class PATINA_OT_fit(Stepped, bpy.types.Operator):
             self.report({"WARNING"}, "The scene no longer exists; the materials were not applied.")
             return
         yield from show_result(self, scene, result)
-        self.report({"INFO"}, f"Materials measured: {len(result.materials)}.")
+        self.report({"INFO"}, f"{counted(len(result.materials), 'material')} measured.")
 
 
 register, _unregister_classes = bpy.utils.register_classes_factory((PATINA_OT_fit,))

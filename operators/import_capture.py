@@ -12,6 +12,7 @@ from ..core.inputs import capture_data
 from ..core.inputs.lights import find_lights
 from ..core.inputs.photos import LitPhotos
 from ..scene.scan.enclosing_objects import hide_enclosing
+from ..scene.scan.orientation import set_upright
 from ..scene.scan.scan_collection import create_scan_collection, find_earlier_import
 from ..scene.session.folders import rectified_folder
 from .report_errors import report_and_cancel
@@ -71,6 +72,7 @@ def import_into_scene(
         made = create_scan_collection(context.scene, capture, scan, lights, rectified_folder(path))
     except PatinaError as error:
         return report_and_cancel(operator, error)
+    set_upright(context.scene)
     context.scene.patina.capture = str(path)
     context.scene.patina.mesh = made.mesh
     hidden = hide_enclosing(context.scene, made.mesh)

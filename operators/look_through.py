@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.photos.photo_list import lit_photos, looked_at
+from ..scene.photos.photo_list import has_camera, lit_photos, looked_at
 
 
 class PATINA_OT_next_photo(bpy.types.Operator):
@@ -40,10 +40,34 @@ switched on"""
         index = (photos.index(current) + self.step) % len(photos) if current in photos else 0
         state = scene.patina_photos
         state.active = list(state.photos).index(photos[index])  # its update callback looks at it
-        for area in context.screen.areas if context.screen else ():
-            if area.type == "VIEW_3D":
-                area.spaces.active.region_3d.view_perspective = "CAMERA"
         return {"FINISHED"}
 
 
-register, unregister = bpy.utils.register_classes_factory((PATINA_OT_next_photo,))
+class PATINA_OT_look_through_photo(bpy.types.Operator):
+    """Look through the camera of this photo, with the photo behind the mesh and its lamp switched \
+on"""
+
+    bl_idname = "patina.look_through_photo"
+    bl_label = "Look Through Photo"
+    bl_options = {"REGISTER", "UNDO"}
+
+    index: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Photo", description="Number of the photo in the list", options={"HIDDEN", "SKIP_SAVE"}
+    )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        state = context.scene.patina_photos
+        if not 0 <= self.index < len(state.photos):
+            self.report({"ERROR"}, f"The list has no photo {self.index}; import the capture again")
+            return {"CANCELLED"}
+        if not has_camera(context.scene, state.photos[self.index]):
+            self.report(
+                {"ERROR"}, "The camera of this photo is not in the scene; import the capture again"
+            )
+            return {"CANCELLED"}
+        state.active = self.index  # its update callback looks at it, also if it was active before
+        return {"FINISHED"}
+
+
+CLASSES = (PATINA_OT_next_photo, PATINA_OT_look_through_photo)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -9,6 +9,7 @@ import bpy
 
 from ..core.capture import Capture, read_capture
 from ..core.concurrency.job import Job, Step
+from ..core.counted import counted
 from ..core.errors import InputError, PatinaError
 from ..core.masks.proposal import MOST_MATERIALS
 from ..core.masks.proposal_job import ProposalJob
@@ -23,6 +24,7 @@ from ..scene.paint.mask_images import (
 )
 from ..scene.photos.lamps import with_dragged_lamps
 from ..scene.scan.face_slots import show_proposal
+from ..scene.session.overlay_shading import leave_overlay
 from ..scene.session.running_job import set_running
 from .stepped import Stepped
 
@@ -87,13 +89,15 @@ class PATINA_OT_propose_materials(_CaptureJob, bpy.types.Operator):
     def _take(self, scene: bpy.types.Scene) -> None:
         found = self._job.result.proposal
         names = material_names(found.count)
+        leave_overlay()  # it would hide the proposal
         show_proposal(scene.patina.mesh, self._capture, found.labels, found.confidence, names)
         scene.patina.use_slots = found.count > 1
         if found.count == 1:
             self.report({"INFO"}, "One material found; the photos show no difference.")
         else:
             self.report(
-                {"INFO"}, f"{found.count} materials proposed. Paint over faces that are wrong."
+                {"INFO"},
+                f"{counted(found.count, 'material')} proposed. Paint over faces that are wrong.",
             )
 
 

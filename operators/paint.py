@@ -17,6 +17,7 @@ from ..scene.paint.paint_kinds import assign_slots, paints, update_brushes
 from ..scene.photos.photo_list import looked_at
 from ..scene.scan.face_slots import leave_edit_mode, new_slot
 from ..scene.session.image_editor import show_canvas
+from ..scene.session.overlay_shading import leave_overlay
 from ..scene.session.scene_properties import capture_path
 from .report_errors import report_and_cancel
 
@@ -93,6 +94,7 @@ class PATINA_OT_paint_mesh(_ScanOperator, bpy.types.Operator):
         scene, mesh = context.scene, context.scene.patina.mesh
         if not scene.patina.use_slots or len(mesh.material_slots) < 2:
             raise PatinaError("There is only one material; add another one, then paint its area")
+        leave_overlay()
         apply_strokes(scene)
         leave_edit_mode(mesh)
         context.view_layer.objects.active = mesh

@@ -12,10 +12,20 @@ from ..core.scan.readers.colmap import read_colmap
 from ..core.solve import SolveJob
 from ..core.solve.solution import MODEL
 from ..core.solve.solve import LENSES
+from ..scene.scan.orientation import set_upright
 from ..scene.scan.scan_collection import create_reconstruction
 from ..scene.session.folders import rectified_folder
 from .report_errors import call_operator
 from .stepped import Stepped
+
+LENS_LABELS = {
+    "SIMPLE_RADIAL": "Simple Radial",
+    "RADIAL": "Radial",
+    "OPENCV": "OpenCV",
+    "OPENCV_FISHEYE": "OpenCV Fisheye",
+    "SIMPLE_PINHOLE": "Simple Pinhole",
+    "PINHOLE": "Pinhole",
+}  # lens models of COLMAP
 
 
 class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
@@ -46,7 +56,7 @@ class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
     lens: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Lens",
         description="Distortion model of the lens",
-        items=[(name, name.replace("_", " ").title(), "") for name in LENSES],
+        items=[(name, label, "") for name, label in LENS_LABELS.items()],
         default=LENSES[0],
     )
     threads: bpy.props.IntProperty(  # type: ignore[valid-type]
@@ -104,6 +114,7 @@ class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
         # without photos behind the cameras: undistorting each would block Blender for seconds
         found = read_colmap(self._out / MODEL)
         create_reconstruction(scene, self._photos.name, found, None, rectified_folder(capture))
+        set_upright(scene)
 
 
 register, unregister = bpy.utils.register_classes_factory((PATINA_OT_solve_photos,))

@@ -14,6 +14,7 @@ from typing import Any
 import bpy
 
 from ..core.concurrency.background import BackgroundJob
+from ..core.concurrency.remaining_time import RemainingTime
 from ..core.errors import PatinaError
 from ..core.jobs import Job
 from ..scene.session.running_job import Running, running, set_running
@@ -21,7 +22,6 @@ from .report_errors import report_and_cancel
 
 APPLYING = "Applying the result"  # progress text
 REDRAW_INTERVAL = 0.25  # seconds between two updates of the progress bar
-MIN_FRACTION, MIN_SECONDS = 0.05, 2.0  # done and elapsed before the remaining time is estimated
 
 
 class Stepped:
@@ -39,6 +39,7 @@ class Stepped:
     _job: Job | None = None
     _background: BackgroundJob | None = None
     _applying: Iterator[None] | None = None
+    _time_left = RemainingTime()
     _scene: str = ""  # by name: a reference does not survive undo
 
     @classmethod
@@ -69,12 +70,12 @@ class Stepped:
         except PatinaError as error:
             self._stop(context)
             return report_and_cancel(self, error)
-        self._started_at = time.perf_counter()
+        self._started_at, self._time_left = time.perf_counter(), RemainingTime()
         self._timer = context.window_manager.event_timer_add(self.TICK, window=context.window)
         context.window_manager.modal_handler_add(self)
-        set_running(
-            Running(self._scene, self.PANEL, "Starting", 0.0)
-        )  # the first step may take long
+        state = Running(self._scene, self.PANEL, "Starting", 0.0)  # the first step may take long
+        set_running(state)
+        _show_status(context, state)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -108,12 +109,16 @@ class Stepped:
                     time.perf_counter() - self._drawn_at > REDRAW_INTERVAL
                 ):  # redrawing slows the job down
                     now = self._job.now
-                    set_running(
-                        Running(self._scene, self.PANEL, now.stage, now.fraction, self._remaining())
+                    state = Running(
+                        self._scene, self.PANEL, now.stage, now.fraction, self._remaining()
                     )
+                    set_running(state)
+                    _show_status(context, state)
                     self._drawn_at = time.perf_counter()
                 return True
-            set_running(Running(self._scene, self.PANEL, APPLYING, 1.0))
+            state = Running(self._scene, self.PANEL, APPLYING, 1.0)
+            set_running(state)
+            _show_status(context, state)
             self._applying = iter(self._finish(context) or ())
             return True
         return next(self._applying, self) is not self
@@ -136,11 +141,9 @@ class Stepped:
         raise NotImplementedError
 
     def _remaining(self) -> float | None:
-        """Remaining seconds, extrapolated from the elapsed time; None if it is too early."""
-        done, elapsed = self._job.now.fraction, time.perf_counter() - self._started_at
-        return (
-            elapsed * (1 - done) / done if done > MIN_FRACTION and elapsed > MIN_SECONDS else None
-        )
+        """Remaining seconds; None if it is too early."""
+        elapsed = time.perf_counter() - self._started_at
+        return self._time_left.update(elapsed, self._job.now.fraction)
 
     def _stop(self, context: bpy.types.Context) -> None:
         if self._background is not None:
@@ -151,3 +154,12 @@ class Stepped:
             context.window_manager.event_timer_remove(self._timer)
             self._timer = None
         set_running(None)
+        _show_status(context, None)
+
+
+def _show_status(context: bpy.types.Context, state: Running | None) -> None:
+    """Show the progress in the status bar of the window; None restores the bar."""
+    workspace = getattr(context, "workspace", None)
+    if workspace is not None:
+        text = None if state is None else f"{state.status} (ESC to cancel)"
+        workspace.status_text_set(text)

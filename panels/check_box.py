@@ -6,7 +6,9 @@ from typing import Any
 
 import bpy
 
+from ..core.diagnose.effects.labels import cause_label
 from ..scene.session.lengths import with_lengths
+from ..scene.session.overlay_shading import overlay_shown
 from ..scene.views.evidence import RESIDUAL
 from .wrapped import IN_BOX, wrapped
 
@@ -36,14 +38,19 @@ def draw_check(
             row = layout.row()
             row.label(text=label, icon="MATERIAL" if index else "NONE")
             row.label(text=f"{100 * before:.1f} → {100 * after:.1f} %")
-    show = layout.operator("patina.show_evidence", text="Show Residual", icon="OVERLAY")
-    show.cause = RESIDUAL
+    shown = overlay_shown()
+    layout.operator(
+        "patina.show_evidence",
+        text="Show Residual",
+        icon="OVERLAY",
+        depress=shown == RESIDUAL,
+    ).cause = RESIDUAL
     ranked = diagnosis["causes"]
     largest = max((_significance(c) for c in ranked), default=1.0)
     for cause in ranked[:MAX_CAUSES]:
         box = layout.box()
         row = box.row()
-        label = cause["cause"].replace("_", " ").title()
+        label = cause_label(cause["cause"])
         switch = causes.get(cause["cause"])
         if switch is not None and cause["accepted"]:
             row.prop(switch, "use", text="")
@@ -54,7 +61,12 @@ def draw_check(
             text=label, factor=min(max(_significance(cause) / max(largest, 1e-9), 0), 1), type="BAR"
         )
         if cause["accepted"]:
-            row.operator("patina.show_evidence", text="", icon="HIDE_OFF").cause = cause["cause"]
+            row.operator(
+                "patina.show_evidence",
+                text="",
+                icon="HIDE_OFF",
+                depress=shown == cause["cause"],
+            ).cause = cause["cause"]
         if cause["accepted"] or cause.get("contradicted"):
             wrapped(box, with_lengths(cause["sentence"]), "BLANK1", IN_BOX)
     if len(causes):

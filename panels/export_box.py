@@ -10,6 +10,7 @@ from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 
 from ..scene.export.export_choice import FORMATS, missing
+from .wrapped import wrapped
 
 PRESETS = "patina/export"  # below the user's presets
 
@@ -55,6 +56,9 @@ class PATINA_PT_export(bpy.types.Panel):
             row = grid.row(align=True)
             row.active = missing(scene, word) is None
             row.prop_enum(scene.patina_export, "formats", word)
+        for reason in (missing(scene, word) for word in FORMATS):
+            if reason is not None:
+                wrapped(layout, reason, "INFO")
         layout.operator("patina.export", icon="EXPORT")
 
 

@@ -14,6 +14,7 @@ from ..scene.photos.photo_list import (
 from ..scene.session.scene_properties import capture_path
 
 ROWS = 5
+MESH_OVER = "scene.patina_photos.mesh_over"
 
 
 class PATINA_UL_photos(bpy.types.UIList):
@@ -30,15 +31,20 @@ class PATINA_UL_photos(bpy.types.UIList):
         icon: int,
         active: PatinaPhotos,
         property_name: str,
+        index: int,
     ) -> None:
         available = has_camera(context.scene, item)
         row = layout.row(align=True)
         row.active = available
         preview = item.image.preview if item.image is not None else None
-        if preview is not None and preview.icon_id:
-            row.label(text=item.name, icon_value=preview.icon_id)
-        else:
-            row.label(text=item.name, icon="IMAGE_DATA")
+        shown = preview is not None and preview.icon_id
+        icons = {"icon_value": preview.icon_id} if shown else {"icon": "IMAGE_DATA"}
+        # a list calls nothing when its active row is clicked again; a button does
+        name = row.row(align=True)
+        name.alignment = "LEFT"
+        name.operator(
+            "patina.look_through_photo", text=item.name, emboss=False, **icons
+        ).index = index
         right = row.row(align=True)
         right.alignment = "RIGHT"
         right.label(text=item.light)
@@ -62,6 +68,12 @@ def draw_photos(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     if photo is None:
         return
     column = layout.column(align=True)
+    row = column.row(align=True)
+    for text, icon, value in (("Photo", "IMAGE_DATA", 0.0), ("Mesh", "MESH_DATA", 1.0)):
+        button = row.operator(
+            "wm.context_set_float", text=text, icon=icon, depress=state.mesh_over == value
+        )
+        button.data_path, button.value = MESH_OVER, value
     column.prop(state, "mesh_over", slider=True)
     column.prop(state, "view_exposure", slider=True)
     if photo.exposure:

@@ -16,6 +16,7 @@ from .draft_box import draw_draft
 from .lamp_box import draw_lamp
 from .mask_box import draw_masks
 from .measured_box import draw_measured, icon_of
+from .orientation_row import draw_orientation
 from .photo_rows import PATINA_UL_photos, draw_photos
 from .stage import StagePanel
 from .traits_box import status_label
@@ -42,6 +43,7 @@ class PATINA_PT_scan(StagePanel, bpy.types.Panel):
         else:
             layout.operator("patina.import_capture", icon="IMPORT")
             layout.operator("patina.add_files", icon="FILE_NEW")
+        draw_orientation(layout, context.scene)
 
 
 class PATINA_PT_photos(StagePanel, bpy.types.Panel):

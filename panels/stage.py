@@ -31,7 +31,8 @@ class StagePanel:
         if job is not None and job.panel == self.stage:
             layout.progress(text=job.text, factor=job.fraction, type="BAR")
             layout.label(text="Press ESC to cancel", icon="CANCEL")
-            return
+            layout = layout.column()
+            layout.enabled = False  # kept: a shorter panel would lose the scroll position
         found = stages(scene)
         own = found[self.stage]
         for line in own.has:

@@ -39,6 +39,7 @@ WORDS = {
 }
 HIGHLIGHT = " highlight"
 NO_EFFECT = "hardly visible"
+MUCH, SLIGHTLY = "much ", "slightly "  # before descriptions that several components share
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,26 @@ def words(found: list[Effect]) -> list[str]:
     """
     table = np.array([[getattr(e, f.name) for f in fields(Effect)] for e in found])
     largest = np.maximum(np.abs(table).max(axis=0), MIN_EFFECT)
-    return [_description(row, np.abs(row) / largest) for row in table]
+    described = [_description(row, np.abs(row) / largest) for row in table]
+    strength = (np.abs(table) / largest).max(axis=1)
+    return _distinct(described, strength)
+
+
+def _distinct(described: list[str], strength: Array) -> list[str]:
+    """The same descriptions, with their strength where several components have the same one.
+
+    strength: (n,) of the effect of each component.
+    """
+    found = list(described)
+    for phrase in {p for p in described if described.count(p) > 1 and p != NO_EFFECT}:
+        places = [i for i, p in enumerate(described) if p == phrase]
+        places.sort(key=lambda i: -strength[i])
+        degrees = ("", SLIGHTLY) if len(places) == 2 else (MUCH, "", SLIGHTLY)
+        for rank, place in enumerate(places):
+            degree = degrees[min(rank, len(degrees) - 1)]
+            extra = rank - len(degrees) + 2  # weaker ones are numbered
+            found[place] = f"{degree}{phrase}" + (f" ({extra})" if extra > 1 else "")
+    return found
 
 
 def _description(row: Array, share: Array) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
+from ..counted import counted
 from . import materialx, materialx_model, mitsuba, pbrt, tensor_file
 from .losses import Loss
 from .subject import Subject
@@ -30,7 +31,7 @@ def write_mtlx(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
             materialx.add_lobe_stack(root, name, stack)
             shown = partial(materialx_model.evaluate, stack)
             count = len(stack.lobes)
-            what = f"{name}, lobe stack of {count} lobe{'s' if count != 1 else ''}"
+            what = f"{name}, lobe stack of {counted(count, 'lobe')}"
             errors[f"{what}, by MaterialX's own shaders"] = subject.error(shown)
             errors[f"{what}, as Blender has it"] = subject.error(stack.evaluate)
         name = f"{subject.id}_openpbr"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..calibrate.chart import ChartTone, chart_tone
 from ..capture import Capture
+from ..counted import counted
 from ..errors import InputError, PatinaError
 from ..noise import MergedNoise, PixelNoise
 from ..photo import read_encoded
@@ -89,7 +90,7 @@ class LitPhotos:
             )
         except InputError as error:
             raise self.capture.error(str(error), "photo", place, "file") from error
-        notes = (f"{len(photo.files)} exposures merged.", *merged.warnings)
+        notes = (f"{counted(len(photo.files), 'exposure')} merged.", *merged.warnings)
         return LitPhoto(merged.radiance, merged.valid, MergedNoise(merged.variance), notes)
 
     def read_other(self, file: Path, exposure: float | None = None) -> LitPhoto:

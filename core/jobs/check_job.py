@@ -11,7 +11,7 @@ from .diagnose_job import EXAMINING, DiagnoseJob
 from .fit_job import CaptureResult, FitJob
 from .refit_job import RefitJob
 
-SHARE = 0.85  # fraction of the job's time before the second fit
+SHARE = 0.84  # fraction of the job's time before the second fit
 
 
 class CheckJob(Job):

@@ -16,6 +16,7 @@ from ..capture import Capture, LightEntry
 from ..concurrency.background import in_background
 from ..concurrency.job import Job, Step, finished
 from ..concurrency.steps import relayed
+from ..counted import counted
 from ..errors import FitError
 from ..fit import PaperFit
 from ..fit.held_out import HeldOutErrors, Judge
@@ -32,6 +33,7 @@ from ..samples.level import at_typical_level
 from ..scan import Scan
 from .applied_effects import AppliedEffect
 from .estimators import Estimate, estimate
+from .fit_times import ASSIGNING, FitTimes
 from .fit_warnings import black_photo_warnings, material_warnings, quality_warnings
 from .portable_materials import Portable, fit_portable
 from .sampling import PhotoSamples, take_samples
@@ -148,6 +150,7 @@ class FitJob(Job):
         self.basis = basis
         self.prepare = prepare
         self.result: CaptureResult | None = None
+        self._times = FitTimes.of(1, 0, [0], portable)
 
     def run(self) -> Iterator[Step]:
         """Read the scan and the photos, then fit one material after the other."""
@@ -166,23 +169,28 @@ class FitJob(Job):
             scan = self.prepare(scan)
         capture_data.check_face_attributes(capture, scan)
         capture_data.check_photos(capture, scan)
-        yield Step("reading the scan", 0.03)
-        rays = yield from in_background(
-            lambda: RayScene.build(scan.mesh), Step("reading the scan", 0.03)
+        pixels = _pixels(capture, scan)
+        self._times = FitTimes.before_sampling(
+            len(capture.photos), pixels, len(capture.materials), self.portable
         )
+        read = Step("reading the scan", 0.5 * self._times.read)
+        yield read
+        rays = yield from in_background(lambda: RayScene.build(scan.mesh), read)
         photos = LitPhotos.open(capture)
         lights = find_lights(capture, scan, photos)
         if any(entry.refine for entry in capture.lights):
             lights = yield from relayed(
                 refined(lights, capture, scan, photos, rays, basis),
-                lambda done: Step("refining the lights", 0.03 + 0.02 * done),
+                lambda done: Step("refining the lights", (0.5 + 0.5 * done) * self._times.read),
             )
         taken = yield from self._take_samples(scan, rays, photos, lights)
+        counts = [int(taken.counts[material.name].sum()) for material in capture.materials]
+        self._times = FitTimes.of(len(capture.photos), pixels, counts, self.portable)
         results = []
         known = lights.known and capture.fit.absolute
         for index in range(len(capture.materials)):
             results.append((yield from self._fit_material(index, taken, basis, known)))
-        yield Step("assigning materials to the mesh", 0.97)
+        yield Step("assigning materials to the mesh", 1 - ASSIGNING / self._times.total)
         self.result = CaptureResult(
             capture=capture,
             scan=scan,
@@ -190,7 +198,7 @@ class FitJob(Job):
             lights=lights,
             notes=(
                 *scan.notes,
-                *(f"{n} photo{'s' * (n > 1)}: {note}" for note, n in taken.notes.items()),
+                *(f"{counted(n, 'photo')}: {note}" for note, n in taken.notes.items()),
                 *photos.notes,
                 *lights.notes,
                 *capture_data.unused_settings(capture),
@@ -207,9 +215,10 @@ class FitJob(Job):
     ) -> Generator[Step, None, PhotoSamples]:
         """Sample all photos; each material's samples go to its sinks as they are taken."""
         sinks = {material.name: self.sinks(material.name) for material in self.capture.materials}
+        read, sampled = self._times.read, self._times.sampled
         taken = yield from relayed(
             take_samples(self.capture, scan, rays, photos, lights, sinks, self.threads),
-            lambda done: Step("sampling the photos", 0.05 + 0.35 * done),
+            lambda done: Step("sampling the photos", read + (sampled - read) * done),
         )
         self._check_light(taken)
         return taken
@@ -228,8 +237,7 @@ class FitJob(Job):
     ) -> Generator[Step, None, MaterialResult]:
         capture = self.capture
         name = capture.materials[index].name
-        share = 0.55 / len(capture.materials)
-        start = 0.4 + share * index
+        start, share = self._times.material(index)
         yield Step(f"fitting {name}", start)
         table = taken.kept.pop(name).table()
         self._check_samples(index, table, taken.marked[name], known)
@@ -277,7 +285,8 @@ class FitJob(Job):
         (photos,) samples taken from each photo."""
         capture, name = self.capture, self.capture.materials[index].name
         known, scale = unit
-        found = yield from self._estimate(index, table, basis, start, 0.8 * share, judge)
+        fit_share = share * (self._times.fit_share(index) if self.portable else 1.0)
+        found = yield from self._estimate(index, table, basis, start, fit_share, judge)
         warnings = material_warnings(table, found.fit, known)
         warnings += quality_warnings(found, capture)
         warnings += black_photo_warnings(table, capture) + found.notes
@@ -297,7 +306,7 @@ class FitJob(Job):
         )
         if not self.portable:
             return material
-        return (yield from with_portable(material, start + 0.8 * share, self.threads))
+        return (yield from with_portable(material, start + fit_share, self.threads))
 
     def _estimate(
         self,
@@ -383,3 +392,9 @@ class FitJob(Job):
         capture has no [[material]] table."""
         own = ("material", index, "name")
         return own if own in self.capture.lines else ("photo", 0, "file")
+
+
+def _pixels(capture: Capture, scan: Scan) -> int:
+    """The number of pixels of all lit photos."""
+    cameras = (capture_data.camera_of(capture, scan, k) for k in range(len(capture.photos)))
+    return sum(camera.width * camera.height for camera in cameras)

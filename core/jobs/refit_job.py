@@ -24,8 +24,10 @@ from .acceptance import Refit, Rejection, evidence_against, joint_log_growth
 from .applied_effects import AppliedEffect
 from .diagnose_job import DiagnoseJob, normal_deviation
 from .fit_job import CaptureResult, MaterialResult, with_portable
+from .fit_times import fit_seconds
 from .highlight_deconvolution_passes import fit_with_deconvolution
 
+ROUND_SHARE = 0.6  # of the remaining time of a second fit that one round takes
 STAGE = "fitting with the named causes"
 MIN_SAMPLES = 50  # of a material after correction
 CORRECTION_SHARE = 0.3  # fraction of a second fit's time that the correction of samples takes
@@ -75,7 +77,7 @@ class RefitJob(Job):
         begin = 0.0
         while selected:
             again, fitted, rejection = yield from self._with(before, found, selected, begin)
-            begin += 0.5 * (1 - begin)
+            begin += ROUND_SHARE * (1 - begin)
             if rejection is None:
                 self.fitted = fitted
                 break
@@ -85,7 +87,7 @@ class RefitJob(Job):
         for trial in dropped[-2::-1]:
             more = [t for t in order if t in selected or t is trial]
             other, fitted, rejection = yield from self._with(before, found, more, begin)
-            begin += 0.5 * (1 - begin)
+            begin += ROUND_SHARE * (1 - begin)
             if rejection is None:
                 selected, again, self.fitted = more, other, fitted
                 for reasons_of in (self.contradicted, self.unused):
@@ -122,15 +124,17 @@ class RefitJob(Job):
         self, before: CaptureResult, found: Diagnosis, selected: Sequence[Trial], done: float
     ) -> Generator[Step, None, tuple[list[Refit], ModelFit, Rejection | None]]:
         """(second fits, the joint fit they are based on, the evidence against them). done: fraction
-        of the job; this takes half of the rest."""
+        of the job; this takes ROUND_SHARE of the rest."""
         step = Step(STAGE, done)
         yield step
         causes = [trial.effect.cause for trial in selected]
         fitted = yield from in_background(lambda: with_causes(found, causes), step)
         again = []
-        share = 0.5 * (1 - done) / len(before.materials)
+        expected = np.array([fit_seconds(material.used) for material in before.materials])
+        shares = ROUND_SHARE * (1 - done) * expected / expected.sum()
         for index, material in enumerate(before.materials):
-            start = done + index * share
+            share = float(shares[index])
+            start = done + float(shares[:index].sum())
             try:
                 one = yield from self._refit_material(index, material, fitted.model, start, share)
             except PatinaError as error:

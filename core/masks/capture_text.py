@@ -12,6 +12,7 @@ import tomlkit
 
 from ..capture import Capture
 from ..capture.model import EXCLUDED_MASKS, SHADOW_MASK
+from ..counted import counted
 from ..errors import InputError
 
 PATHS: tuple[tuple[str, ...], ...] = (
@@ -56,8 +57,8 @@ def capture_with_masks(
     photos = document.get("photo", [])
     if len(photos) != len(capture.photos):
         raise InputError(
-            f"found {len(photos)} photos; expected {len(capture.photos)} as before; run again, "
-            "since the file has changed in the meantime",
+            f"found {counted(len(photos), 'photo')}; expected {len(capture.photos)} as before; "
+            "run again, since the file has changed in the meantime",
             file=capture.file,
         )
     for place in PATHS:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..counted import counted
 from ..errors import InputError
 from ..noise import PhotoNoise
 from .noise_estimate import estimate_noise
@@ -68,8 +69,8 @@ def merge_bracket(
     """
     if not photos or len(photos) != len(exposures):
         raise InputError(
-            f"found {len(photos)} photos and {len(exposures)} exposures; expected one exposure per "
-            "photo"
+            f"found {counted(len(photos), 'photo')} and "
+            f"{counted(len(exposures), 'exposure')}; expected one exposure per photo"
         )
     if not all(math.isfinite(e) and e > 0 for e in exposures):
         raise InputError(f"found exposures {list(exposures)}; expected positive numbers")

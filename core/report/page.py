@@ -7,6 +7,7 @@ from html import escape
 from pathlib import Path
 
 from ..concurrency.steps import drained
+from ..counted import counted
 from ..fit import PaperFit
 from ..jobs import CaptureResult
 from ..photo import write_png
@@ -32,8 +33,8 @@ def write_report(folder: Path, result: CaptureResult) -> Iterator[float]:
     if not result.effects:
         yield from _photo_rows(folder, result, body)
     head = (
-        f"{len(result.capture.photos)} lit photos · {len(result.scan.mesh.faces):,} faces · basis "
-        f"{result.basis.version}"
+        f"{counted(len(result.capture.photos), 'lit photo')} · "
+        f"{counted(len(result.scan.mesh.faces), 'face')} · basis {result.basis.version}"
     )
     html = page(result.capture.file.name, "".join(body), head)
     (folder / "index.html").write_text(html, "utf-8")

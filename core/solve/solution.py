@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pycolmap
 
+from ..counted import counted
 from ..errors import PatinaError
 
 MODEL = "sparse"
@@ -30,7 +31,8 @@ class Unplaced:
         """The reason, as a clause."""
         if not self.others:
             return "no matches with any other photo"
-        return f"{self.points} points match {self.others} photos: too few, or ambiguous"
+        points, others = counted(self.points, "point"), counted(self.others, "photo")
+        return f"{points} match {others}: too few, or ambiguous"
 
 
 @dataclass(frozen=True)
@@ -75,8 +77,8 @@ class Solution:
                 for name, value in zip(camera.params_info.split(","), camera.params, strict=False)
             )
             lines.append(
-                f"  {used} photos of {camera.width} x {camera.height}: {camera.model.name} "
-                f"{parameters}"
+                f"  {counted(used, 'photo')} of {camera.width} x {camera.height}: "
+                f"{camera.model.name} {parameters}"
             )
         _list(lines, "Photos without a pose", [f"{u.name}: {u.why}" for u in self.unplaced])
         _list(lines, "Unreadable photos", [why for _, why in self.unreadable])

@@ -14,6 +14,7 @@ import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
+from ..counted import counted
 from ..errors import PatinaError
 from ..photo import read_exif
 from .background import Work
@@ -100,7 +101,9 @@ def solve(photos: Sequence[PhotoFile], lens: str, threads: int | None, work: Wor
 
 def _check_count(count: int, why: str) -> None:
     if count < MIN_PHOTOS:
-        raise PatinaError(f"found {count} usable photos; expected at least {MIN_PHOTOS}{why}")
+        raise PatinaError(
+            f"found {counted(count, 'usable photo')}; expected at least {MIN_PHOTOS}{why}"
+        )
 
 
 def _first_reason(unreadable: Sequence[tuple[str, str]]) -> str:

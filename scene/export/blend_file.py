@@ -16,6 +16,7 @@ from ...core.scan import Reconstruction, Scan
 from ..material import material_nodes, osl_files
 from ..material.measured_materials import measured_materials
 from ..scan.apply_result import apply_result
+from ..scan.orientation import set_upright
 from ..scan.scan_collection import ScanCollection, create_reconstruction, create_scan_collection
 
 RECTIFIED = "rectified"  # folder next to the .blend for resampled photos of distorted lenses
@@ -39,6 +40,7 @@ def write_reconstruction(
     """Write a .blend with the cameras and sparse points of a reconstruction without a mesh."""
     scene = _new_file()
     create_reconstruction(scene, final.stem, found, images, path.parent / RECTIFIED)
+    set_upright(scene)
     save(path, final)
 
 
@@ -61,6 +63,7 @@ def _imported(path: Path, capture: Capture, scan: Scan, lights: Lights) -> ScanC
     made = create_scan_collection(scene, capture, scan, lights, path.parent / RECTIFIED)
     scene.patina.capture = str(capture.file)
     scene.patina.mesh = made.mesh
+    set_upright(scene)
     return made
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -28,7 +29,8 @@ def to_blend(
 ) -> list[Loss]:
     """Write materials.blend: the measured BRDF in Cycles with OSL, the Principled elsewhere."""
     file = f"{PREVIEW}.blend"
-    files = write_blend(folder / file, final / file, subjects)
+    record = json.loads(result.file.read_text("utf-8"))
+    files = write_blend(folder / file, final / file, subjects, record)
     reason = osl_missing()
     losses = []
     for subject in subjects:

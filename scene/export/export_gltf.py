@@ -11,6 +11,7 @@ from ...core.errors import PatinaError
 from .export_scene import select_only
 
 ADD_ON = "io_scene_gltf2"
+NO_COLOURS = "export_vertex_color"  # option of the exporter
 
 
 def write_glb(path: Path, objects: Sequence[bpy.types.Object]) -> None:
@@ -23,6 +24,7 @@ def write_glb(path: Path, objects: Sequence[bpy.types.Object]) -> None:
     if not hasattr(bpy.ops.export_scene, "gltf") or ADD_ON not in bpy.context.preferences.addons:
         addon_utils.enable(ADD_ON)
     select_only(objects)
+    known = bpy.ops.export_scene.gltf.get_rna_type().properties.keys()
     try:
         bpy.ops.export_scene.gltf(
             filepath=str(path),
@@ -35,6 +37,8 @@ def write_glb(path: Path, objects: Sequence[bpy.types.Object]) -> None:
             export_animations=False,
             export_extras=False,
             export_image_format="AUTO",
+            # a viewer multiplies the base colour by COLOR_0, which would change the material
+            **{NO_COLOURS: "NONE"} if NO_COLOURS in known else {},
         )
     except (RuntimeError, AttributeError) as error:
         message = " ".join(str(error).split())

@@ -24,17 +24,20 @@ from ...core.output_folder import check_out, staged_folder
 from ...core.report import write_report
 from ...core.report.result_json import write_json
 from ...core.result import read_result
+from ..material.trait_update import finish_updates
 from ..session.background_blender import in_background
 from ..session.last_fit import kept_fit
 from ..session.scene_properties import DIAGNOSIS, capture_path, stored_result
 from .export_choice import FORMATS, RECORD, REPORT, missing
+from .present_result import present_result
 
 MARKS = ("losses.txt", "result.json", "report/index.html")  # files that identify an earlier export
 FIT = ("scene.blend",)  # identifies the output folder of `fit`, which is never overwritten
 
 
 class ExportJob(Job):
-    """Export the last fit of a scene to a folder. formats: entries of FORMATS; cache: folder of the
+    """Export the materials of the last fit as they are now; record and report are those of the
+    fit. formats: entries of FORMATS; cache: folder of the
     bases that were computed from the user's own MERL files. Raises PatinaError."""
 
     def __init__(
@@ -54,6 +57,7 @@ class ExportJob(Job):
             if reason is not None:
                 raise PatinaError(reason)
         self.found, self.out, self.cache = found, check_out(out), cache
+        self.capture = capture
         _check_own(self.out)
         self.diagnosis = stored_result(capture, DIAGNOSIS)
         self.fit: CaptureResult | None = kept_fit(capture, found)
@@ -69,9 +73,11 @@ class ExportJob(Job):
             return
         with tempfile.TemporaryDirectory(prefix="patina-", ignore_cleanup_errors=True) as folder:
             result = Path(folder)
-            write_json(result / "result.json", self.found)
+            present = yield from present_result(self.found, self.capture)
+            write_json(result / "result.json", present)
             if set(exported) & set(BLENDER):
                 yield Step("copying the scene", 0.0)
+                finish_updates()  # the copy must show the present traits
                 _save_copy(result / "scene.blend")
                 yield from self._by_another_blender(result, exported)
             else:

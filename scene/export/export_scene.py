@@ -11,7 +11,10 @@ from ...core.appearance.principled_fit import PrincipledFit
 from ...core.errors import PatinaError
 from ...core.export.subject import Subject
 from ..material import material_nodes, osl_files
-from ..property_keys import MEASURED_NAME
+from ..material.preview import show_sphere
+from ..paint.mesh_paint import COLOUR_ATTRIBUTE
+from ..property_keys import EVIDENCE_COLOURS, MEASURED_NAME
+from .present_result import export_name
 
 RINGS, SEGMENTS = 48, 96  # of a preview sphere
 SPACING = 2.5  # between the centres of preview spheres of radius 1
@@ -31,11 +34,23 @@ def open_scan(file: Path, names: Sequence[str]) -> bpy.types.Object | None:
     mesh = bpy.context.scene.patina.mesh
     if mesh is None or mesh.type != "MESH" or mesh.name not in bpy.context.scene.objects:
         return None
-    assigned = {slot.material.get(MEASURED_NAME) for slot in mesh.material_slots if slot.material}
+    measured = [
+        s.material for s in mesh.material_slots if s.material and MEASURED_NAME in s.material
+    ]
+    assigned = {m[MEASURED_NAME] for m in measured} | {export_name(m) for m in measured}
     if not set(names) <= assigned:
         return None
+    _drop_own_colours(mesh.data)
     _show(mesh)
     return mesh
+
+
+def _drop_own_colours(mesh: bpy.types.Mesh) -> None:
+    """Remove the colours of evidence and of painted materials, which are not the scan's."""
+    attributes = mesh.color_attributes
+    for name in [a.name for a in attributes]:
+        if name.startswith(EVIDENCE_COLOURS) or name == COLOUR_ATTRIBUTE:
+            attributes.remove(attributes[name])
 
 
 def _show(thing: bpy.types.Object) -> None:
@@ -87,6 +102,8 @@ def create_materials(
                 files = osl_files.ensure_files(item.brdf)
         material = material_nodes.create_material(item.name, item.brdf, fit, files, lobes)
         material[MEASURED_NAME] = item.name
+        if whole:
+            show_sphere(material, item.brdf)
         made.append(material)
     return made
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 
+from ...core.counted import counted
 from ..property_keys import MEASURED_DATE, MEASURED_NAME, PROVENANCE
 from .trait_offsets import movable, state
 
@@ -21,17 +22,23 @@ def mark(material: bpy.types.Material, result: dict[str, Any]) -> bool:
     own = next((m for m in result["materials"] if m["name"] == name), None)
     if own is None:
         return False
-    origin = provenance(own, result, material.get(MEASURED_DATE, ""))
-    if movable(material) and state(material):
+    date = material.get(MEASURED_DATE) or own.get("date", "")
+    origin = provenance(own, result, date)
+    if own.get("changed") or (movable(material) and state(material)):
         origin["changed"] = "traits changed after the fit"
     material[PROVENANCE] = origin
     material.asset_mark()
     data = material.asset_data
     data.description = "; ".join(origin.values())
-    data.author = f"Patina {result['program']['version']}"
-    for tag in ("Patina", "measured", name, Path(result["capture"]).name.split(".")[0]):
-        data.tags.new(tag, skip_if_exists=True)
+    data.author = f"Patina {_version(result)}"
+    for tag in ("Patina", "measured", name, Path(result.get("capture", "")).name.split(".")[0]):
+        if tag:
+            data.tags.new(tag, skip_if_exists=True)
     return True
+
+
+def _version(result: dict[str, Any]) -> str:
+    return str(result.get("program", {}).get("version", "of an unknown version"))
 
 
 def provenance(material: dict[str, Any], result: dict[str, Any], date: str) -> dict[str, str]:
@@ -40,13 +47,14 @@ def provenance(material: dict[str, Any], result: dict[str, Any], date: str) -> d
     material: an entry of ``result["materials"]``; result: the content of result.json; date: ISO
     8601, "" if unknown.
     """
-    photos = sum(count > 0 for count in material["samples"]["per_photo"].values())
-    lights = [light["name"] for light in result["lights"]]
+    per_photo = material.get("samples", {}).get("per_photo", {})
+    photos = sum(count > 0 for count in per_photo.values())
+    lights = ", ".join(light["name"] for light in result.get("lights", [])) or "an unknown light"
     sentences = {
-        "scan": f"measured from {Path(result['capture']).name}",
-        "photos": f"{photos} lit photos under {', '.join(lights)}",
+        "scan": f"measured from {Path(result.get('capture', '')).name or 'an unknown capture'}",
+        "photos": f"{counted(photos, 'lit photo')} under {lights}",
         "date": f"on {date}" if date else "on an unknown date",
-        "version": f"by Patina {result['program']['version']}, {material['estimator']} method",
+        "version": f"by Patina {_version(result)}, {material.get('estimator', 'paper')} method",
     }
     held = material.get("held_out")
     if held:

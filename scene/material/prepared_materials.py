@@ -15,7 +15,7 @@ from .material_nodes import osl_missing
 from .osl_files import ShaderTables, shader_tables
 from .preview import Picture, spheres
 
-JOB_FRACTION = 0.98  # share of the fit in the progress of a PreparedJob
+JOB_FRACTION = 0.96  # share of the fit in the progress of a PreparedJob
 
 
 class Fitting(Protocol):

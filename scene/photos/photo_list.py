@@ -10,6 +10,7 @@ import bpy
 from ...core.capture.entries import PhotoEntry
 from ..property_keys import CAPTURE, LIGHT_NAME, LIT_PHOTO, LIT_PHOTO_INDEX
 from ..session.handlers import attach, detach, register_property_factory
+from ..session.overlay_shading import leave_overlay
 from ..session.scene_properties import capture_path
 from . import cameras, lamps
 from .exposed_photo import exposed
@@ -36,7 +37,11 @@ class PatinaPhoto(bpy.types.PropertyGroup):
 
 def _look(state: PatinaPhotos, context: bpy.types.Context) -> None:
     if 0 <= state.active < len(state.photos):
+        leave_overlay()
         look_at(state.id_data, state.photos[state.active])
+        for area in context.screen.areas if context.screen else ():
+            if area.type == "VIEW_3D":
+                area.spaces.active.region_3d.view_perspective = "CAMERA"
 
 
 def _expose(state: PatinaPhotos, context: bpy.types.Context) -> None:

@@ -17,12 +17,14 @@ from ...core.inputs import capture_data
 from ...core.inputs.lights import Lights
 from ...core.photo.image import image_size
 from ...core.scan import Camera, Reconstruction, Scan
+from ...core.scan.up_axis import find_up
 from ..photos import cameras, rectified_photo
 from ..photos.lamps import create_lamp
 from ..photos.photo_list import LitPhoto, list_photos, mark_lit
 from ..property_keys import CAPTURE, ORIGIN, RESOLUTION
 from . import meshes
 from .face_slots import reassign_slots
+from .orientation import store_found
 from .origin import frame_origin
 
 log = logging.getLogger(__name__)
@@ -43,7 +45,8 @@ class ScanCollection:
 def create_scan_collection(
     scene: bpy.types.Scene, capture: Capture, scan: Scan, found: Lights, rectified: Path
 ) -> ScanCollection:
-    """Create the objects of a capture in ``scene``. Call it only after all files were read.
+    """Create the objects of a capture in ``scene``, in the scan's frame (set_upright turns them
+    afterwards). Call it only after all files were read.
 
     rectified: folder for resampled photos of distorted lenses. Raises PatinaError if a lit photo
     cannot be read.
@@ -82,6 +85,7 @@ def create_scan_collection(
     for lamp in lamps.values():
         lamp[CAPTURE] = str(capture.file)
     list_photos(scene, listed)
+    store_found(top, find_up(scan.cameras, scan.mesh))
     return ScanCollection(top, mesh, made, lamps)
 
 
@@ -113,6 +117,7 @@ def create_reconstruction(
         meshes.create_points_object(f"{name} points", found.points - origin, found.colours, top)
     made = _cameras(found.cameras, own, origin, centre, camera_collection)
     cameras.look_through(scene, next(iter(made.values())))
+    store_found(top, find_up(found.cameras))
 
 
 def _collections(

@@ -11,6 +11,8 @@ import bpy
 from ...core.basis.merl_folder import user_cache
 from .preferences import PACKAGE, preferences
 
+EXTENSION = Path(__file__).resolve().parents[2]
+
 
 def blend_folder() -> Path:
     """The folder of the .blend if it can be written to, else the extension's own folder."""
@@ -19,6 +21,26 @@ def blend_folder() -> Path:
         if os.access(folder, os.W_OK):
             return folder
     return own_folder()
+
+
+def export_folder(capture: str) -> Path:
+    """Where exports are written by default: next to the .blend, else next to the capture, else in
+    the user's home. Never in the extension's own folder, which an update deletes.
+
+    capture: path of the capture file, "" if there is none.
+    """
+    for file in (bpy.data.filepath, capture):
+        folder = Path(file).parent
+        if file and not within_extension(folder) and os.access(folder, os.W_OK):
+            return folder
+    home = Path.home()
+    documents = home / "Documents"
+    return documents if documents.is_dir() else home
+
+
+def within_extension(folder: Path) -> bool:
+    """Whether a folder is that of the extension, or lies in it."""
+    return folder.resolve().is_relative_to(EXTENSION)
 
 
 def own_folder() -> Path:

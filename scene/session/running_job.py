@@ -26,6 +26,11 @@ class Running:
         """Text of the progress bar."""
         return self.stage if self.left is None else f"{self.stage}, {_time(self.left)} left"
 
+    @property
+    def status(self) -> str:
+        """Text of the status bar."""
+        return f"Patina: {100 * self.fraction:.0f} %, {self.text}"
+
 
 _now: Running | None = None
 

@@ -9,10 +9,10 @@ from scipy.spatial import cKDTree
 
 from ...core.diagnose.forward.pixels import Pixels
 from ...core.diagnose.selection.diagnosis import Diagnosis
+from ..property_keys import EVIDENCE_COLOURS
 
 Array = NDArray[np.floating]
 
-EVIDENCE = "Patina: "  # prefix of the attributes, followed by the cause or RESIDUAL
 RESIDUAL = "residual"  # attribute of the residual
 NEIGHBOURS = 8  # nearest pixels whose median colours a vertex
 FULL_SCALE = 0.10  # relative change of the pixel value with the full colour
@@ -43,7 +43,7 @@ def paint_evidence(
     near, distance = near.reshape(len(vertices), -1), distance.reshape(len(vertices), -1)
     observed = distance[:, 0] < 4 * np.median(distance[:, 0]) + 1e-9
     for name, values in colours.items():
-        _paint(mesh, EVIDENCE + name, np.median(values[near], axis=1), observed)
+        _paint(mesh, EVIDENCE_COLOURS + name, np.median(values[near], axis=1), observed)
     return True
 
 
@@ -51,7 +51,7 @@ def show_evidence(thing: bpy.types.Object, cause: str) -> bool:
     """Make the attribute of a cause the active colour, which Solid shading shows; False if it does
     not exist."""
     attributes = thing.data.color_attributes
-    wanted = attributes.get(EVIDENCE + cause)
+    wanted = attributes.get(EVIDENCE_COLOURS + cause)
     if wanted is None:
         return False
     attributes.active_color = wanted
@@ -61,7 +61,7 @@ def show_evidence(thing: bpy.types.Object, cause: str) -> bool:
 def drop_evidence(thing: bpy.types.Object) -> None:
     """Remove the attributes of the last check."""
     attributes = thing.data.color_attributes
-    for name in [a.name for a in attributes if a.name.startswith(EVIDENCE)]:
+    for name in [a.name for a in attributes if a.name.startswith(EVIDENCE_COLOURS)]:
         attributes.remove(attributes[name])
 
 

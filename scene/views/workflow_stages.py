@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ...core.counted import counted
+from ...core.diagnose.effects.labels import cause_label
 from ..material.measured_materials import measured_of
 from ..paint.mask_images import shadow_images
 from ..photos.photo_list import PatinaPhoto, lit_photos
@@ -72,7 +74,7 @@ def _photos(lit: list[PatinaPhoto]) -> Stage:
     if not lit:
         return Stage(missing="No lit photos yet; import a capture, which lists them")
     lights = {photo.light for photo in lit}
-    return Stage((f"{_count(len(lit), 'lit photo')}, {_count(len(lights), 'light')}",))
+    return Stage((f"{counted(len(lit), 'lit photo')}, {counted(len(lights), 'light')}",))
 
 
 def _masks(
@@ -83,13 +85,13 @@ def _masks(
     mesh, has = scene.patina.mesh, []
     if mesh is not None and mesh.type == "MESH" and scene.patina.use_slots:
         names = [shown_name(s.material) for s in mesh.material_slots if s.material]
-        has.append(f"{_count(len(names), 'material')} on the mesh: {', '.join(names)}")
+        has.append(f"{counted(len(names), 'material')} on the mesh: {', '.join(names)}")
     elif result is not None:
         names = [material["name"] for material in result.get("materials", [])]
-        has.append(f"{_count(len(names), 'material')}: {', '.join(names)}")
+        has.append(f"{counted(len(names), 'material')}: {', '.join(names)}")
     masks = shadow_images(capture)
     if masks:
-        has.append(_count(len(masks), "shadow mask"))
+        has.append(counted(len(masks), "shadow mask"))
         return Stage(tuple(has))
     missing = "No shadow masks; shadows are computed from the mesh only"
     return Stage(tuple(has), missing, "patina.shadow_masks", optional=True)
@@ -98,7 +100,7 @@ def _masks(
 def _fit(result: dict | None) -> Stage:  # type: ignore[type-arg]
     if result is None:
         return Stage(missing="Not measured yet", press="patina.fit")
-    has = f"{_count(len(result.get('materials', [])), 'material')} measured"
+    has = f"{counted(len(result.get('materials', [])), 'material')} measured"
     return Stage((has,), press="patina.fit", again="Fit Again")
 
 
@@ -106,7 +108,7 @@ def _check(diagnosis: dict | None) -> Stage:  # type: ignore[type-arg]
     if diagnosis is None:
         missing = "Not checked yet: do lights, cameras and mesh agree with the photos?"
         return Stage((), missing, "patina.check", optional=True)
-    causes = [cause.replace("_", " ") for cause in diagnosis["named"] if cause != "none"]
+    causes = [cause_label(cause).lower() for cause in diagnosis["named"] if cause != "none"]
     has = f"Found: {', '.join(causes)}" if causes else "No known cause found"
     return Stage((has,), press="patina.check", again="Check Again")
 
@@ -115,8 +117,4 @@ def _material(capture: str) -> Stage:
     found = measured_of(capture)
     if not found:
         return Stage(missing="No measured materials yet")
-    return Stage((_count(len(found), "measured material"),))
-
-
-def _count(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"
+    return Stage((counted(len(found), "measured material"),))

@@ -149,6 +149,22 @@ def test_trait_words_follow_from_measured_change() -> None:
     ]
 
 
+def test_no_two_components_have_the_same_words() -> None:
+    """Three sliders of one name cannot be told apart; the strongest effect comes first in words."""
+    grazing = [Effect(0.0, 0.0, 0.0, x) for x in (0.4, 1.2, -0.9, 0.15, 0.12)]
+    assert trait_words.words(grazing) == [
+        "more at grazing angles",
+        "much more at grazing angles",
+        "less at grazing angles",
+        "slightly more at grazing angles",
+        "slightly more at grazing angles (2)",
+    ]
+    own = trait_words.words(trait_words.effects(default_basis()))
+    assert len({word for word in own if word != trait_words.NO_EFFECT}) == len(own) - own.count(
+        trait_words.NO_EFFECT
+    )
+
+
 def test_component_changes_material_as_its_words_say() -> None:
     """On a material that none of the words was measured on, computed in another way."""
     basis = default_basis()

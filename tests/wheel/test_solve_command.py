@@ -118,6 +118,7 @@ def test_operator_adds_cameras_and_points_to_scene(photos: Path, tmp_path: Path)
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     patina.register()
+    bpy.context.scene.patina_orientation.up_axis = "Z"  # centres are compared with the files
     try:
         done = bpy.ops.patina.solve_photos(
             directory=str(photos), out=str(tmp_path / "out"), threads=2

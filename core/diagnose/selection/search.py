@@ -44,6 +44,8 @@ Array = NDArray[np.floating]
 
 MIN_OUTSIDE_BASIS = 0.002  # RMS change of the photos, relative, that outside_basis has to explain
 MAX_ACCEPTED_EFFECTS = 4
+# fraction of the time at which each round starts; after the second most searches end
+ROUND_STARTS = (0.16, 0.58, 0.92, 0.95, 0.98)
 NEARLY_BEST = 0.93  # fraction of the best gain at which the simpler effect is preferred
 MIN_TRIALS, PROMISING = 4, 0.25  # fitted at least; and all that promise this much of the best
 MAX_PATCH_P_VALUE = 0.05  # of patch effects that are fitted at all
@@ -69,7 +71,7 @@ def search(
     remaining = list(effects)
     failed: dict[str, float] = {}
     for turn in range(MAX_ACCEPTED_EFFECTS):
-        yield turn / MAX_ACCEPTED_EFFECTS
+        yield ROUND_STARTS[turn]
         trials, costs = [], held_out_costs(now)
         promising = [
             one
@@ -81,7 +83,8 @@ def search(
             trials.append(trial)
             if trial.gain < 0:  # it is tried again only if it promises more
                 failed[one.effect.cause] = one.gain
-            yield (turn + (place + 1) / (len(promising) + 1)) / MAX_ACCEPTED_EFFECTS
+            share = (place + 1) / (len(promising) + 1)
+            yield ROUND_STARTS[turn] + share * (ROUND_STARTS[turn + 1] - ROUND_STARTS[turn])
         trials.sort(key=lambda trial: -trial.gain)
         rounds.append(tuple(trials))
         best = _simplest([t for t in trials if t.is_significant and not t.contradicted_by])

@@ -28,6 +28,7 @@ from .shrinkage import shrinkage_step
 
 MIN_SAMPLES = 50
 CONVERGED = 0.02  # RMS change of ln(ρ·cosMap + ε) over the grid below which refinement ends
+FIRST_SOLVE, USUAL_ROUNDS = 0.25, 4  # for progress: time before the rounds, number of rounds
 CHUNK = 1 << 15  # directions
 # factor on the posterior's standard deviation: no material is a draw from the training distribution
 BAND_FACTOR = 1.5
@@ -113,14 +114,14 @@ def measured_steps(
     found, temperature = solve_power_likelihood(model, prior, s.floor)
     patches = Patches.of_points(table.point) if s.rounds else None
     for done in range(s.rounds if patches is not None else 0):
-        yield 0.1 + 0.6 * done / s.rounds
+        yield _fraction(done)
         brdf = LogTable.of(basis, found.coefficients)
         assert patches is not None
         # a BRDF unlike the measured materials is uncertain: normals must not absorb its errors
         tolerance = TOLERANCE * float(np.sqrt(temperature / MIN_TEMPERATURE))
         normals = refine_normals(table, patches, brdf, deviation, tolerance)
         deviation = normals.deviation
-        yield 0.1 + 0.6 * (done + 0.5) / s.rounds
+        yield _fraction(done + 0.5)
         model = CellModel.of(gather(normals.table, normals.error), basis)
         before = brdf.values
         temperature = max(MIN_TEMPERATURE, temperature / 2)
@@ -130,10 +131,10 @@ def measured_steps(
         change = LogTable.of(basis, found.coefficients).values - before
         if np.sqrt(np.mean(change**2)) < CONVERGED:
             break
-    yield 0.7
+    yield 0.95
     if np.isfinite(s.trust):
         prior = prior.with_grazing_prior(extrapolated(model, found.coefficients), s.trust)
-    yield 0.95
+    yield 0.97
     found = solve(model, prior, s.floor, found.coefficients, temperature=temperature)
     covariance = found.covariance()
     shrinkage = shrinkage_step(basis, covariance)
@@ -170,3 +171,11 @@ def _anchoring_text(trust: float) -> str:
         "Directions without samples follow the measured materials and microfacet lobes (the lobes "
         f"within a factor of {np.exp(trust):.1f})."
     )
+
+
+def _fraction(rounds: float) -> float:
+    """Fraction of a fit that is done after a number of rounds of normals. How many follow is not
+    known before they converge; they are mostly three to five."""
+    usual = USUAL_ROUNDS - 1
+    done = rounds / USUAL_ROUNDS if rounds < usual else 1 - 0.5 ** (rounds - usual) / USUAL_ROUNDS
+    return FIRST_SOLVE + (0.95 - FIRST_SOLVE) * done

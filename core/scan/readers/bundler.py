@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ...counted import counted
 from ...errors import InputError
 from ..camera import Camera, Pose
 from ..lenses.brown import brown_lens
@@ -65,9 +66,8 @@ def read_bundler(path: Path, images: Path | None, chunk: str | None) -> Reconstr
         notes.append(f"Photos without a pose that were left out: {unaligned}.")
     if estimated:
         notes.append(
-            f"The sizes of {estimated} photos were estimated from their features, because the "
-            "photos "
-            "were not found. Set [scan] images to the folder of the photos."
+            f"The sizes of {counted(estimated, 'photo')} were estimated from their features, "
+            "because the photos were not found. Set [scan] images to the folder of the photos."
         )
     places, colours, more = sparse_points(*tracks.all_points())
     return reconstruction_of(cameras, path, points=places, colours=colours, notes=(*notes, *more))

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ...counted import counted
 from ...errors import InputError
 from ..camera import Camera, Pose
 from ..parsing.json_record import as_number
@@ -122,8 +123,8 @@ def _reconstruction(
         cameras.append(Camera(label, width, height, *lens, poses[i], name))
     if missing:
         notes.append(
-            f"The sizes of {missing} photos were estimated from their features, because the photos "
-            "were not found. Set [scan] images to the folder of the photos."
+            f"The sizes of {counted(missing, 'photo')} were estimated from their features, "
+            "because the photos were not found. Set [scan] images to the folder of the photos."
         )
     if not flavour.measured and model.values[:, 8].any():
         notes.append(

@@ -13,6 +13,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
+from ...counted import counted
 from ...errors import InputError
 from ..camera import Camera, Pose
 from ..parsing.json_record import as_number, shown
@@ -141,7 +142,7 @@ def _numbers(
     values = [number for number in found if number is not None]
     if len(values) != len(found) or (len(found) != count and not (fewer and len(found) < count)):
         raise InputError(
-            f"is {shown(text)}; expected {count} finite number{'s' * (count > 1)}",
+            f"is {shown(text)}; expected {counted(count, 'finite number')}",
             file=file,
             key=f"xcr:{name}",
             line=line_of(element),

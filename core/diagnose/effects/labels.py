@@ -1,0 +1,31 @@
+"""Names of the causes for users."""
+
+from __future__ import annotations
+
+LABELS = {
+    "camera_pose": "Wrong Camera Poses",
+    "anisotropy": "Anisotropic Material",
+    "normal_error": "Errors of the Normals",
+    "veiling_glare": "Veiling Glare",
+    "cast_shadow": "Unexplained Shadows",
+    "light_intensity": "Wrong Light Intensity",
+    "second_material": "Second Material",
+    "light_direction": "Wrong Light Direction",
+    "subsurface": "Subsurface Scattering",
+    "camera_response": "Camera Response",
+    "area_light": "Area Light",
+    "outside_basis": "Material Outside the Basis",
+    "near_light": "Near Light",
+    "vignetting": "Vignetting",
+    "environment_reflection": "Environment Reflections",
+    "clipping": "Clipped Highlights",
+    "interreflection": "Interreflection",
+    "ambient_light": "Ambient Light",
+    "unknown": "Unknown Cause",
+    "residual": "Residual",
+}
+
+
+def cause_label(cause: str) -> str:
+    """The name of a cause in Title Case; unknown identifiers are put into words."""
+    return LABELS.get(cause, cause.replace("_", " ").title())

@@ -1,0 +1,22 @@
+"""Counts in sentences."""
+
+from __future__ import annotations
+
+from patina.core.counted import counted
+from patina.core.diagnose.effects import EFFECTS
+from patina.core.diagnose.effects.labels import LABELS, cause_label
+
+
+def test_only_one_is_singular() -> None:
+    assert [counted(n, "photo") for n in (0, 1, 2, 1200)] == [
+        "0 photos",
+        "1 photo",
+        "2 photos",
+        "1,200 photos",
+    ]
+    assert counted(2, "axis", "axes") == "2 axes"
+
+
+def test_every_cause_has_a_label() -> None:
+    assert {effect.cause for effect in EFFECTS} <= set(LABELS)
+    assert cause_label("camera_pose") == "Wrong Camera Poses"
