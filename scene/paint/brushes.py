@@ -36,8 +36,8 @@ def _make() -> None:
         brush = bpy.data.brushes.get(name)
         if brush is None:
             brush = bpy.data.brushes.new(name, mode=kind)
-            brush.asset_mark()  # only assets can be picked
             brush.size, brush.strength, brush.curve_preset = SIZE, 1.0, "CONSTANT"
+        brush.asset_mark()  # only assets can be activated
         for window in bpy.context.window_manager.windows:
             area = next((a for a in window.screen.areas if a.type == area_type), None)
             if area is None:
@@ -49,6 +49,7 @@ def _make() -> None:
                     asset_library_identifier="",
                     relative_asset_identifier=f"Brush/{name}",
                 )
+            brush.asset_clear()  # it stays active; saved files should not offer it as an asset
             break
         update_brushes(bpy.context)
 

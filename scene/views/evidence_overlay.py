@@ -16,7 +16,7 @@ from ..session.handlers import attach, detach
 from ..session.overlay_shading import enter_overlay, leave_overlay, overlay_shown, shows_overlay
 from .evidence import BRIGHTER, DARKER, FULL_SCALE, RESIDUAL, SAME, UNOBSERVED, show_evidence
 
-LEFT, BOTTOM, WIDTH, HEIGHT, TEXT, GAP = 24, 40, 240, 14, 12, 6  # pixels at a display scale of 1
+LEFT, BOTTOM, WIDTH, HEIGHT, TEXT, GAP = 24, 40, 280, 14, 12, 6  # pixels at a display scale of 1
 STEPS = 24  # coloured rectangles of the scale
 _handle: Any = None
 
