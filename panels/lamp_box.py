@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 
 from ..scene.photos.dragged_lamps import lamp_edits, lamp_of
+from ..scene.photos.lamp_knowledge import Source, lamp_knowledge
 from ..scene.photos.lamp_placement import DISTANT, MOUNTED, NEAR
 from ..scene.property_keys import CAPTURE, LAMP_KIND, LIGHT_NAME
 from ..scene.session.lengths import length
@@ -28,6 +29,11 @@ def draw_lamp(layout: bpy.types.UILayout, scene: bpy.types.Scene, camera: bpy.ty
         return
     kind = lamp.get(LAMP_KIND)
     column.label(text=f"{KINDS.get(kind, 'Light')}: {name}", icon=ICONS.get(kind, "LIGHT"))
+    known = lamp_knowledge(scene, lamp)
+    guess = known.source is Source.GUESS
+    column.label(text=known.sentence, icon="ERROR" if guess else "BLANK1")
+    if not guess and known.source is not Source.CAPTURE:
+        column.operator("patina.find_lights", text="Find Again from Photos").light = name
     hand = lamp_edits(scene, lamp)
     if hand:
         edits = {"position": hand.moved, "strength": hand.strength, "size": hand.softness}

@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 
+from ..core.fit.fit_quality import FitQuality, Rating
 from ..core.report.figures import either_side
 from .wrapped import IN_BOX, wrapped
 
@@ -28,10 +29,9 @@ def draw_measured(
         box.label(text=material["name"], icon="MATERIAL")
         if material["name"] in materials:
             box.template_icon(icon_value=icon_of(materials[material["name"]]), scale=SPHERE)
-        held = material.get("held_out")
-        if held:
-            error = f"Median error of held-out photos: {100 * held['typical']:.0f} %"
-            wrapped(box, error, "BLANK1", IN_BOX)
+        quality = quality_of(material)
+        icon = "ERROR" if quality.rating is Rating.POOR else "BLANK1"
+        wrapped(box, quality.sentence, icon, IN_BOX)
         if "interval_90" in material["uncertainty"]:
             median = either_side(material["uncertainty"]["median"])
             interval = f"90 % interval of the BRDF: {median} (median over directions)"
@@ -40,6 +40,12 @@ def draw_measured(
         for warning in material["warnings"]:
             wrapped(box, warning, "ERROR", IN_BOX)
         _coefficients(layout, material)
+
+
+def quality_of(material: Mapping[str, Any]) -> FitQuality:
+    """The quality of a material of result.json, also of one that an earlier version wrote."""
+    held = material.get("held_out")
+    return FitQuality(held["typical"] if held else None)
 
 
 def _coefficients(layout: bpy.types.UILayout, material: dict[str, Any]) -> None:

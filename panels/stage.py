@@ -8,7 +8,7 @@ from ..scene.session.running_job import running
 from ..scene.views.workflow_stages import next_stage, stages
 from .wrapped import wrapped
 
-DONE, NOW, LATER = "CHECKMARK", "PLAY", "RADIOBUT_OFF"
+DONE, DOUBTFUL, NOW, LATER = "CHECKMARK", "ERROR", "PLAY", "RADIOBUT_OFF"
 NEXT_BUTTON_SCALE = 1.4  # height of the button to press next, in button heights
 
 
@@ -23,7 +23,9 @@ class StagePanel:
     def draw_header(self, context: bpy.types.Context) -> None:
         found = stages(context.scene)
         now = next_stage(found) == self.stage
-        self.layout.label(icon=DONE if found[self.stage].done else NOW if now else LATER)
+        own = found[self.stage]
+        done = DOUBTFUL if own.doubts else DONE
+        self.layout.label(icon=done if own.done else NOW if now else LATER)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
@@ -37,6 +39,10 @@ class StagePanel:
         own = found[self.stage]
         for line in own.has:
             wrapped(layout, line, "BLANK1")
+        for line in own.doubts:
+            wrapped(layout, line, DOUBTFUL)
+        if own.remedy:
+            layout.operator(own.remedy)
         if own.missing is not None:
             wrapped(layout, own.missing, "INFO")
         if own.press and not own.done:

@@ -25,7 +25,6 @@ MATERIALS = (
 SCANS = (("jar", "bumpy", 1.5), ("pebble", "wavy", 1.0), ("knot", "blurred", 1.0))
 LAMPS, PHOTOS_OF_LAMP = 4, 2
 SEED = 100  # of the first capture's cameras, lamps and noise
-RADIUS_90 = np.sqrt(2 * np.log(10))  # standard errors within which 90 % of directions lie
 FLASHES = (
     (0, 2, (0.08, -0.25, 0.05)), (1, 0, (0.0, -0.15, 0.0)), (2, 5, (-0.3, -0.1, 0.1)),
     (0, 3, (0.02, 0.06, 0.0)),
@@ -45,6 +44,8 @@ class Found:
 
 def run(data: Path) -> None:
     """Print the tables of docs/method/measurements.md."""
+    from patina.core.light_search.jackknife import RADIUS_90
+
     print("## lights found from photos: directions (degrees)\n")
     print("| capture | error of each lamp | standard error | fit error, found ÷ true | seconds |")
     print("|---|---|---|---|---|")

@@ -64,7 +64,7 @@ class LightEntry:
     strength: (3,) irradiance of a distant light, or intensity of a near one. angle: radians,
     angular diameter of a distant source; radius: of a near source, scan units; beam: radians, angle
     from the axis at which half of the intensity is left. refine: the given values are start values
-    of an optimisation. guess: nobody measured the direction or position, it is a placeholder.
+    of an optimisation. guess: the direction or position is a placeholder that was not measured.
     standard_error: of the direction (radians), or of the position or offset (scan units), where it
     was found from photos. charted: the colour chart of [tone] gives the strength."""
 

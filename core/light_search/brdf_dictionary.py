@@ -1,6 +1,6 @@
 """A few measured BRDFs whose non-negative sums stand for an unknown material.
 
-While a light is unknown, the material must be flexible enough for felt and for metal, but must not
+While a light is unknown, the material must be flexible enough for cloth and for metal, but must not
 explain a wrong light by a reflectance that no surface has. Non-negative sums of measured BRDFs are
 both: each of them is a possible BRDF.
 """

@@ -1,4 +1,5 @@
-"""What is known of a flash on a camera before any photo: it is beside the lens, not before it.
+"""What is known of a flash on a camera before any photo: it is next to the lens, not in
+front of it.
 
 Forward offset and beam profile change the falloff across a photo in nearly the same way, so photos
 of a small object determine neither alone.

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import f as f_distribution
 
 from ..geometry import RayScene
 from ..light import DistantLight, Light, MountedLight, NearLight
@@ -24,6 +25,8 @@ from .shading import LampPixels
 Array = NDArray[np.float64]
 
 GROUPS = 8
+# standard errors within which 90 % of directions lie: Hotelling's T² in two dimensions
+RADIUS_90 = float(np.sqrt(2 * (GROUPS - 1) / (GROUPS - 2) * f_distribution.ppf(0.9, 2, GROUPS - 2)))
 BLOCKS = 5  # of the surface along its longest axis
 PIXELS = 3000  # of a lamp
 SCALES = (0.3, 0.12)  # of the simplex of each repetition's searches

@@ -58,7 +58,8 @@ class UnknownLamp:
 @dataclass(frozen=True)
 class FoundLamp:
     """light: found. standard_error: per axis, of the direction (radians) or of the position or
-    offset (scan units); 90 % of directions lie within 2.15 of it. cost: mean capped |log residual|.
+    offset (scan units); 90 % of directions lie within 2.84 of it
+    (jackknife.RADIUS_90). cost: mean capped |log residual|.
     other: (3,) a different direction that explains the photos almost as well, None if there is
     none."""
 

@@ -103,7 +103,7 @@ class Draft:
 
 
 def lamp_text(lamp: DraftLamp) -> LampText:
-    """The lamp's line in a capture file; what nobody stated is marked as a guess."""
+    """The lamp's line in a capture file; what was not stated is marked as a guess."""
     if lamp.kind is LampKind.SUN:
         return LampText.sun()
     make = {

@@ -127,7 +127,7 @@ def _searched(parts: list[LampPhoto], opened: OpenedScan) -> Generator[float, No
 
 
 def _from_camera(direction: Array, camera: Camera, opened: OpenedScan) -> bool:
-    """Whether the light comes from beside the camera."""
+    """Whether the light comes from the direction of the camera."""
     towards = camera.pose.centre - _centre(opened.scan.mesh)
     if camera.orthographic:
         towards = -camera.pose.rotation[2]

@@ -13,6 +13,7 @@ import numpy as np
 from ..appearance.lobe_stack import LobeStack
 from ..files import write_text_atomic
 from ..fit import PaperFit
+from ..fit.fit_quality import FitQuality
 from ..fit.measured_result import MeasuredResult
 from ..fit.spread import Spread
 from ..inputs import capture_data
@@ -115,6 +116,11 @@ def parameters(
     }
 
 
+def _quality(material: MaterialResult) -> dict[str, str]:
+    quality = FitQuality(None if material.held_out is None else material.held_out.typical)
+    return {"rating": quality.rating.value, "sentence": quality.sentence}
+
+
 def _material(result: CaptureResult, material: MaterialResult) -> dict[str, Any]:
     fit, held, principled = material.fit, material.held_out, material.principled
     names = [result.capture.photo_name(place) for place in range(len(result.capture.photos))]
@@ -144,6 +150,7 @@ def _material(result: CaptureResult, material: MaterialResult) -> dict[str, Any]
             "typical": held.typical,
             "per_photo": {names[i]: e for i, e in held.per_photo.items()},
         },
+        "quality": _quality(material),
         "uncertainty": {
             "measure": measure,
             "median": material.spread.median,

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 
 from ...core.capture import Capture, LightEntry
 from ...core.errors import PatinaError
-from ..property_keys import CAPTURE, INTENSITY_KNOWN, LAMP_KIND, LIGHT_NAME, ORIGIN
+from ..property_keys import (
+    CAPTURE,
+    INTENSITY_KNOWN,
+    LAMP_KIND,
+    LIGHT_GUESS,
+    LIGHT_NAME,
+    ORIGIN,
+    STATED_ERROR,
+)
 from . import lamp_placement
 from .found_lights import found_values
 from .lamp_placement import DISTANT, FROM_CAMERA, MOUNTED, NEAR, Placement
@@ -119,6 +127,12 @@ def accept(capture: Capture, scene: bpy.types.Scene) -> None:
         hand = None if lamp is None else lamp_edits(scene, lamp)
         if hand:
             lamp[lamp_placement.LAMP_AS_IMPORTED] = hand.now.values
+            if hand.moved:
+                lamp[LIGHT_GUESS] = False
+                error = (found_values(lamp, hand.now) or {}).get("standard_error")
+                lamp.pop(STATED_ERROR, None)
+                if error is not None:
+                    lamp[STATED_ERROR] = error
 
 
 def _differs(kind: str, now: Placement, made: Placement) -> bool:

@@ -21,7 +21,7 @@ from ...core.scan.up_axis import find_up
 from ..photos import cameras, rectified_photo
 from ..photos.lamps import create_lamp
 from ..photos.photo_list import LitPhoto, list_photos, mark_lit
-from ..property_keys import CAPTURE, ORIGIN, RESOLUTION
+from ..property_keys import CAPTURE, LIGHT_GUESS, ORIGIN, RESOLUTION, STATED_ERROR
 from . import meshes
 from .face_slots import reassign_slots
 from .orientation import store_found
@@ -82,8 +82,11 @@ def create_scan_collection(
         light.name: create_lamp(light, origin, centre, scan.mesh.size, light_collection)
         for light in found.by_name.values()
     }
-    for lamp in lamps.values():
-        lamp[CAPTURE] = str(capture.file)
+    for entry in capture.lights:
+        lamp = lamps[entry.name]
+        lamp[CAPTURE], lamp[LIGHT_GUESS] = str(capture.file), entry.guess
+        if entry.standard_error is not None:
+            lamp[STATED_ERROR] = entry.standard_error
     list_photos(scene, listed)
     store_found(top, find_up(scan.cameras, scan.mesh))
     return ScanCollection(top, mesh, made, lamps)

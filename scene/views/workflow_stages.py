@@ -9,12 +9,16 @@ import numpy as np
 
 from ...core.counted import counted
 from ...core.diagnose.effects.labels import cause_label
+from ...core.fit.fit_quality import FitQuality, Rating
 from ..material.measured_materials import measured_of
 from ..paint.mask_images import shadow_images
+from ..photos.lamp_knowledge import Source, knowledge_of
 from ..photos.photo_list import PatinaPhoto, lit_photos
 from ..scan.face_slots import shown_name
 from ..session.lengths import length
 from ..session.scene_properties import DIAGNOSIS, capture_path, stored_result
+
+MAX_LISTED = 4  # names in a sentence
 
 
 @dataclass(frozen=True)
@@ -23,7 +27,8 @@ class Stage:
 
     has: lines on what is present; missing: what remains to be done, None if nothing; press: the
     operator for it; again: label of its button when the stage is done, "" for no button; optional:
-    whether later stages can start without it.
+    whether later stages can start without it; doubts: sentences on what makes the stage's result
+    doubtful; remedy: the operator that may resolve them, "" if there is none.
     """
 
     has: tuple[str, ...] = ()
@@ -31,6 +36,8 @@ class Stage:
     press: str = ""
     again: str = ""
     optional: bool = False
+    doubts: tuple[str, ...] = ()
+    remedy: str = ""
 
     @property
     def done(self) -> bool:
@@ -45,7 +52,7 @@ def stages(scene: bpy.types.Scene) -> dict[str, Stage]:
     result, diagnosis = stored_result(capture), stored_result(capture, DIAGNOSIS)
     return {
         "scan": _scan(mesh if there else None),
-        "photos": _photos(lit_photos(scene)),
+        "photos": _photos(scene, capture, lit_photos(scene)),
         "masks": _masks(scene, capture, result),
         "fit": _fit(result),
         "check": _check(diagnosis),
@@ -54,11 +61,9 @@ def stages(scene: bpy.types.Scene) -> dict[str, Stage]:
 
 
 def next_stage(found: dict[str, Stage]) -> str | None:
-    """The first required stage that is not done; if there is none, the last optional one; None if
-    all are done."""
-    waiting = [name for name, stage in found.items() if not stage.done]
-    needed = [name for name in waiting if not found[name].optional]
-    return next(iter(needed or waiting[::-1]), None)
+    """The first required stage that is not done; None if all are. Optional stages are never next:
+    the user may return to them at any time."""
+    return next((n for n, stage in found.items() if not (stage.done or stage.optional)), None)
 
 
 def _scan(mesh: bpy.types.Object | None) -> Stage:
@@ -70,11 +75,28 @@ def _scan(mesh: bpy.types.Object | None) -> Stage:
     return Stage((f"{mesh.name}: {faces:,} faces, {length(across)} long",))
 
 
-def _photos(lit: list[PatinaPhoto]) -> Stage:
+def _photos(scene: bpy.types.Scene, capture: str, lit: list[PatinaPhoto]) -> Stage:
     if not lit:
         return Stage(missing="No lit photos yet; import a capture, which lists them")
-    lights = {photo.light for photo in lit}
-    return Stage((f"{counted(len(lit), 'lit photo')}, {counted(len(lights), 'light')}",))
+    names = list(dict.fromkeys(photo.light for photo in lit))
+    has = f"{counted(len(lit), 'lit photo')}, {counted(len(names), 'light')}"
+    known = [knowledge_of(scene, capture, name) for name in names]
+    guesses = [one.name for one in known if one.source is Source.GUESS]
+    lost = [one.name for one in known if one.source is Source.MISSING]
+    doubts = []
+    if guesses:
+        verb = "is a guess" if len(guesses) == 1 else "are guesses"
+        doubts.append(f"{'Light' if len(guesses) == 1 else 'Lights'} {_listed(guesses)} {verb}")
+    if lost:
+        doubts.append(
+            f"No lamp in the scene for {_listed(lost)}: the fit uses the capture file's light"
+        )
+    remedy = "patina.find_lights" if guesses else ""
+    return Stage((has,), doubts=tuple(doubts), remedy=remedy)
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(names[:MAX_LISTED]) + (" …" if len(names) > MAX_LISTED else "")
 
 
 def _masks(
@@ -100,8 +122,15 @@ def _masks(
 def _fit(result: dict | None) -> Stage:  # type: ignore[type-arg]
     if result is None:
         return Stage(missing="Not measured yet", press="patina.fit")
-    has = f"{counted(len(result.get('materials', [])), 'material')} measured"
-    return Stage((has,), press="patina.fit", again="Fit Again")
+    materials = result.get("materials", [])
+    has = f"{counted(len(materials), 'material')} measured"
+    poor = [
+        material["name"]
+        for material in materials
+        if FitQuality((material.get("held_out") or {}).get("typical")).rating is Rating.POOR
+    ]
+    doubts = (f"Poor fit: {_listed(poor)}",) if poor else ()
+    return Stage((has,), press="patina.fit", again="Fit Again", doubts=doubts)
 
 
 def _check(diagnosis: dict | None) -> Stage:  # type: ignore[type-arg]

@@ -73,6 +73,7 @@ name = "flash"
 mounted = [0.0, -0.12, 0.0]
 intensity = [12, 12, 12]
 beam = 40
+standard_error = 0.1
 
 [[photo]]
 file = "lit_1.exr"

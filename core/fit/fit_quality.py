@@ -1,0 +1,43 @@
+"""How good a fit is, in a word: good, fair or poor, by its error on held-out photos."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+MAX_GOOD_ERROR = 0.10  # typical error of a held-out photo; even materials with known lights: 2–8 %
+MAX_FAIR_ERROR = 0.25  # one BRDF on a museum bronze with patina: 20 %; one Lambertian colour: 31 %
+
+
+class Rating(Enum):
+    """A word for the error."""
+
+    GOOD = "good"
+    FAIR = "fair"
+    POOR = "poor"
+    NOT_RATED = "not rated"
+
+
+@dataclass(frozen=True)
+class FitQuality:
+    """typical: median |L̂ − L| / L of held-out photos; None where no photo was held out."""
+
+    typical: float | None
+
+    @property
+    def rating(self) -> Rating:
+        """The word."""
+        if self.typical is None:
+            return Rating.NOT_RATED
+        if self.typical <= MAX_GOOD_ERROR:
+            return Rating.GOOD
+        return Rating.FAIR if self.typical <= MAX_FAIR_ERROR else Rating.POOR
+
+    @property
+    def sentence(self) -> str:
+        """For the user."""
+        if self.typical is None:
+            return "Not rated: no photo was held out; two photos or more are needed"
+        percent = 100 * self.typical
+        shown = f"{percent:.0f}" if percent >= 9.5 else f"{percent:.1f}"
+        return f"Typical error of a held-out photo: {shown} % ({self.rating.value})"

@@ -1,0 +1,77 @@
+"""A stage is done without doubt only where its data is known."""
+
+from __future__ import annotations
+
+import bpy
+from support import extension
+from test_find_lights import guessed_capture
+
+
+def stage(name: str):
+    return extension("scene.views.workflow_stages").stages(bpy.context.scene)[name]
+
+
+def knowledge(light: str) -> str:
+    module = extension("scene.photos.lamp_knowledge")
+    capture = extension("scene.session.scene_properties").capture_path(bpy.context.scene)
+    return module.knowledge_of(bpy.context.scene, capture, light).sentence
+
+
+def test_guessed_light_is_doubtful_until_it_is_found() -> None:
+    path, _ = guessed_capture()
+    bpy.ops.patina.import_capture(filepath=str(path))
+    photos = stage("photos")
+    assert photos.done and photos.doubts == ("Light lamp1 is a guess",)
+    assert photos.remedy == "patina.find_lights"
+    assert knowledge("lamp1") == "lamp1: a guess"
+    assert knowledge("lamp2") == "lamp2: from the capture file"
+    bpy.ops.patina.find_lights()
+    bpy.context.view_layer.update()
+    assert not stage("photos").doubts
+    assert "found from photos, ±" in knowledge("lamp1")
+    dragged = extension("scene.photos.dragged_lamps")
+    capture = extension("scene.session.scene_properties").capture_path(bpy.context.scene)
+    lamp = dragged.lamp_of(bpy.context.scene, capture, "lamp1")
+    lamp.rotation_mode = "XYZ"
+    lamp.rotation_euler[1] += 0.3
+    bpy.context.view_layer.update()
+    assert knowledge("lamp1") == "lamp1: placed by hand"
+    bpy.data.objects.remove(lamp)
+    assert knowledge("lamp1") == "lamp1: not in the scene"
+    assert "No lamp in the scene for lamp1" in stage("photos").doubts[0]
+
+
+def test_saved_capture_keeps_what_is_known() -> None:
+    path, _ = guessed_capture()
+    bpy.ops.patina.import_capture(filepath=str(path))
+    bpy.ops.patina.find_lights()
+    bpy.context.view_layer.update()
+    bpy.ops.patina.save_lights(filepath=str(path), check_existing=False)
+    assert "found from photos, ±" in knowledge("lamp1")
+    collection = next(c for c in bpy.data.collections if c.get("patina_capture") == str(path))
+    for thing in list(collection.all_objects):
+        bpy.data.objects.remove(thing)
+    bpy.data.collections.remove(collection)
+    bpy.ops.patina.import_capture(filepath=str(path))
+    assert "found from photos, ±" in knowledge("lamp1") and not stage("photos").doubts
+
+
+def test_poor_fit_is_no_success() -> None:
+    path, _ = guessed_capture()
+    bpy.ops.patina.import_capture(filepath=str(path))
+    properties = extension("scene.session.scene_properties")
+    capture = properties.capture_path(bpy.context.scene)
+    for typical, poor in ((0.05, False), (0.99, True)):
+        material = {"name": "paint", "held_out": {"typical": typical}, "warnings": []}
+        properties.store_result(capture, {"materials": [material]})
+        fit = stage("fit")
+        assert fit.done and bool(fit.doubts) == poor
+    assert fit.doubts == ("Poor fit: paint",)
+
+
+def test_optional_stages_are_never_next() -> None:
+    stages = extension("scene.views.workflow_stages")
+    done, optional = stages.Stage(), stages.Stage(missing="No masks", optional=True)
+    assert stages.next_stage({"scan": done, "masks": optional}) is None
+    needed = stages.Stage(missing="Not measured yet")
+    assert stages.next_stage({"masks": optional, "fit": needed}) == "fit"
