@@ -9,7 +9,8 @@ from typing import Any
 
 import bpy
 
-STORED = "patina_overlay"  # on the screen: what is shown, and the shading before it, JSON
+from ..property_keys import OVERLAY
+
 SHADING = ("SOLID", "VERTEX", "FLAT")  # type, colour type and light that show a colour attribute
 
 
@@ -19,6 +20,7 @@ def enter_overlay(shown: str, mesh: bpy.types.Object) -> None:
     shown: identifier of what is shown. The shading and the active attribute before the first call
     are stored until leave_overlay. Call this before the active attribute is changed.
     """
+    mesh[OVERLAY] = shown  # undo takes this mark away, and leaves the screen as it is
     for screen in _screens_in_windows():
         views = _viewports(screen)
         if not views:
@@ -31,7 +33,7 @@ def enter_overlay(shown: str, mesh: bpy.types.Object) -> None:
                 "colour": attributes.active_color.name if attributes.active_color else "",
                 "views": [[str(view.as_pointer()), *_shading(view)] for view in views],
             }
-        screen[STORED] = json.dumps({**record, "shown": shown})
+        screen[OVERLAY] = json.dumps({**record, "shown": shown})
         for view in views:
             _set_shading(view, SHADING)
 
@@ -45,7 +47,7 @@ def leave_overlay() -> bool:
         if record is None:
             continue
         left = True
-        del screen[STORED]
+        del screen[OVERLAY]
         stored = {pointer: shading for pointer, *shading in record["views"]}
         first = next(iter(stored.values()))
         for view in _viewports(screen):
@@ -64,6 +66,12 @@ def overlay_shown(screen: bpy.types.Screen | None = None) -> str:
         if record is not None and any(shows_overlay(view) for view in _viewports(one)):
             return str(record["shown"])
     return ""
+
+
+def overlay_undone() -> bool:
+    """Whether no mesh has the mark of the overlay any more: it was undone, or another file was
+    loaded."""
+    return not any(OVERLAY in o for scene in bpy.data.scenes for o in scene.objects)
 
 
 def shows_overlay(view: bpy.types.Area) -> bool:
@@ -95,7 +103,7 @@ def _set_shading(view: bpy.types.Area, values: tuple[str, str, str] | list[str])
 def _record(screen: bpy.types.Screen) -> dict[str, Any] | None:
     """The record of a screen; None if there is none, or none that can be read."""
     try:
-        found = json.loads(screen.get(STORED, ""))
+        found = json.loads(screen.get(OVERLAY, ""))
         valid = isinstance(found["shown"], str) and all(len(v) == 4 for v in found["views"])
     except (ValueError, TypeError, KeyError):
         return None
@@ -106,6 +114,7 @@ def _restore_colour(record: dict[str, Any]) -> None:
     mesh = bpy.data.objects.get(str(record.get("mesh", "")))
     if mesh is None or mesh.type != "MESH":
         return
+    mesh.pop(OVERLAY, None)
     earlier = mesh.data.color_attributes.get(str(record.get("colour", "")))
     if earlier is not None:
         mesh.data.color_attributes.active_color = earlier

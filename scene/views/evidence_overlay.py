@@ -13,7 +13,13 @@ from gpu_extras.batch import batch_for_shader
 from ...core.diagnose.effects.labels import cause_label
 from ..property_keys import EVIDENCE_COLOURS
 from ..session.handlers import attach, detach
-from ..session.overlay_shading import enter_overlay, leave_overlay, overlay_shown, shows_overlay
+from ..session.overlay_shading import (
+    enter_overlay,
+    leave_overlay,
+    overlay_shown,
+    overlay_undone,
+    shows_overlay,
+)
 from .evidence import BRIGHTER, DARKER, FULL_SCALE, RESIDUAL, SAME, UNOBSERVED, show_evidence
 
 LEFT, BOTTOM, WIDTH, HEIGHT, TEXT, GAP = 24, 40, 280, 14, 12, 6  # pixels at a display scale of 1
@@ -104,16 +110,8 @@ def _text(x: float, y: float, text: str, scale: float, align: float = 0.0) -> No
 @bpy.app.handlers.persistent
 def _check(*_: object) -> None:
     """Leave the overlay where undo, redo or another file has taken its colours away."""
-    if not any(overlay_shown(screen) for screen in bpy.data.screens):
-        return
-    for scene in bpy.data.scenes:
-        mesh = scene.patina.mesh
-        if mesh is None or mesh.type != "MESH" or mesh.name not in scene.objects:
-            continue
-        active = mesh.data.color_attributes.active_color
-        if active is not None and active.name.startswith(EVIDENCE_COLOURS):
-            return
-    leave_overlay()
+    if overlay_undone():
+        leave_overlay()
 
 
 HANDLERS = (("undo_post", _check), ("redo_post", _check), ("load_post", _check))

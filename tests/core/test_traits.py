@@ -188,7 +188,7 @@ def test_component_changes_material_as_its_words_say() -> None:
         directional_albedo(second.evaluate, facing)
         < 0.6 * directional_albedo(plain.evaluate, facing)
     )
-    assert words[3] == "more at grazing angles"
+    assert words[3] == "much more at grazing angles"
     edge = Angles(np.zeros(2), np.radians([10.0, 80.0]), np.zeros(2))
     rise = [float(np.divide(*b.evaluate(edge)[::-1, 0])) for b in (fourth, plain)]
     assert rise[0] > 2 * rise[1]
