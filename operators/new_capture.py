@@ -17,6 +17,7 @@ from ..core.capture.new_capture import (
 )
 from ..core.errors import InputError, PatinaError
 from ..core.scan.formats import read_reconstruction
+from ..scene.scan.orientation import set_upright
 from ..scene.scan.scan_collection import create_reconstruction
 from ..scene.session.folders import rectified_folder
 from .import_capture import import_into_scene
@@ -150,6 +151,7 @@ the mesh if the folder holds several. Without photos, only cameras and sparse po
         found = read_reconstruction(cameras, images, self.chunk or None)
         name = cameras.stem if cameras.is_file() else cameras.resolve().name
         create_reconstruction(context.scene, name, found, images, rectified_folder(cameras))
+        set_upright(context.scene)
         for note in found.notes:
             self.report({"INFO"}, note)
         self.report(

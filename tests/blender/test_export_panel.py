@@ -64,6 +64,15 @@ def test_nothing_to_export_without_measured_material() -> None:
     assert "fit the materials first" in error_message(directory=str(folder()), formats={"binary"})
 
 
+def rounded(value):
+    """The same JSON with numbers of nine digits."""
+    if isinstance(value, dict):
+        return {key: rounded(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [rounded(inner) for inner in value]
+    return float(f"{value:.9g}") if isinstance(value, float) else value
+
+
 def test_tables_match_those_of_command_line() -> None:
     """Written from the .blend and by `fit` and `material`: the same bytes."""
     measured()
@@ -89,6 +98,8 @@ def test_tables_match_those_of_command_line() -> None:
         if name.endswith(".npz"):  # archives contain the time
             one, other = np.load(ours), np.load(theirs)
             assert all(np.array_equal(one[key], other[key]) for key in one.files)
+        elif name == "losses.json":  # sums depend on the number of threads in the last digits
+            assert rounded(json.loads(ours.read_text())) == rounded(json.loads(theirs.read_text()))
         else:
             assert ours.read_bytes() == theirs.read_bytes(), name
 
