@@ -61,9 +61,15 @@ def stages(scene: bpy.types.Scene) -> dict[str, Stage]:
 
 
 def next_stage(found: dict[str, Stage]) -> str | None:
-    """The first required stage that is not done; None if all are. Optional stages are never next:
-    the user may return to them at any time."""
-    return next((n for n, stage in found.items() if not (stage.done or stage.optional)), None)
+    """The first required stage that is not done; if there is none, the first optional one after the
+    last stage with a button. None if all are done: an optional stage that was passed is not next.
+    """
+    names = list(found)
+    needed = [name for name in names if not (found[name].done or found[name].optional)]
+    if needed:
+        return needed[0]
+    passed = max((i for i, n in enumerate(names) if found[n].press and found[n].done), default=-1)
+    return next((n for n in names[passed + 1 :] if not found[n].done), None)
 
 
 def _scan(mesh: bpy.types.Object | None) -> Stage:

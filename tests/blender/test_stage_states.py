@@ -69,9 +69,11 @@ def test_poor_fit_is_no_success() -> None:
     assert fit.doubts == ("Poor fit: paint",)
 
 
-def test_optional_stages_are_never_next() -> None:
+def test_passed_optional_stage_is_not_next() -> None:
     stages = extension("scene.views.workflow_stages")
     done, optional = stages.Stage(), stages.Stage(missing="No masks", optional=True)
-    assert stages.next_stage({"scan": done, "masks": optional}) is None
-    needed = stages.Stage(missing="Not measured yet")
-    assert stages.next_stage({"masks": optional, "fit": needed}) == "fit"
+    fitted = stages.Stage(press="patina.fit")
+    needed = stages.Stage(missing="Not measured yet", press="patina.fit")
+    assert stages.next_stage({"masks": optional, "fit": needed, "check": optional}) == "fit"
+    assert stages.next_stage({"masks": optional, "fit": fitted, "check": optional}) == "check"
+    assert stages.next_stage({"masks": optional, "fit": fitted, "check": done}) is None
