@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import bpy
 
 from ..core.new_capture import LampKind
@@ -11,6 +9,7 @@ from ..scene.scan.capture_draft import PatinaDraft, PatinaDraftPhoto, draft_of
 from .wrapped import wrapped
 
 ROWS = 5
+NAME_SHARE, CAMERA_SHARE = 0.38, 0.6  # of a row's width; of the rest
 CREATE_SCALE = 1.4  # height of the button to press next, in button heights
 VALUE_LABELS = {
     LampKind.DISTANT.value: "Direction",
@@ -36,14 +35,14 @@ class PATINA_UL_draft_photos(bpy.types.UIList):
     ) -> None:
         row = layout.row(align=True)
         row.prop(item, "use", text="")
-        names = row.row(align=True)
+        names = row.split(factor=NAME_SHARE, align=True)
         names.active = item.use
         names.label(text=item.name)
         if item.use:
-            names.label(
-                text=item.camera or "No camera", icon="CAMERA_DATA" if item.camera else "ERROR"
-            )
-            names.label(text=item.lamp)
+            right = names.split(factor=CAMERA_SHARE, align=True)
+            icon = "NONE" if item.camera else "ERROR"
+            right.label(text=item.camera or "No camera", icon=icon)
+            right.label(text=item.lamp)
 
 
 def draw_draft(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
@@ -55,11 +54,8 @@ def draw_draft(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     for sentence in draft.found:
         wrapped(layout, sentence, "CHECKMARK")
     for name, path in (("Cameras", draft.cameras), ("Mesh", draft.mesh)):
-        row = layout.row()
-        row.label(
-            text=f"{name}: {Path(path).name if path else 'none yet'}",
-            icon="BLANK1" if path else "RADIOBUT_OFF",
-        )
+        icon = "BLANK1" if path else "RADIOBUT_OFF"
+        layout.label(text=f"{name}: {path.name if path else 'none yet'}", icon=icon)
     layout.operator("patina.add_files", text="Add or Replace Files…", icon="FILE_FOLDER")
     if draft.cameras is None:
         layout.operator("patina.solve_photos", icon="CAMERA_DATA")

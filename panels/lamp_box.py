@@ -36,9 +36,11 @@ def draw_lamp(layout: bpy.types.UILayout, scene: bpy.types.Scene, camera: bpy.ty
         column.operator("patina.find_lights", text="Find Again from Photos").light = name
     hand = lamp_edits(scene, lamp)
     if hand:
-        edits = {"position": hand.moved, "strength": hand.strength, "size": hand.softness}
+        moved = hand.moved and known.source is not Source.FOUND
+        edits = {"position": moved, "strength": hand.strength, "size": hand.softness}
         edited = ", ".join(word for word, changed in edits.items() if changed)
-        column.label(text=f"{edited[0].upper()}{edited[1:]} edited", icon="VIEW_PAN")
+        if edited:
+            column.label(text=f"{edited[0].upper()}{edited[1:]} edited", icon="VIEW_PAN")
         column.operator("patina.save_lights", icon="FILE_TICK")
     refined = _refined(stored_result(capture) or {}, name)
     if refined:

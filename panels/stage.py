@@ -42,7 +42,9 @@ class StagePanel:
         for line in own.doubts:
             wrapped(layout, line, DOUBTFUL)
         if own.remedy:
-            layout.operator(own.remedy)
+            row = layout.row()
+            row.scale_y = NEXT_BUTTON_SCALE
+            row.operator(own.remedy)
         if own.missing is not None:
             wrapped(layout, own.missing, "INFO")
         if own.press and not own.done:

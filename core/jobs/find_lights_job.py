@@ -10,6 +10,7 @@ import numpy as np
 from ..basis import Basis, default_basis
 from ..capture import Capture, LightEntry
 from ..concurrency.job import Job, Step
+from ..counted import counted
 from ..errors import PatinaError
 from ..geometry import RayScene
 from ..inputs import capture_data
@@ -167,7 +168,7 @@ def _entry(entry: LightEntry, lamp: FoundLamp) -> LightEntry:
 
 
 def _sentence(name: str, lamp: FoundLamp, photos: int) -> str:
-    source = f"from {photos} photo{'' if photos == 1 else 's'}"
+    source = f"from {counted(photos, 'photo')}"
     error = lamp.standard_error
     if isinstance(lamp.light, DistantLight):
         return f"Light {name!r}: direction found {source}, ± {np.degrees(error):.1f}°."

@@ -78,7 +78,8 @@ class Draft:
             return "Add the lit photos"
         lost = [photo.file.name for photo in used if photo.camera is None]
         if lost:
-            return f"{len(lost)} photos have no camera: {listed(lost)}. Localise or remove them"
+            have = "photo has" if len(lost) == 1 else "photos have"
+            return f"{len(lost)} {have} no camera: {listed(lost)}. Choose one or switch them off"
         kinds = {self.lamps[photo.lamp].kind for photo in used if photo.lamp < len(self.lamps)}
         if kinds & NEAR_KINDS and kinds - NEAR_KINDS:
             return (

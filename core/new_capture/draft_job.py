@@ -6,6 +6,7 @@ from collections.abc import Generator, Iterator, Sequence
 from pathlib import Path
 
 from ..concurrency.job import Job, Step
+from ..counted import counted
 from ..errors import PatinaError
 from ..photo import Transfer, read_photo
 from ..scan import Camera
@@ -38,7 +39,9 @@ class DraftJob(Job):
             yield Step(READING, 0.5 * READ_SHARE)
             opened, draft = opened_scan(draft)
         if opened is not None and draft.photos:
-            draft = yield from _relayed(matched(draft, opened), MATCHING, READ_SHARE, MATCH_SHARE)
+            draft = yield from _relayed(
+                matched(draft, opened, self.paths), MATCHING, READ_SHARE, MATCH_SHARE
+            )
             draft = yield from _relayed(with_lamps(draft, opened), GROUPING, MATCH_SHARE, 1.0)
         self.draft = draft
 
@@ -59,7 +62,7 @@ class DraftJob(Job):
             problems.append(f"{len(why)} photos cannot be read: {listed(why)}")
         path = cameras.path if cameras is not None else before.cameras
         if cameras is not None:
-            found.append(f"{len(cameras.cameras)} cameras, {tool_name(cameras.path)}")
+            found.append(f"{counted(len(cameras.cameras), 'camera')}, {tool_name(cameras.path)}")
         if surface is not None and mesh is not None:
             found.append(f"Mesh of {len(surface.faces):,} faces ({mesh.name})")
         images, lit = _scan_photos(photos, () if cameras is None else cameras.cameras)
@@ -82,7 +85,7 @@ def _photo_sentence(photos: Sequence[Path]) -> str:
         encoding = read_photo(photos[0], Transfer.named("auto")).info.transfer.name
     except PatinaError:
         encoding = ""
-    count = f"{len(photos)} photo{'' if len(photos) == 1 else 's'}"
+    count = counted(len(photos), "photo")
     return f"{count}, {', '.join(kinds)}" + (f", {encoding}" if encoding else "")
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Collection, Generator, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
 from numpy.typing import NDArray
 
+from ..counted import counted
 from ..errors import PatinaError
 from ..photo import Photo, Transfer, read_exif, read_photo
 from ..scan import Camera
@@ -37,9 +38,15 @@ class _Outlines:
         return self.cache[shape]
 
 
-def matched(draft: Draft, opened: OpenedScan) -> Generator[float, None, Draft]:
+def matched(
+    draft: Draft, opened: OpenedScan, chosen: Collection[Path] = ()
+) -> Generator[float, None, Draft]:
     """The draft with a camera for each photo that has none: by name, else by number or time if the
-    photo's content agrees, else by its content. Yields the fraction done."""
+    photo's content agrees, else by its content. Yields the fraction done.
+
+    chosen: photos that the user chose one by one. Others that match no camera are left out where
+    some match by name: a folder may also hold masks and textures.
+    """
     cameras = opened.scan.cameras
     files = [photo.file for photo in draft.photos if photo.camera is None]
     named = match_names.by_name(files, cameras)
@@ -67,14 +74,18 @@ def matched(draft: Draft, opened: OpenedScan) -> Generator[float, None, Draft]:
         )
         if match is not None:
             found[file] = match.label, "by content"
-    others_named = bool(named)  # photos among named ones are something else
-    photos = tuple(
+    photos = [
         replace(photo, camera=found[photo.file][0], how=found[photo.file][1])
         if photo.file in found
-        else replace(photo, used=photo.used and (photo.camera is not None or not others_named))
+        else photo
         for photo in draft.photos
-    )
-    return replace(draft, photos=photos)
+    ]
+    kept = [p for p in photos if p.camera is not None or not named or p.file in chosen]
+    sentences = list(draft.found)
+    if len(kept) < len(photos):
+        left = counted(len(photos) - len(kept), "other picture")
+        sentences.append(f"Left out: {left} without a camera of the same name")
+    return replace(draft, photos=tuple(kept), found=tuple(sentences))
 
 
 def _read(file: Path) -> Photo | None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..counted import counted
 from ..light import DistantLight
 from ..light_search import LampPhoto, UnknownLamp, draw_lamp_pixels, find_lamps
 from ..light_search.search import MIN_PIXELS as MIN_LIT_PIXELS
@@ -66,8 +67,7 @@ def with_lamps(draft: Draft, opened: OpenedScan) -> Generator[float, None, Draft
     photos = list(draft.photos)
     for i, lamp in zip(used, lamps, strict=True):
         photos[i] = replace(photos[i], lamp=lamp)
-    count = f"{len(made)} lamp{'' if len(made) == 1 else 's'}"
-    note = f"{count} for {len(used)} photos: {how}"
+    note = f"{counted(len(made), 'lamp')} for {counted(len(used), 'photo')}: {how}"
     return replace(draft, photos=tuple(photos), lamps=tuple(made), found=(*draft.found, note))
 
 
