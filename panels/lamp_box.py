@@ -30,9 +30,10 @@ def draw_lamp(layout: bpy.types.UILayout, scene: bpy.types.Scene, camera: bpy.ty
     kind = lamp.get(LAMP_KIND)
     column.label(text=f"{KINDS.get(kind, 'Light')}: {name}", icon=ICONS.get(kind, "LIGHT"))
     known = lamp_knowledge(scene, lamp)
-    guess = known.source is Source.GUESS
-    column.label(text=known.sentence, icon="ERROR" if guess else "BLANK1")
-    if not guess and known.source is not Source.CAPTURE:
+    if known.source is Source.GUESS:
+        column.label(text=known.sentence, icon="ERROR")
+    elif known.source is Source.FOUND:
+        column.label(text=known.sentence, icon="BLANK1")
         column.operator("patina.find_lights", text="Find Again from Photos").light = name
     hand = lamp_edits(scene, lamp)
     if hand:
