@@ -78,6 +78,7 @@ MODULES: tuple[str, ...] = (
     "scene.material.trait_update",
     "scene.material.file_cache",
     "scene.views.view_properties",
+    "scene.views.outdated",
     "scene.views.evidence_overlay",
     "scene.export.export_choice",
     "operators.import_capture",

@@ -20,6 +20,7 @@ from ..scene.session.running_job import set_running
 from ..scene.session.scene_properties import DIAGNOSIS, capture_path, store_result
 from ..scene.views.evidence import paint_evidence
 from ..scene.views.evidence_overlay import toggle_evidence
+from ..scene.views.outdated import record_inputs
 from .fit import can_fit, fit_job, show_result
 from .stepped import Stepped
 
@@ -70,6 +71,8 @@ the causes, and fit again with these causes included in the model"""
                 {"WARNING"},
                 f"{mesh.name} no longer has the vertices of the scan, so it was not coloured.",
             )
+        record_inputs(scene)
+        record_inputs(scene, DIAGNOSIS)
         for trial in found.reported:
             self.report({"WARNING"}, f"{cause_label(trial.effect.cause)}: {found.sentence(trial)}")
         if not found.causes:
@@ -108,6 +111,8 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
         yield from _show(self, scene, after)
         description = describe(checked.found, checked.result, after)
         store_result(str(after.capture.file), description, DIAGNOSIS)
+        record_inputs(scene)
+        record_inputs(scene, DIAGNOSIS)
 
 
 def _show(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> Iterator[None]:

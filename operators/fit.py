@@ -17,6 +17,7 @@ from ..scene.material.file_cache import own_basis, trim_cache
 from ..scene.material.prepared_materials import PreparedJob
 from ..scene.paint.apply_paint import apply_strokes
 from ..scene.paint.mask_images import with_mask_images
+from ..scene.photos.dragged_lamps import lamp_of
 from ..scene.photos.lamps import with_dragged_lamps
 from ..scene.scan.apply_result import apply_result_steps
 from ..scene.scan.face_slots import with_painted_slots
@@ -24,6 +25,7 @@ from ..scene.session.last_fit import keep_fit
 from ..scene.session.overlay_shading import leave_overlay
 from ..scene.session.preferences import preferences
 from ..scene.session.running_job import set_running
+from ..scene.views.outdated import record_inputs
 from .stepped import Stepped
 
 
@@ -52,6 +54,13 @@ def fit_job(operator: bpy.types.Operator, scene: bpy.types.Scene) -> FitJob:
         operator.report({"INFO"}, f"Margins set by capture and preferences: {margins}.")
     if dragged:
         operator.report({"INFO"}, f"Lights taken from edited lamps: {', '.join(dragged)}.")
+    lost = [entry.name for entry in capture.lights if not lamp_of(scene, str(path), entry.name)]
+    if lost:
+        operator.report(
+            {"WARNING"},
+            f"No lamp in the scene for {', '.join(lost)}: the fit uses the light of the capture "
+            "file. Undo the deletion, or import the capture again",
+        )
     apply_strokes(scene)
     capture, prepare = with_painted_slots(with_mask_images(capture), scene)
     return FitJob(capture, own_basis(), prepare)
@@ -98,6 +107,7 @@ class PATINA_OT_fit(Stepped, bpy.types.Operator):
             self.report({"WARNING"}, "The scene no longer exists; the materials were not applied.")
             return
         yield from show_result(self, scene, result)
+        record_inputs(scene)
         self.report({"INFO"}, f"{counted(len(result.materials), 'material')} measured.")
 
 

@@ -22,6 +22,7 @@ STATED_ERROR = "patina_stated_error"  # on a lamp: standard error in the capture
 FOUND_PLACEMENT = "patina_found"  # on a lamp: direction, position or offset found from photos
 FOUND_ERROR = "patina_found_error"  # on a lamp: standard error of these, −1 where unknown
 FOUND_BEAM = "patina_found_beam"  # on a lamp: beam of a flash found from photos, −1 for none
+RESULT_INPUTS = "patina_inputs"  # on a text with a result: what it was made with, JSON
 MAP_KIND = "patina_map"  # on a node: which map it shows
 PROVENANCE = "patina_provenance"  # on the material: sentences on its origin
 CAPTURE = "patina_capture"  # on data-blocks created from a capture: absolute path of its file

@@ -53,7 +53,7 @@ def store_result(capture: str, description: dict[str, Any], kind: str = RESULT) 
 
     description: the content of result.json or diagnosis.json; kind: RESULT or DIAGNOSIS.
     """
-    text = _text(capture, kind) or bpy.data.texts.new(kind)
+    text = result_text(capture, kind) or bpy.data.texts.new(kind)
     text[CAPTURE] = capture
     text.clear()
     text.write(json.dumps(description, indent=1))
@@ -63,7 +63,7 @@ def store_result(capture: str, description: dict[str, Any], kind: str = RESULT) 
 def stored_result(capture: str, kind: str = RESULT) -> dict[str, Any] | None:
     """The stored result of the last fit or check of a capture, or None. The object is cached and
     must not be changed."""
-    text = _text(capture, kind)
+    text = result_text(capture, kind)
     return None if text is None else _parsed(text.as_string())
 
 
@@ -82,7 +82,8 @@ def capture_path(scene: bpy.types.Scene) -> str:
     return str(Path(bpy.path.abspath(path)).resolve()) if path else ""
 
 
-def _text(capture: str, kind: str) -> bpy.types.Text | None:
+def result_text(capture: str, kind: str = RESULT) -> bpy.types.Text | None:
+    """The text data-block with the result of the last fit or check of a capture, or None."""
     own = (t for t in bpy.data.texts if t.get(CAPTURE) == capture)
     return next((t for t in own if t.name.startswith(kind)), None)
 

@@ -17,6 +17,7 @@ from ..photos.photo_list import PatinaPhoto, lit_photos
 from ..scan.face_slots import shown_name
 from ..session.lengths import length
 from ..session.scene_properties import DIAGNOSIS, capture_path, stored_result
+from .outdated import changes_since
 
 MAX_LISTED = 4  # names in a sentence
 
@@ -54,8 +55,8 @@ def stages(scene: bpy.types.Scene) -> dict[str, Stage]:
         "scan": _scan(mesh if there else None),
         "photos": _photos(scene, capture, lit_photos(scene)),
         "masks": _masks(scene, capture, result),
-        "fit": _fit(result),
-        "check": _check(diagnosis),
+        "fit": _fit(result, changes_since(scene)),
+        "check": _check(diagnosis, changes_since(scene, DIAGNOSIS)),
         "material": _material(capture),
     }
 
@@ -125,7 +126,7 @@ def _masks(
     return Stage(tuple(has), missing, "patina.shadow_masks", optional=True)
 
 
-def _fit(result: dict | None) -> Stage:  # type: ignore[type-arg]
+def _fit(result: dict | None, changes: tuple[str, ...]) -> Stage:  # type: ignore[type-arg]
     if result is None:
         return Stage(missing="Not measured yet", press="patina.fit")
     materials = result.get("materials", [])
@@ -135,17 +136,21 @@ def _fit(result: dict | None) -> Stage:  # type: ignore[type-arg]
         for material in materials
         if FitQuality((material.get("held_out") or {}).get("typical")).rating is Rating.POOR
     ]
-    doubts = (f"Poor fit: {_listed(poor)}",) if poor else ()
+    doubts = _outdated(changes) + ((f"Poor fit: {_listed(poor)}",) if poor else ())
     return Stage((has,), press="patina.fit", again="Fit Again", doubts=doubts)
 
 
-def _check(diagnosis: dict | None) -> Stage:  # type: ignore[type-arg]
+def _outdated(changes: tuple[str, ...]) -> tuple[str, ...]:
+    return (f"Outdated: {', '.join(changes)} since then",) if changes else ()
+
+
+def _check(diagnosis: dict | None, changes: tuple[str, ...]) -> Stage:  # type: ignore[type-arg]
     if diagnosis is None:
         missing = "Not checked yet: do lights, cameras and mesh agree with the photos?"
         return Stage((), missing, "patina.check", optional=True)
     causes = [cause_label(cause).lower() for cause in diagnosis["named"] if cause != "none"]
     has = f"Found: {', '.join(causes)}" if causes else "No known cause found"
-    return Stage((has,), press="patina.check", again="Check Again")
+    return Stage((has,), press="patina.check", again="Check Again", doubts=_outdated(changes))
 
 
 def _material(capture: str) -> Stage:

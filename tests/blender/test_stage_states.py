@@ -77,3 +77,75 @@ def test_passed_optional_stage_is_not_next() -> None:
     assert stages.next_stage({"masks": optional, "fit": needed, "check": optional}) == "fit"
     assert stages.next_stage({"masks": optional, "fit": fitted, "check": optional}) == "check"
     assert stages.next_stage({"masks": optional, "fit": fitted, "check": done}) is None
+
+
+def outdated(kind: str = "Patina result") -> tuple[str, ...]:
+    return extension("scene.views.outdated").changes_since(bpy.context.scene, kind)
+
+
+def stored_fit() -> None:
+    """A stored result of the open capture, with the present inputs."""
+    properties = extension("scene.session.scene_properties")
+    capture = properties.capture_path(bpy.context.scene)
+    properties.store_result(capture, {"materials": [{"name": "paint", "held_out": None}]})
+    extension("scene.views.outdated").record_inputs(bpy.context.scene)
+
+
+def test_edits_after_a_fit_make_it_outdated() -> None:
+    path, _ = guessed_capture()
+    bpy.ops.patina.import_capture(filepath=str(path))
+    scene, mesh = bpy.context.scene, bpy.context.scene.patina.mesh
+    stored_fit()
+    assert not outdated()
+    mesh.scale = (2.0, 2.0, 2.0)
+    bpy.context.view_layer.update()
+    assert outdated() == ("the mesh was scaled",)
+    bpy.context.view_layer.objects.active = mesh
+    bpy.ops.object.transform_apply(scale=True)
+    bpy.context.view_layer.update()
+    assert "the mesh was edited" in outdated() and "the mesh was scaled" not in outdated()
+    assert stage("fit").doubts[0].startswith("Outdated: the mesh was edited")
+    stored_fit()
+    assert not outdated()
+    mesh.data.polygons[0].material_index = 3
+    mesh.data.update()
+    bpy.context.view_layer.update()
+    assert outdated() == ("materials of the mesh were painted or changed",)
+    stored_fit()
+    path.write_text(path.read_text() + "# changed\n")
+    assert outdated() == ("the capture file was changed",)
+    stored_fit()
+    dragged = extension("scene.photos.dragged_lamps")
+    capture = extension("scene.session.scene_properties").capture_path(scene)
+    lamp = dragged.lamp_of(scene, capture, "lamp2")
+    lamp.rotation_mode = "XYZ"
+    lamp.rotation_euler[0] += 0.1
+    bpy.context.view_layer.update()
+    assert outdated() == ("a lamp was moved or deleted",)
+    stored_fit()
+    bpy.data.objects.remove(lamp)
+    assert outdated() == ("a lamp was moved or deleted",)
+
+
+def test_turning_the_whole_scan_is_no_change() -> None:
+    path, _ = guessed_capture()
+    bpy.ops.patina.import_capture(filepath=str(path))
+    stored_fit()
+    bpy.context.scene.patina_orientation.up_axis = "X"
+    bpy.context.view_layer.update()
+    assert not outdated()
+
+
+def test_saved_file_keeps_inputs_of_the_fit() -> None:
+    path, _ = guessed_capture()
+    bpy.ops.patina.import_capture(filepath=str(path))
+    stored_fit()
+    saved = path.parent / "scene.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(saved))
+    bpy.ops.wm.open_mainfile(filepath=str(saved))
+    bpy.context.view_layer.update()
+    assert not outdated()
+    bpy.context.scene.patina.mesh.data.vertices[0].co.x += 0.1
+    bpy.context.scene.patina.mesh.data.update()
+    bpy.context.view_layer.update()
+    assert outdated() == ("the mesh was edited",)
