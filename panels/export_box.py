@@ -10,6 +10,7 @@ from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 
 from ..scene.export.export_choice import FORMATS, missing
+from ..scene.views.outdated import changes_since
 from .wrapped import wrapped
 
 PRESETS = "patina/export"  # below the user's presets
@@ -59,6 +60,9 @@ class PATINA_PT_export(bpy.types.Panel):
         for reason in (missing(scene, word) for word in FORMATS):
             if reason is not None:
                 wrapped(layout, reason, "INFO")
+        changes = changes_since(scene)
+        if changes:
+            wrapped(layout, f"Measured before {', '.join(changes)}", "INFO")
         layout.operator("patina.export", icon="EXPORT")
 
 

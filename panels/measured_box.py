@@ -12,6 +12,7 @@ from ..core.report.figures import either_side
 from .wrapped import IN_BOX, wrapped
 
 SPHERE = 5.0  # scale of the preview icon, in line heights
+LIGHT_MAY_BE_WRONG = "black where the light should reach"  # in a warning of fit_warnings.py
 MAX_COEFFICIENTS = 8  # coefficients that are listed for each channel
 
 
@@ -39,6 +40,8 @@ def draw_measured(
         box.label(text=f"{material['samples']['used']:,} samples", icon="BLANK1")
         for warning in material["warnings"]:
             wrapped(box, warning, "ERROR", IN_BOX)
+            if LIGHT_MAY_BE_WRONG in warning:
+                box.operator("patina.find_lights")
         _coefficients(layout, material)
 
 

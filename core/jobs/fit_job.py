@@ -287,9 +287,9 @@ class FitJob(Job):
         known, scale = unit
         fit_share = share * (self._times.fit_share(index) if self.portable else 1.0)
         found = yield from self._estimate(index, table, basis, start, fit_share, judge)
-        warnings = material_warnings(table, found.fit, known)
-        warnings += quality_warnings(found, capture)
-        warnings += black_photo_warnings(table, capture) + found.notes
+        # the most severe first: what makes the result wrong, then what makes it uncertain
+        warnings = black_photo_warnings(table, capture) + quality_warnings(found, capture)
+        warnings += material_warnings(table, found.fit, known) + found.notes
         material = MaterialResult(
             name=name,
             fit=found.fit,

@@ -16,6 +16,7 @@ MIN_PEAK_SAMPLES = 200  # samples with the half vector within 5° of the normal
 MAX_TYPICAL_ERROR = 0.2  # limit of the held-out error and of the uncertainty, relative
 ODD_PHOTO_RATIO = 5.0  # held-out error of a photo over the median of all photos
 ODD_GAIN = 0.1  # relative brightness of a photo against the others
+MAX_LISTED_PHOTOS = 4  # names in a sentence
 MAX_NORMAL_ERROR = 5.0  # degrees along each tangent
 VIEW_ANGLES = (0.0, 20.0, 40.0, 60.0, 70.0, 80.0)  # degrees from the normal
 MAX_ALBEDO = 1.01  # reflected over incident light: 1 plus the error of the quadrature
@@ -87,24 +88,31 @@ def quality_warnings(found: Estimate, capture: Capture) -> tuple[str, ...]:
         )
     if held is not None and len(held.per_photo) > 2:
         median = float(np.median(list(held.per_photo.values())))
-        warnings += [
-            f"The held-out error of {capture.photo_name(photo)} is {error / median:.0f} times the "
-            "median of all photos. Check its camera, light and exposure. If they are right, it "
-            "shows angles that no other photo shows."
-            for photo, error in held.per_photo.items()
-            if error > ODD_PHOTO_RATIO * median
-        ]
+        odd = {p: e for p, e in held.per_photo.items() if e > ODD_PHOTO_RATIO * median}
+        if odd:
+            warnings.insert(
+                0,
+                f"The held-out error of {_photos(capture, list(odd))} is at least "
+                f"{min(odd.values()) / median:.0f} times the median of all photos. Check camera, "
+                "light and exposure. If they are right, no other photo shows these angles.",
+            )
     return tuple(warnings)
 
 
 def _measured_warnings(fit: MeasuredResult, std: float, capture: Capture) -> list[str]:
     """Warnings of the measured method. std: median standard deviation of ln ρ."""
-    warnings = [
-        f"{capture.photo_name(photo)} is {abs(100 * (gain - 1)):.0f} % "
-        f"{'brighter' if gain > 1 else 'darker'} than the other photos predict. Check its exposure "
-        "and the irradiance of its light."
-        for photo, gain in fit.gains_beyond(ODD_GAIN).items()
-    ]
+    warnings = []
+    gains = fit.gains_beyond(ODD_GAIN)
+    if gains:
+        shown = ", ".join(
+            f"{capture.photo_name(photo)} by {100 * (gain - 1):+.0f} %"
+            for photo, gain in list(gains.items())[:MAX_LISTED_PHOTOS]
+        )
+        more = f" and {len(gains) - MAX_LISTED_PHOTOS} more" * (len(gains) > MAX_LISTED_PHOTOS)
+        warnings.append(
+            "The brightness differs from what the other photos predict: "
+            f"{shown}{more}. Check the exposures and the irradiance of the lights."
+        )
     if fit.normal_deviation > MAX_NORMAL_ERROR:
         warnings.append(
             f"The mesh's normals are off by about {fit.normal_deviation:.0f}° along each tangent. "
@@ -120,19 +128,32 @@ def _measured_warnings(fit: MeasuredResult, std: float, capture: Capture) -> lis
 
 
 def black_photo_warnings(table: SampleTable, capture: Capture) -> tuple[str, ...]:
-    """A warning for each photo in which many samples are black although the light reaches them.
+    """A warning about the photos in which many samples are black although the light reaches them.
 
-    The usual cause is a wrong camera or a wrong light.
+    The usual cause is a wrong light or a wrong camera.
     """
-    found = []
+    black = []
     level = table.radiance.mean(axis=1)
     for photo in np.unique(table.photo).tolist():
         which = table.photo == photo
         own, weight = level[which], table.weight[which].astype(np.float64)
         dark = own < BLACK_LEVEL * np.percentile(own, 95)
         if weight[dark].sum() > MAX_BLACK_SHARE * weight.sum():
-            found.append(
-                f"{capture.photo_name(photo)} is black in places that its light should reach. "
-                "Check that the photo has the right camera and the right light."
-            )
-    return tuple(found)
+            black.append(photo)
+    if not black:
+        return ()
+    verb = "is" if len(black) == 1 else "are"
+    return (
+        f"{_photos(capture, black)} {verb} black where the light should reach: the light or the "
+        "camera is wrong. Find the light from the photos, and check the outline of the mesh over "
+        "the photo.",
+    )
+
+
+def _photos(capture: Capture, places: list[int]) -> str:
+    """Names of a few photos, and the number of the others."""
+    names = [capture.photo_name(place) for place in places[:MAX_LISTED_PHOTOS]]
+    more = len(places) - len(names)
+    if more:
+        return f"{', '.join(names)} and {more} more"
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -155,8 +155,19 @@ def test_swapped_photos_are_named_in_warning(tmp_path: Path) -> None:
     path = made.make_capture(tmp_path / "ball", photos=6)
     text = path.read_text().replace("view_02", "swap").replace("view_05", "view_02")
     path.write_text(text.replace("swap", "view_05"))
-    warnings = " ".join(black_photo_warnings(sampled(path)[0], read_capture(path)))
-    assert "lit_2.exr" in warnings or "lit_5.exr" in warnings, warnings
+    warnings = black_photo_warnings(sampled(path)[0], read_capture(path))
+    assert len(warnings) == 1, "photos are merged into one sentence"
+    assert "lit_2.exr" in warnings[0] or "lit_5.exr" in warnings[0], warnings
+
+
+def test_wrong_light_is_the_first_warning(tmp_path: Path) -> None:
+    path = made.make_capture(tmp_path / "ball", photos=3, extra="[fit]\nheld_out = false")
+    capture = read_capture(path)
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])  # 90° about z
+    lights = tuple(replace(light, direction=turn @ light.direction) for light in capture.lights)
+    job = FitJob(replace(capture, lights=lights))
+    job.drain()
+    assert "black where the light should reach" in job.result.materials[0].warnings[0]
 
 
 def test_good_capture_has_no_swap_warning(result: CaptureResult) -> None:
