@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from ..core.errors import PatinaError
 from ..core.output_folder import check_out
@@ -13,7 +14,7 @@ from ..scene.paint.brushes import prepare_brush
 from ..scene.paint.canvas import canvas_of, canvases, draw
 from ..scene.paint.mask_files import write_masks
 from ..scene.paint.mesh_paint import show_on_mesh, shown_on_mesh, slots_of_face_sets
-from ..scene.paint.paint_kinds import assign_slots, paints, update_brushes
+from ..scene.paint.paint_kinds import assign_slots, paints, slots_of_faces, update_brushes
 from ..scene.photos.photo_list import looked_at
 from ..scene.scan.face_slots import leave_edit_mode, new_slot
 from ..scene.session.image_editor import show_canvas
@@ -62,6 +63,27 @@ class PATINA_OT_add_material(_ScanOperator, bpy.types.Operator):
         number = new_slot(scene, capture_path(scene), self.name)
         scene.patina.use_slots = True
         scene.patina_paint.active = number
+        _redraw_paint(context)
+        return {"FINISHED"}
+
+
+class PATINA_OT_remove_material(_ScanOperator, bpy.types.Operator):
+    """Remove the active material slot of the scanned mesh; its faces get the first material"""
+
+    bl_idname = "patina.remove_material"
+    bl_label = "Remove Material"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def _do(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        mesh, number = scene.patina.mesh, scene.patina_paint.active
+        if not 0 <= number < len(mesh.material_slots):
+            raise PatinaError("No material is active; choose one in the list, then remove it")
+        slots = slots_of_faces(mesh)
+        mesh.data.materials.pop(index=number)
+        assign_slots(mesh, np.where(slots == number, 0, slots - (slots > number)))
+        scene.patina_paint.active = max(number - 1, 0)
+        scene.patina.use_slots = len(mesh.data.materials) > 0
         _redraw_paint(context)
         return {"FINISHED"}
 
@@ -214,6 +236,7 @@ def _redraw_paint(context: bpy.types.Context) -> None:
 
 CLASSES = (
     PATINA_OT_add_material,
+    PATINA_OT_remove_material,
     PATINA_OT_pick_paint,
     PATINA_OT_paint_mesh,
     PATINA_OT_paint_photo,

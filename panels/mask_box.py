@@ -8,7 +8,8 @@ from ..scene.paint.mask_images import mask_images, shadow_images
 from ..scene.paint.paint_kinds import Paint, paints
 from ..scene.paint.swatches import swatch
 from ..scene.photos.photo_list import looked_at
-from ..scene.session.scene_properties import capture_path
+from ..scene.session.scene_properties import capture_path, stored_result
+from .wrapped import IN_BOX, wrapped
 
 MASK_LABELS = {
     "shadow": "Shadow",
@@ -20,16 +21,23 @@ MASK_LABELS = {
 
 def draw_masks(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     """Draw the materials and masks that can be painted, and the buttons to paint them."""
-    kinds, state = paints(scene), scene.patina_paint
+    kinds, state, capture = paints(scene), scene.patina_paint, capture_path(scene)
     materials = [p for p in kinds if p.kind == "material"] if scene.patina.use_slots else []
     box = layout.box()
     head = box.row()
     head.label(text="Materials")
-    head.operator("patina.add_material", text="", icon="ADD")
+    buttons = head.row(align=True)
+    buttons.operator("patina.add_material", text="", icon="ADD")
+    if materials:
+        buttons.operator("patina.remove_material", text="", icon="REMOVE")
     for number, paint in enumerate(materials):
         _row(box, scene, paint, number, number == state.active)
     if not materials:
-        box.label(text="One material for the whole object", icon="BLANK1")
+        names = [m["name"] for m in (stored_result(capture) or {}).get("materials", [])]
+        if len(names) > 1:
+            wrapped(box, f"Materials of the capture: {', '.join(names)}", "BLANK1", IN_BOX)
+        else:
+            box.label(text="One material for the whole object", icon="BLANK1")
     row = box.row(align=True)
     row.operator("patina.propose_materials", text="Propose", icon="SHADERFX")
     row.operator("patina.slots_from_face_sets", text="Face Sets", icon="FACE_MAPS")

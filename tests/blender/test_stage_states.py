@@ -149,3 +149,25 @@ def test_saved_file_keeps_inputs_of_the_fit() -> None:
     bpy.context.scene.patina.mesh.data.update()
     bpy.context.view_layer.update()
     assert outdated() == ("the mesh was edited",)
+
+
+def test_removed_material_gives_its_faces_to_the_first() -> None:
+    path, _ = guessed_capture()
+    bpy.ops.patina.import_capture(filepath=str(path))
+    scene, mesh = bpy.context.scene, bpy.context.scene.patina.mesh
+    for name in ("clay", "gold"):  # the rest of the object is the first material
+        bpy.ops.patina.add_material(name=name)
+    kinds = extension("scene.paint.paint_kinds")
+    slots = kinds.slots_of_faces(mesh)
+    slots[:] = 0
+    slots[10:20], slots[20:40] = 1, 2
+    kinds.assign_slots(mesh, slots)
+    scene.patina_paint.active = 1
+    assert bpy.ops.patina.remove_material() == {"FINISHED"}
+    names = [paint.name for paint in kinds.paints(scene)[:2]]
+    assert names == ["surface", "gold"], names
+    now = kinds.slots_of_faces(mesh)
+    assert (now[:20] == 0).all() and (now[20:40] == 1).all()
+    bpy.ops.patina.remove_material()
+    bpy.ops.patina.remove_material()
+    assert not scene.patina.use_slots and not len(mesh.data.materials)
