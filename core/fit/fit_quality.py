@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-MAX_GOOD_ERROR = 0.10  # typical error of a held-out photo; even materials with known lights: 2–8 %
-MAX_FAIR_ERROR = 0.25  # one BRDF on a museum bronze with patina: 20 %; one Lambertian colour: 31 %
+# of linear light, in which errors are about twice those of the encoded photo that a viewer shows
+MAX_GOOD_ERROR = 0.10  # typical error of a held-out photo; even materials under known lamps: 2–8 %
+MAX_FAIR_ERROR = 0.25  # telephone photos of an even box: 20 %; one BRDF on a patinated bronze: 39 %
 
 
 class Rating(Enum):

@@ -42,7 +42,9 @@ class DraftJob(Job):
             draft = yield from _relayed(
                 matched(draft, opened, self.paths), MATCHING, READ_SHARE, MATCH_SHARE
             )
-            draft = yield from _relayed(with_lamps(draft, opened), GROUPING, MATCH_SHARE, 1.0)
+            kept = {photo.file for photo in self.before.photos} if draft.lamps else set()
+            steps = with_lamps(draft, opened, kept)
+            draft = yield from _relayed(steps, GROUPING, MATCH_SHARE, 1.0)
         self.draft = draft
 
     def _read(self) -> Draft:

@@ -50,7 +50,7 @@ class Picture:
         step = max(int(np.ceil(max(grey.shape) / OUTLINE_PIXELS)), 1)
         height, width = (n // step * step for n in grey.shape)
         blocks = grey[:height, :width].reshape(height // step, step, width // step, step)
-        level = np.maximum(blocks.mean(axis=(1, 3)), 0)
+        level = np.maximum(np.nan_to_num(blocks.mean(axis=(1, 3)), posinf=0.0), 0)
         return cls(level, max(float(np.percentile(level, 99.5)), 1e-30))
 
     @property

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Collection, Generator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,46 +33,64 @@ MIN_FLASH_SHARE = 0.8  # of the photos
 MIN_FLASH_PHOTOS = 3
 
 
-def with_lamps(draft: Draft, opened: OpenedScan) -> Generator[float, None, Draft]:
-    """The draft with a lamp for each photo; yields the fraction done."""
-    used = [i for i, photo in enumerate(draft.photos) if photo.used and photo.camera is not None]
+def with_lamps(
+    draft: Draft, opened: OpenedScan, grouped: Collection[Path] = ()
+) -> Generator[float, None, Draft]:
+    """The draft with a lamp for each photo; yields the fraction done.
+
+    grouped: photos that keep their lamps, which the user may have edited; the lamps of the others
+    are added.
+    """
+    used = [
+        i
+        for i, photo in enumerate(draft.photos)
+        if photo.used and photo.camera is not None and photo.file not in grouped
+    ]
     if not used:
         return draft
-    directions: list[Array] = []
-    from_camera: list[bool] = []
-    parts: list[LampPhoto] = []
+    parts: list[LampPhoto | None] = []
+    directions: list[Array | None] = []
     for done, i in enumerate(used[:MAX_COMPARED_PHOTOS]):
         yield 0.4 * done / len(used)
         part = _pixels(draft.photos[i], opened)
-        if part is None:
-            parts.clear()
-            break
         parts.append(part)
-        direction, _ = best_direction(part.first(COARSE_PIXELS), opened.rays, opened.dictionary)
-        directions.append(direction)
-        from_camera.append(_from_camera(direction, part.camera, opened))
-    if len(used) >= MIN_FLASH_PHOTOS and sum(from_camera) >= MIN_FLASH_SHARE * len(used):
+        directions.append(None)
+        if part is not None:
+            few = part.first(COARSE_PIXELS)
+            directions[-1], _ = best_direction(few, opened.rays, opened.dictionary)
+    directions += [None] * (len(used) - len(directions))
+    flashes = sum(
+        part is not None and one is not None and _from_camera(one, part.camera, opened)
+        for part, one in zip(parts, directions, strict=False)
+    )
+    if len(used) >= MIN_FLASH_PHOTOS and flashes >= MIN_FLASH_SHARE * len(used):
         lamps, how = [0] * len(used), "the light comes from the camera"
         made = [DraftLamp("flash", LampKind.FLASH, (0.0, 0.0, 0.0))]
     else:
-        if len(used) == len(parts) <= MAX_SEARCHED_PHOTOS:
+        if len(used) <= MAX_SEARCHED_PHOTOS:
             directions = yield from _searched(parts, opened)
         lamps, how = _groups(draft, used, directions)
         made = [
             DraftLamp(
-                f"lamp {k + 1}",
-                values=_mean([d for d, own in zip(directions, lamps, strict=False) if own == k]),
+                f"lamp {len(draft.lamps) + k + 1}",
+                values=_mean([
+                    one
+                    for one, own in zip(directions, lamps, strict=True)
+                    if own == k and one is not None
+                ]),
             )
             for k in range(max(lamps) + 1)
-        ]
+        ]  # fmt: skip
     photos = list(draft.photos)
     for i, lamp in zip(used, lamps, strict=True):
-        photos[i] = replace(photos[i], lamp=lamp)
+        photos[i] = replace(photos[i], lamp=len(draft.lamps) + lamp)
     note = f"{counted(len(made), 'lamp')} for {counted(len(used), 'photo')}: {how}"
-    return replace(draft, photos=tuple(photos), lamps=tuple(made), found=(*draft.found, note))
+    return replace(
+        draft, photos=tuple(photos), lamps=(*draft.lamps, *made), found=(*draft.found, note)
+    )
 
 
-def _groups(draft: Draft, used: list[int], directions: list[Array]) -> tuple[list[int], str]:
+def _groups(draft: Draft, used: list[int], directions: list[Array | None]) -> tuple[list[int], str]:
     """(lamp of each used photo, why)."""
     files = [draft.photos[i].file for i in used]
     found = group_lamps.by_folder_or_name(files)
@@ -80,9 +99,18 @@ def _groups(draft: Draft, used: list[int], directions: list[Array]) -> tuple[lis
     found = group_lamps.by_time(files, {file: time_of(file) for file in files})
     if found is not None:
         return found, "by pauses between the photos"
-    if directions:
-        return group_lamps.by_direction(directions), "by shading"
-    return [0] * len(files), "one for all, because there are too many photos to compare"
+    known = [one for one in directions if one is not None]
+    if len(used) > MAX_COMPARED_PHOTOS or not known:
+        why = "too many to compare" if known else "too dark to compare"
+        return [0] * len(files), f"one for all, because the photos are {why}"
+    shared = iter(group_lamps.by_direction(known))
+    lamps = [None if one is None else next(shared) for one in directions]
+    extra = max(k for k in lamps if k is not None)
+    for place, lamp in enumerate(lamps):  # a photo that shows too little gets a lamp of its own
+        if lamp is None:
+            extra += 1
+            lamps[place] = extra
+    return [k for k in lamps if k is not None], "by shading"
 
 
 def _mean(directions: list[Array]) -> tuple[float, float, float]:
@@ -109,21 +137,26 @@ def _pixels(photo: DraftPhoto, opened: OpenedScan) -> LampPhoto | None:
     return part if (part.radiance > 0).sum() >= MIN_LIT_PIXELS else None
 
 
-def _searched(parts: list[LampPhoto], opened: OpenedScan) -> Generator[float, None, list[Array]]:
-    """Direction of the light of each photo, all photos together."""
+def _searched(
+    parts: list[LampPhoto | None], opened: OpenedScan
+) -> Generator[float, None, list[Array | None]]:
+    """Direction of the light of each photo, all photos together; None without pixels."""
     lamps = [
         UnknownLamp(DistantLight(f"{k}", np.array([0.0, 0.0, 1.0])), (part,))
         for k, part in enumerate(parts)
+        if part is not None
     ]
+    if not lamps:
+        return [None] * len(parts)
     steps = find_lamps(lamps, 1, opened.rays, opened.dictionary, with_errors=False)
     while True:
         try:
             done = next(steps)
         except StopIteration as stop:
-            found = stop.value.lamps
+            found = iter(stop.value.lamps)
             break
         yield 0.4 + 0.6 * done
-    return [one.light.direction for one in found if one is not None]
+    return [None if part is None else next(found).light.direction for part in parts]
 
 
 def _from_camera(direction: Array, camera: Camera, opened: OpenedScan) -> bool:

@@ -150,6 +150,34 @@ def test_only_stated_values_are_no_guess(kind: LampKind, stated: bool) -> None:
     assert ("guess = true" in text) == (not stated and kind is not LampKind.SUN)
 
 
+def test_photos_added_later_keep_the_lamps_of_others(loose: Path) -> None:
+    """Lamps that the user edited stay; a photo that shows nothing gets a lamp of its own."""
+    shots = sorted(loose.glob("*.exr"))
+    for k, shot in enumerate(shots, start=1):
+        shot.rename(loose / f"view_{k:02}.exr")
+    made.write_exr(loose / "view_02.exr", np.zeros((made.HEIGHT, made.WIDTH, 3), np.float32))
+    named = [loose / f"view_{k:02}.exr" for k in range(1, 7)]
+    first = drafted(loose / "sparse", loose / "mesh.ply", *named[:3])
+    assert len({photo.lamp for photo in first.photos}) == 3
+    edited = Draft(
+        **{
+            **vars(first),
+            "lamps": (DraftLamp("mine", LampKind.FLASH), *first.lamps[1:]),
+            "photos": tuple(DraftPhoto(p.file, p.camera, p.how) for p in first.photos),
+        }
+    )
+    second = drafted(*named[3:], before=edited)
+    assert [photo.lamp for photo in second.photos[:3]] == [0, 0, 0]
+    assert second.lamps[0] == edited.lamps[0]
+    assert min(photo.lamp for photo in second.photos[3:]) == len(edited.lamps)
+    assert len(second.lamps) > len(edited.lamps)
+
+
+def test_empty_folder_says_what_is_missing(tmp_path: Path) -> None:
+    draft = drafted(tmp_path)
+    assert not draft.found and draft.missing is not None and "cameras" in draft.missing
+
+
 def test_incomplete_draft_says_what_is_missing(tmp_path: Path) -> None:
     full = Draft(
         Path("sparse"), Path("mesh.ply"), None, (DraftPhoto(Path("a.exr"), "a"),), (DraftLamp("l"),)
