@@ -249,7 +249,7 @@ def test_exposures_without_common_range_give_a_warning() -> None:
 @pytest.mark.parametrize("exposures", [(1.0,), (1.0, 0.0), (1.0, -1.0), (1.0, math.nan)])
 def test_impossible_exposures_are_rejected(exposures) -> None:
     shots = bracket(scene(14), (1.0, 0.5))
-    with pytest.raises(InputError, match="exposures"):
+    with pytest.raises(InputError, match="exposure"):
         merge_bracket(shots, exposures)
     with pytest.raises(InputError, match="size"):
         merge_bracket([shots[0], photo(np.ones((4, 4, 3)))], (1.0, 0.5), [NOISE] * 2)
