@@ -17,10 +17,10 @@ from ..core.report.diagnosis_json import describe
 from ..scene.material.prepared_materials import PreparedJob
 from ..scene.session.last_diagnosis import keep_check, kept_check
 from ..scene.session.running_job import set_running
-from ..scene.session.scene_properties import DIAGNOSIS, capture_path, store_result
+from ..scene.session.scene_properties import DIAGNOSIS, RESULT, capture_path, store_result
 from ..scene.views.evidence import paint_evidence
 from ..scene.views.evidence_overlay import toggle_evidence
-from ..scene.views.outdated import record_inputs
+from ..scene.views.outdated import inputs_now, record_inputs
 from .fit import can_fit, fit_job, show_result
 from .stepped import Stepped
 
@@ -41,6 +41,7 @@ the causes, and fit again with these causes included in the model"""
     def _start(self, context: bpy.types.Context) -> None:
         keep_check(None)  # the samples of two checks would need too much memory
         self._job = PreparedJob(CheckJob(fit_job(self, context.scene)))
+        self._inputs = inputs_now(context.scene)
         self._scene = context.scene.name
 
     def _finish(self, context: bpy.types.Context) -> Iterator[None]:
@@ -71,8 +72,8 @@ the causes, and fit again with these causes included in the model"""
                 {"WARNING"},
                 f"{mesh.name} no longer has the vertices of the scan, so it was not coloured.",
             )
-        record_inputs(scene)
-        record_inputs(scene, DIAGNOSIS)
+        for kind in (RESULT, DIAGNOSIS):
+            record_inputs(scene, kind, self._inputs)
         for trial in found.reported:
             self.report({"WARNING"}, f"{cause_label(trial.effect.cause)}: {found.sentence(trial)}")
         if not found.causes:
@@ -100,6 +101,7 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
         off = [cause.name for cause in context.scene.patina.causes if not cause.use]
         refit = RefitJob(kept_check(capture_path(context.scene)), without=off, exactly=True)
         self._job = PreparedJob(refit)
+        self._inputs = inputs_now(context.scene)
         self._scene = context.scene.name
 
     def _finish(self, context: bpy.types.Context) -> Iterator[None]:
@@ -111,8 +113,8 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
         yield from _show(self, scene, after)
         description = describe(checked.found, checked.result, after)
         store_result(str(after.capture.file), description, DIAGNOSIS)
-        record_inputs(scene)
-        record_inputs(scene, DIAGNOSIS)
+        for kind in (RESULT, DIAGNOSIS):
+            record_inputs(scene, kind, self._inputs)
 
 
 def _show(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> Iterator[None]:

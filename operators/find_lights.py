@@ -15,6 +15,7 @@ from ..scene.paint.mask_images import with_mask_images
 from ..scene.photos.dragged_lamps import lamp_of, mesh_frame, with_dragged_lamps
 from ..scene.photos.found_lights import move_to_found, scan_origin
 from ..scene.photos.photo_list import looked_at
+from ..scene.property_keys import FOUND_STRENGTH
 from .fit import can_fit
 from .stepped import Stepped
 
@@ -72,9 +73,11 @@ photos, and move the lamps there"""
         file = str(self._job.capture.file)
         frame, origin = mesh_frame(scene, file), scan_origin(scene, file)
         for entry in found.entries:
+            lamp = lamp_of(scene, file, entry.name)
+            if lamp is not None and entry.relative_strength is not None:
+                lamp[FOUND_STRENGTH] = entry.relative_strength
             if entry.name not in found.lamps:
                 continue
-            lamp = lamp_of(scene, file, entry.name)
             if lamp is None or not move_to_found(lamp, entry, frame, origin):
                 self.report(
                     {"WARNING"},

@@ -25,7 +25,7 @@ from ..scene.session.last_fit import keep_fit
 from ..scene.session.overlay_shading import leave_overlay
 from ..scene.session.preferences import preferences
 from ..scene.session.running_job import set_running
-from ..scene.views.outdated import record_inputs
+from ..scene.views.outdated import inputs_now, record_inputs
 from .stepped import Stepped
 
 
@@ -96,6 +96,7 @@ class PATINA_OT_fit(Stepped, bpy.types.Operator):
 
     def _start(self, context: bpy.types.Context) -> None:
         self._job = PreparedJob(fit_job(self, context.scene))
+        self._inputs = inputs_now(context.scene)
         self._scene = context.scene.name  # by name: a reference does not survive undo
 
     def _finish(self, context: bpy.types.Context) -> Iterator[None]:
@@ -107,7 +108,7 @@ class PATINA_OT_fit(Stepped, bpy.types.Operator):
             self.report({"WARNING"}, "The scene no longer exists; the materials were not applied.")
             return
         yield from show_result(self, scene, result)
-        record_inputs(scene)
+        record_inputs(scene, at_start=self._inputs)
         self.report({"INFO"}, f"{counted(len(result.materials), 'material')} measured.")
 
 

@@ -21,6 +21,7 @@ LIGHT_GUESS = "patina_guess"  # on a lamp: its place is a placeholder that was n
 STATED_ERROR = "patina_stated_error"  # on a lamp: standard error in the capture file
 FOUND_PLACEMENT = "patina_found"  # on a lamp: direction, position or offset found from photos
 FOUND_ERROR = "patina_found_error"  # on a lamp: standard error of these, −1 where unknown
+FOUND_STRENGTH = "patina_found_strength"  # on a lamp: relative strength found from photos
 FOUND_BEAM = "patina_found_beam"  # on a lamp: beam of a flash found from photos, −1 for none
 RESULT_INPUTS = "patina_inputs"  # on a text with a result: what it was made with, JSON
 MAP_KIND = "patina_map"  # on a node: which map it shows

@@ -66,7 +66,8 @@ class LightEntry:
     from the axis at which half of the intensity is left. refine: the given values are start values
     of an optimisation. guess: the direction or position is a placeholder that was not measured.
     standard_error: of the direction (radians), or of the position or offset (scan units), where it
-    was found from photos. charted: the colour chart of [tone] gives the strength."""
+    was found from photos. relative_strength: where no strength is known, that relative to the other
+    lights. charted: the colour chart of [tone] gives the strength."""
 
     name: str
     direction: Array | None = None
@@ -82,6 +83,7 @@ class LightEntry:
     refine: bool = False
     guess: bool = False
     standard_error: float | None = None
+    relative_strength: float | None = None
     charted: bool = False
 
     @property

@@ -53,7 +53,14 @@ def read_light(section: Section) -> LightEntry:
         refine=section.flag("refine", False),
         guess=section.flag("guess", False),
         standard_error=_standard_error(section, distant),
+        relative_strength=_relative_strength(section),
     )
+    if entry.relative_strength is not None and entry.strength_given:
+        raise section.error(
+            "the strength is given; a relative strength is only for lights of unknown strength: "
+            "remove one of the two",
+            "relative_strength",
+        )
     if entry.sphere is not None or entry.sun is not None:
         for key in ("guess", "standard_error"):
             if key in section:
@@ -89,6 +96,12 @@ def _standard_error(section: Section, distant: bool) -> float | None:
     if distant:
         return float(np.radians(section.number("standard_error", 0.0, 0.0, 180.0)))
     return section.number("standard_error", 0.0, 0.0, MAX_RADIUS)
+
+
+def _relative_strength(section: Section) -> float | None:
+    if "relative_strength" not in section:
+        return None
+    return section.number("relative_strength", 1.0, 1e-6, 1e6)
 
 
 def _strength(section: Section, key: str, distant: bool) -> NDArray[np.float64] | None:

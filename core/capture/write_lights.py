@@ -25,10 +25,10 @@ TABLES = ("sphere", "sun", "white")
 def write_lights(capture: Capture, lights: Sequence[LightEntry], out: Path) -> None:
     """Write a copy of the capture's file with ``lights`` in place of its own, one for one.
 
-    Written are direction, position, mounted, irradiance or intensity, angle, radius, beam, guess
-    and standard_error; the entries that these replace (sphere, sun, white) become comments. out may
-    be the capture's own file. It is written atomically, after it has been read back and compared.
-    Raises PatinaError.
+    Written are direction, position, mounted, irradiance or intensity, angle, radius, beam, guess,
+    standard_error and relative_strength; the entries that these replace (sphere, sun, white) become
+    comments. out may be the capture's own file. It is written atomically, after it has been read
+    back and compared. Raises PatinaError.
     """
     try:
         text = capture.file.read_bytes().decode("utf-8")
@@ -117,6 +117,9 @@ def _changes(old: LightEntry, new: LightEntry) -> dict[str, str | None]:
         changes["guess"] = "true" if new.guess else None
     if not _same(old.standard_error, new.standard_error):
         changes["standard_error"] = _standard_error(new)
+    if not _same(old.relative_strength, new.relative_strength):
+        relative = new.relative_strength
+        changes["relative_strength"] = None if relative is None else repr(float(relative))
     for key in TABLES:
         if getattr(old, key) is not None and getattr(new, key) is None:
             changes[key] = None

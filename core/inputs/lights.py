@@ -124,7 +124,8 @@ def _light(
     notes: list[str],
 ) -> Light:
     if entry.position is not None:
-        return NearLight(entry.name, entry.position, entry.strength, entry.radius)
+        relative = entry.relative_strength or 1.0
+        return NearLight(entry.name, entry.position, entry.strength, entry.radius, relative)
     if entry.mounted is not None:
         return MountedLight(entry.name, entry.mounted, entry.strength, entry.radius, entry.beam)
     radius = 0.0 if entry.angle is None else 0.5 * entry.angle
@@ -155,7 +156,7 @@ def _light(
         message = error.detail if without_file and isinstance(error, InputError) else str(error)
         raise capture.error(message, "light", place, key) from error
     notes += [f"Light {entry.name!r}: {sentence}" for sentence in found]
-    return DistantLight(entry.name, direction, strength, radius)
+    return DistantLight(entry.name, direction, strength, radius, entry.relative_strength or 1.0)
 
 
 def _from_sphere(

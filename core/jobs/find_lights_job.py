@@ -26,6 +26,8 @@ from ..scan import Scan
 READING, SEARCHING = "reading photos", "searching lights"
 READ_SHARE = 0.1  # of the job's time
 MIN_PIXELS_OF_PHOTO = 150
+MIN_STRENGTH_RATIO = 2.2  # of two lamps: lamps of equal strength are found to differ by up to 2.1,
+# because the strength of a lamp behind the object is hard to tell from the reflectance there
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,9 @@ class FindLightsJob(Job):
                 break
             yield Step(SEARCHING, READ_SHARE + (1 - READ_SHARE) * done)
         by_name = {n: one for n, one in zip(names, found.lamps, strict=True) if one is not None}
-        self.result = _result(capture, lights, by_name, parts)
+        gains = dict(zip(names, found.gains, strict=True))
+        strengths = _relative_strengths(capture, lights, gains)
+        self.result = _result(capture, lights, by_name, parts, strengths)
 
 
 def _without_locations(capture: Capture, names: Collection[str]) -> Capture:
@@ -133,11 +137,15 @@ def _result(
     lights: Lights,
     lamps: dict[str, FoundLamp],
     parts: dict[str, list[LampPhoto]],
+    strengths: dict[str, float],
 ) -> FoundLights:
     entries, notes = [], list(lights.notes)
     for entry in capture.lights:
         lamp = lamps.get(entry.name)
-        entries.append(entry if lamp is None else _entry(entry, lamp))
+        new = entry if lamp is None else _entry(entry, lamp)
+        if entry.name in strengths:
+            new = replace(new, relative_strength=strengths[entry.name])
+        entries.append(new)
         if lamp is not None:
             notes.append(_sentence(entry.name, lamp, len(parts[entry.name])))
             if lamp.other is not None:
@@ -148,6 +156,30 @@ def _result(
                     "from other sides."
                 )
     return FoundLights(tuple(entries), lamps, tuple(notes))
+
+
+def _relative_strengths(
+    capture: Capture, lights: Lights, gains: dict[str, float]
+) -> dict[str, float]:
+    """Strengths of the lights of unknown strength relative to one another, {} where all may be
+    equal, where a strength is known, and for flashes.
+
+    Only a light that differs from the median by more than MIN_STRENGTH_RATIO gets a value of its
+    own; the others are 1.
+    """
+    total = {}
+    for entry in capture.lights:
+        light = lights.by_name[entry.name]
+        if entry.strength_given or not isinstance(light, DistantLight | NearLight):
+            return {}
+        if entry.name in gains:
+            total[entry.name] = gains[entry.name] * light.relative
+    if len(total) < 2 or not min(total.values()) > 0:
+        return {}
+    unit = float(np.median(list(total.values())))
+    ratios = {name: value / unit for name, value in total.items()}
+    far = {n: r for n, r in ratios.items() if max(r, 1 / r) > MIN_STRENGTH_RATIO}
+    return {name: far.get(name, 1.0) for name in ratios} if far else {}
 
 
 def _angle_to(lamp: FoundLamp) -> float:

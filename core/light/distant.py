@@ -19,13 +19,15 @@ class DistantLight:
 
     direction: (3,) unit, surface → light, scan frame. irradiance: (3,) at normal incidence, in
     radiance units of the photos × sr; None where unknown (the BRDF is then known up to a scale).
-    angular_radius: of the source, radians (the sun's is 0.00465).
+    angular_radius: of the source, radians (the sun's is 0.00465). relative: irradiance relative to
+    the other lights of unknown irradiance.
     """
 
     name: str
     direction: Array
     irradiance: Array | None = None
     angular_radius: float = 0.0
+    relative: float = 1.0
 
     @property
     def known(self) -> bool:
@@ -34,8 +36,8 @@ class DistantLight:
 
     @property
     def effective_irradiance(self) -> Array:
-        """(3,) the irradiance, or 1 where unknown."""
-        return np.ones(3) if self.irradiance is None else self.irradiance
+        """(3,) the irradiance, or the relative one where unknown."""
+        return np.full(3, self.relative) if self.irradiance is None else self.irradiance
 
     def incidence(self, points: Array, camera: Camera) -> Incidence:
         """Incident light at points (n, 3), the same at all of them."""

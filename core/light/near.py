@@ -37,12 +37,13 @@ def irradiance_of_point(
 class NearLight:
     """A lamp near the object. position: (3,) scan frame. intensity: (3,) irradiance at distance 1
     (scan units), with inverse-square falloff; None where unknown. radius: of the source, scan
-    units."""
+    units. relative: intensity relative to the other lights of unknown intensity."""
 
     name: str
     position: Array
     intensity: Array | None = None
     radius: float = 0.0
+    relative: float = 1.0
 
     @property
     def known(self) -> bool:
@@ -51,7 +52,7 @@ class NearLight:
 
     def incidence(self, points: Array, camera: Camera) -> Incidence:
         """Incident light at points (n, 3), scan frame."""
-        intensity = np.ones(3) if self.intensity is None else self.intensity
+        intensity = np.full(3, self.relative) if self.intensity is None else self.intensity
         return irradiance_of_point(points, self.position, intensity, None, None)
 
 

@@ -72,10 +72,12 @@ class FoundLamp:
 @dataclass(frozen=True)
 class FoundLamps:
     """lamps: in the order given, None for a known one. coefficients: (m, k) of the materials in the
-    dictionary, of unknown scale."""
+    dictionary, of unknown scale. gains: strength of each lamp, also of known ones, relative to that
+    of its light, in one unknown unit."""
 
     lamps: tuple[FoundLamp | None, ...]
     coefficients: Array
+    gains: tuple[float, ...]
 
 
 @dataclass
@@ -154,7 +156,11 @@ def find_lamps(
         cost = cost_with_gain(state.fine, values, coefficients)
         one = FoundLamp(state.light, error, cost, _other(state, coefficients))
         found.append(None if state.lamp.known else one)
-    return FoundLamps(tuple(found), coefficients)
+    gains = tuple(
+        state.fine.measured.gain(predicted(values, coefficients, state.fine.material))
+        for state, values in zip(states, radiance, strict=True)
+    )
+    return FoundLamps(tuple(found), coefficients, gains)
 
 
 def _scaled(

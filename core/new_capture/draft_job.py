@@ -18,7 +18,7 @@ from .propose_lamps import with_lamps
 from .recognise import best_cameras, best_mesh, readable_photos, sort_paths, tool_name
 
 READING, MATCHING, GROUPING = "reading files", "matching photos", "grouping photos by lamp"
-READ_SHARE, MATCH_SHARE = 0.2, 0.4  # of the job's time, at the ends of these parts
+READ_SHARE, MATCH_SHARE = 0.08, 0.25  # of the job's time, at the ends of these parts
 SCAN_PHOTO_SHARE = 0.8  # of the cameras that a folder holds the photos of, to be the scan's photos
 
 

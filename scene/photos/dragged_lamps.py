@@ -22,7 +22,7 @@ from ..property_keys import (
     STATED_ERROR,
 )
 from . import lamp_placement
-from .found_lights import found_values
+from .found_lights import found_strength, found_values
 from .lamp_placement import DISTANT, FROM_CAMERA, MOUNTED, NEAR, Placement
 
 Array = NDArray[np.float64]
@@ -100,10 +100,9 @@ def changed_lights(
         if lamp is None or lamp.get(LAMP_KIND) != _kind(entry):
             continue
         hand = lamp_edits(scene, lamp)
-        if hand:
-            changed = _entry(entry, lamp, hand, origin)
-            if changed is not entry:
-                yield changed, lamp
+        changed = entry if hand is None else _entry(entry, lamp, hand, origin)
+        if changed is not entry:
+            yield changed, lamp
 
 
 def with_dragged_lamps(capture: Capture, scene: bpy.types.Scene) -> tuple[Capture, list[str]]:
@@ -150,6 +149,9 @@ def _kind(entry: LightEntry) -> str:
 
 def _entry(entry: LightEntry, lamp: bpy.types.Object, hand: LampEdits, origin: Array) -> LightEntry:
     new: dict[str, Any] = {}
+    strength = found_strength(lamp)
+    if not (strength in (None, entry.relative_strength) or entry.strength_given):
+        new["relative_strength"] = strength
     if hand.moved:
         new.update(guess=False, standard_error=None)
         new.update(found_values(lamp, hand.now) or {})

@@ -8,7 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.capture import LightEntry
-from ..property_keys import CAPTURE, FOUND_BEAM, FOUND_ERROR, FOUND_PLACEMENT, LAMP_KIND, ORIGIN
+from ..property_keys import (
+    CAPTURE,
+    FOUND_BEAM,
+    FOUND_ERROR,
+    FOUND_PLACEMENT,
+    FOUND_STRENGTH,
+    LAMP_KIND,
+    ORIGIN,
+)
 from .lamp_placement import DISTANT, FROM_CAMERA, MOUNTED, Placement, world_matrix
 
 Array = NDArray[np.float64]
@@ -41,6 +49,7 @@ def move_to_found(
         _set_world(lamp, None, axis / np.linalg.norm(axis))
     lamp[FOUND_PLACEMENT] = found.tolist()
     lamp[FOUND_ERROR] = entry.standard_error if entry.standard_error is not None else -1.0
+    lamp[FOUND_STRENGTH] = -1.0 if entry.relative_strength is None else entry.relative_strength
     lamp[FOUND_BEAM] = -1.0 if entry.beam is None else entry.beam
     return True
 
@@ -61,6 +70,12 @@ def found_values(lamp: bpy.types.Object, now: Placement) -> dict[str, float | No
     if kind == MOUNTED:
         values["beam"] = _known(lamp.get(FOUND_BEAM, -1.0))
     return values
+
+
+def found_strength(lamp: bpy.types.Object) -> float | None:
+    """The strength relative to the other lamps that was found; it does not depend on later edits of
+    the lamp's place."""
+    return _known(lamp.get(FOUND_STRENGTH, -1.0))
 
 
 def scan_origin(scene: bpy.types.Scene, capture: str) -> Array:

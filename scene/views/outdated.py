@@ -52,11 +52,18 @@ def inputs_now(scene: bpy.types.Scene) -> dict[str, str]:
     return found
 
 
-def record_inputs(scene: bpy.types.Scene, kind: str = RESULT) -> None:
-    """Store the present inputs with the result of a fit or a check."""
+def record_inputs(
+    scene: bpy.types.Scene, kind: str = RESULT, at_start: dict[str, str] | None = None
+) -> None:
+    """Store with the result of a fit or a check what it was made with.
+
+    at_start: inputs_now when the job started; what was edited meanwhile is not in its result. The
+    slots of the mesh are those of now, because the job assigns them.
+    """
     text = result_text(capture_path(scene), kind)
     if text is not None:
-        text[RESULT_INPUTS] = json.dumps(inputs_now(scene))
+        now = inputs_now(scene)
+        text[RESULT_INPUTS] = json.dumps({**now, **(at_start or {}), "slots": now["slots"]})
 
 
 def changes_since(scene: bpy.types.Scene, kind: str = RESULT) -> tuple[str, ...]:

@@ -16,6 +16,9 @@ from patina.core.basis import default_basis
 from patina.core.capture import read_capture
 from patina.core.errors import PatinaError
 from patina.core.geometry import RayScene
+from patina.core.inputs import capture_data
+from patina.core.inputs.lights import find_lights
+from patina.core.inputs.photos import LitPhotos
 from patina.core.jobs.find_lights_job import FindLightsJob
 from patina.core.light import MountedLight, NearLight
 from patina.core.light_search import LampPhoto, UnknownLamp, draw_lamp_pixels, find_lamps
@@ -81,6 +84,32 @@ def test_known_lights_stay_and_named_light_is_found(guessed: Path) -> None:
     assert job.result.entries[1:] == capture.lights[1:]
     assert degrees(job.result.entries[0].direction, first.direction) < 5.0
     assert set(job.result.lamps) == {first.name}
+
+
+def test_relative_strengths_are_found(guessed: Path) -> None:
+    """Lamps of very different, unknown strengths: the ratios are found with the directions."""
+    text = (guessed.parent / "true.capture.toml").read_text("utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith("irradiance")]
+    guessed.write_text("\n".join(lines), "utf-8")
+    for k, factor in ((2, 4.0), (4, 0.2)):
+        rotation, translation = list(made.poses())[k - 1]
+        light = list(made.light_directions())[k - 1]
+        picture = made.photo(rotation, translation, light)
+        made.write_exr(guessed.parent / f"lit_{k}.exr", (factor * picture).astype(np.float32))
+    capture = read_capture(guessed)
+    job = FindLightsJob(capture, [light.name for light in capture.lights])
+    job.drain()
+    found = np.array([light.relative_strength for light in job.result.entries])
+    assert found[[0, 2, 4, 5]].tolist() == [1.0, 1.0, 1.0, 1.0]
+    assert abs(np.log(found[1] / 4.0)) < np.log(1.6) and abs(np.log(found[3] / 0.2)) < np.log(1.6)
+    lights = find_lights(
+        replace(capture, lights=job.result.entries),
+        capture_data.open_scan(capture),
+        LitPhotos.open(capture),
+    )
+    second = lights.by_name[capture.lights[1].name]
+    assert second.effective_irradiance == pytest.approx(np.full(3, found[1]))
+    assert not second.known
 
 
 def test_nothing_to_find_and_unknown_names_are_errors(guessed: Path) -> None:

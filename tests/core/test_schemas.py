@@ -42,6 +42,7 @@ light = "lamp", normal = [0, 0, 1]}
 name = "lamp"
 direction = [0.3, 0.5, 0.81]
 angle = 0.53
+relative_strength = 1.5
 refine = false
 
 [[light]]
