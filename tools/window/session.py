@@ -27,6 +27,7 @@ PACKAGE = "bl_ext.user_default.patina"
 STAGES = ["scan", "photos", "masks", "fit", "check", "material"]
 HEADER, FIRST = 25, 18  # pixels: between headers of closed panels; from the top to the first header
 TIMEOUT = 1500  # seconds for the session (real_blender.sh ends it soon after)
+SHOTS = "hcafbged"  # letters of the own object's photos: an order that matches no camera
 REDRAW_DELAY = 2.0  # seconds after which a window has been redrawn
 found: dict[str, object] = {}
 drawn: set[str] = set()  # stages whose panels were open at the last redraw of the sidebar
@@ -287,7 +288,7 @@ def loose_files() -> Path:
     shutil.copy(demo / "mesh.ply", folder)
     (folder / "lit").mkdir()
     for place, photo in enumerate(sorted((demo / "lit").glob("*.exr"))):
-        shutil.copy(photo, folder / "lit" / f"shot_{'hcafbged'[place]}.exr")
+        shutil.copy(photo, folder / "lit" / f"shot_{SHOTS[place]}.exr")
     return folder
 
 
@@ -301,6 +302,15 @@ def own_object() -> Iterator[float]:
     photograph("14_new_capture")
     scene = bpy.context.scene
     draft = scene.patina_draft
+    names = sorted(
+        p.stem for p in (Path(part("operators.import_capture").DEMO).parent / "lit").iterdir()
+    )
+    wrong = []
+    for photo in draft.photos:
+        photo.use = bool(photo.camera)  # as a user switches off what has no camera
+        true = names[SHOTS.index(Path(photo.name).stem[-1])]
+        wrong += [photo.name] if photo.camera and Path(photo.camera).stem != true else []
+    found["own object, wrong cameras"] = wrong
     found["own object, matched by content"] = sum(p.how == "by content" for p in draft.photos)
     found["own object, lamps"] = len(draft.lamps)
     press("patina.create_capture")
@@ -318,7 +328,7 @@ def own_object() -> Iterator[float]:
         for light in now.lights
     ]
     found["own object, doubts"] = list(stages.stages(scene)["photos"].doubts)
-    assert found["own object, matched by content"] == 8, found
+    assert not wrong and found["own object, matched by content"] >= 7, found
     assert found["own object, lamps"] == 4, found
     assert max(found["own object, degrees off"]) < 5, found
     assert not found["own object, doubts"], found
