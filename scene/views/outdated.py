@@ -44,8 +44,7 @@ def inputs_now(scene: bpy.types.Scene) -> dict[str, str]:
     lamps = []
     for name in dict.fromkeys(photo.light for photo in lit_photos(scene)):
         lamp = lamp_of(scene, capture, name)
-        edits = None if lamp is None else lamp_edits(scene, lamp)
-        lamps.append(f"{name} {_rounded(np.array(edits.now.values)) if edits else 'missing'}")
+        lamps.append(f"{name} {_lamp_state(scene, lamp)}")
     found["lamps"] = _short("\n".join(lamps).encode())
     found["masks"] = _short(repr(sorted(mask_images(capture))).encode())
     found["capture"] = _file_state(Path(capture)) if capture else ""
@@ -66,16 +65,29 @@ def record_inputs(
         text[RESULT_INPUTS] = json.dumps({**now, **(at_start or {}), "slots": now["slots"]})
 
 
-def changes_since(scene: bpy.types.Scene, kind: str = RESULT) -> tuple[str, ...]:
+def changes_since(
+    scene: bpy.types.Scene, kind: str = RESULT, now: dict[str, str] | None = None
+) -> tuple[str, ...]:
     """What changed since the last fit or check, as clauses; () where nothing did, and for results
-    of earlier versions."""
+    of earlier versions. now: inputs_now, if the caller has it already."""
     text = result_text(capture_path(scene), kind)
     try:
         before = json.loads(text[RESULT_INPUTS]) if text is not None else {}
     except (KeyError, TypeError, ValueError):
         return ()
-    now = inputs_now(scene)
+    if not before:
+        return ()
+    now = now or inputs_now(scene)
     return tuple(CHANGES[key] for key in CHANGES if key in before and before[key] != now[key])
+
+
+def _lamp_state(scene: bpy.types.Scene, lamp: bpy.types.Object | None) -> str:
+    if lamp is None:
+        return "missing"
+    edits = lamp_edits(scene, lamp)
+    if edits is None:
+        return "of another type"
+    return _rounded(np.array(edits.now.values)) if edits else "as imported"
 
 
 def _mesh_hashes(mesh: bpy.types.Mesh) -> tuple[str, str]:

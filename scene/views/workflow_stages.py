@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...core.counted import counted
+from ...core.counted import counted, listed
 from ...core.diagnose.effects.labels import cause_label
 from ...core.fit.fit_quality import FitQuality, Rating
 from ..material.measured_materials import measured_of
@@ -17,9 +17,7 @@ from ..photos.photo_list import PatinaPhoto, lit_photos
 from ..scan.face_slots import shown_name
 from ..session.lengths import length
 from ..session.scene_properties import DIAGNOSIS, capture_path, stored_result
-from .outdated import changes_since
-
-MAX_LISTED = 4  # names in a sentence
+from .outdated import changes_since, inputs_now
 
 
 @dataclass(frozen=True)
@@ -51,12 +49,13 @@ def stages(scene: bpy.types.Scene) -> dict[str, Stage]:
     capture, mesh = capture_path(scene), scene.patina.mesh
     there = mesh is not None and mesh.name in scene.objects
     result, diagnosis = stored_result(capture), stored_result(capture, DIAGNOSIS)
+    now = inputs_now(scene) if result is not None or diagnosis is not None else {}
     return {
         "scan": _scan(mesh if there else None),
         "photos": _photos(scene, capture, lit_photos(scene)),
         "masks": _masks(scene, capture, result),
-        "fit": _fit(result, changes_since(scene)),
-        "check": _check(diagnosis, changes_since(scene, DIAGNOSIS)),
+        "fit": _fit(result, changes_since(scene, now=now)),
+        "check": _check(diagnosis, changes_since(scene, DIAGNOSIS, now)),
         "material": _material(capture),
     }
 
@@ -93,17 +92,13 @@ def _photos(scene: bpy.types.Scene, capture: str, lit: list[PatinaPhoto]) -> Sta
     doubts = []
     if guesses:
         verb = "is a guess" if len(guesses) == 1 else "are guesses"
-        doubts.append(f"{'Light' if len(guesses) == 1 else 'Lights'} {_listed(guesses)} {verb}")
+        doubts.append(f"{'Light' if len(guesses) == 1 else 'Lights'} {listed(guesses)} {verb}")
     if lost:
         doubts.append(
-            f"No lamp in the scene for {_listed(lost)}: the fit uses the capture file's light"
+            f"No lamp in the scene for {listed(lost)}: the fit uses the capture file's light"
         )
     remedy = "patina.find_lights" if guesses else ""
     return Stage((has,), doubts=tuple(doubts), remedy=remedy)
-
-
-def _listed(names: list[str]) -> str:
-    return ", ".join(names[:MAX_LISTED]) + (" …" if len(names) > MAX_LISTED else "")
 
 
 def _masks(
@@ -134,9 +129,9 @@ def _fit(result: dict | None, changes: tuple[str, ...]) -> Stage:  # type: ignor
     poor = [
         material["name"]
         for material in materials
-        if FitQuality((material.get("held_out") or {}).get("typical")).rating is Rating.POOR
+        if FitQuality.of_result(material).rating is Rating.POOR
     ]
-    doubts = _outdated(changes) + ((f"Poor fit: {_listed(poor)}",) if poor else ())
+    doubts = _outdated(changes) + ((f"Poor fit: {listed(poor)}",) if poor else ())
     return Stage((has,), press="patina.fit", again="Fit Again", doubts=doubts)
 
 

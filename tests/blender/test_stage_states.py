@@ -117,6 +117,9 @@ def test_edits_after_a_fit_make_it_outdated() -> None:
     stored_fit()
     dragged = extension("scene.photos.dragged_lamps")
     capture = extension("scene.session.scene_properties").capture_path(scene)
+    bpy.data.objects.remove(dragged.lamp_of(scene, capture, "lamp1"))  # as it was imported
+    assert outdated() == ("a lamp was moved or deleted",)
+    stored_fit()
     lamp = dragged.lamp_of(scene, capture, "lamp2")
     lamp.rotation_mode = "XYZ"
     lamp.rotation_euler[0] += 0.1
