@@ -11,7 +11,6 @@ from pathlib import Path
 from ..core.brdf import merl_file
 from ..core.capture import read_capture
 from ..core.concurrency.job import Step, peak_memory
-from ..core.fit.fit_quality import FitQuality
 from ..core.fit.measured_result import MeasuredResult
 from ..core.jobs import CaptureResult, FitJob, Stage, finished
 from ..core.output_folder import check_out, staged_folder
@@ -89,9 +88,8 @@ def print_summary(out: Path, result: CaptureResult) -> None:
     """Print a summary of a fit: errors, warnings, notes, refined lights and files."""
     for material in result.materials:
         held = material.held_out
-        quality = FitQuality(None if held is None else held.typical).sentence
         rms = "" if held is None else f", relative RMS {100 * held.error:.0f} %"
-        print(f"{material.name}: {material.samples:,} samples. {quality}{rms}")
+        print(f"{material.name}: {material.samples:,} samples. {material.quality.sentence}{rms}")
         if isinstance(material.fit, MeasuredResult):
             print(f"  90 % interval: {reach(material.spread)}")
         for warning in material.warnings:

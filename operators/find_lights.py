@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import bpy
 
 from ..core.capture import Capture, read_capture
-from ..core.errors import InputError
 from ..core.jobs.find_lights_job import FindLightsJob
 from ..scene.material.file_cache import own_basis
 from ..scene.paint.apply_paint import apply_strokes
@@ -16,6 +13,7 @@ from ..scene.photos.dragged_lamps import lamp_of, mesh_frame, with_dragged_lamps
 from ..scene.photos.found_lights import move_to_found, scan_origin
 from ..scene.photos.photo_list import looked_at
 from ..scene.property_keys import FOUND_STRENGTH
+from ..scene.session.existing_capture import existing_capture
 from .fit import can_fit
 from .stepped import Stepped
 
@@ -43,12 +41,7 @@ photos, and move the lamps there"""
 
     def _start(self, context: bpy.types.Context) -> None:
         scene = context.scene
-        path = Path(bpy.path.abspath(scene.patina.capture))
-        if not path.is_file():
-            raise InputError(
-                "the file does not exist; import the capture again from its current folder",
-                file=path,
-            )
+        path = existing_capture(scene.patina.capture)
         apply_strokes(scene)
         capture, _ = with_dragged_lamps(read_capture(path), scene)
         self._job = FindLightsJob(

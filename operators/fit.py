@@ -4,13 +4,11 @@ cancels."""
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import bpy
 
 from ..core.capture import read_capture
 from ..core.counted import counted
-from ..core.errors import InputError
 from ..core.jobs import CaptureResult, FitJob
 from ..core.samples import Margins
 from ..scene.material.file_cache import own_basis, trim_cache
@@ -21,6 +19,7 @@ from ..scene.photos.dragged_lamps import lamp_of
 from ..scene.photos.lamps import with_dragged_lamps
 from ..scene.scan.apply_result import apply_result_steps
 from ..scene.scan.face_slots import with_painted_slots
+from ..scene.session.existing_capture import existing_capture
 from ..scene.session.last_fit import keep_fit
 from ..scene.session.overlay_shading import leave_overlay
 from ..scene.session.preferences import preferences
@@ -40,11 +39,7 @@ def can_fit(operator: type[Stepped], context: bpy.types.Context) -> bool:
 def fit_job(operator: bpy.types.Operator, scene: bpy.types.Scene) -> FitJob:
     """The fit of the scene's capture, with the lamps that the user moved and the slots and masks
     that were painted. Raises InputError if the capture file does not exist."""
-    path = Path(bpy.path.abspath(scene.patina.capture))
-    if not path.is_file():
-        raise InputError(
-            "the file does not exist; import the capture again from its current folder", file=path
-        )
+    path = existing_capture(scene.patina.capture)
     margins = preferences().margins
     capture, dragged = with_dragged_lamps(read_capture(path, margins), scene)
     if capture.fit.margins != Margins():

@@ -100,5 +100,17 @@ def import_into_scene(
     return {"FINISHED"}
 
 
+def import_written(
+    operator: bpy.types.Operator, context: bpy.types.Context, path: Path
+) -> set[str]:
+    """Import a capture file that was just written; delete the file if that fails."""
+    done = import_into_scene(operator, context, path)
+    if done == {"CANCELLED"}:
+        path.unlink(missing_ok=True)  # import_into_scene has reported the error
+    else:
+        operator.report({"INFO"}, f"Capture file written: {path}")
+    return done
+
+
 CLASSES = (PATINA_OT_import_capture, PATINA_OT_import_demo)
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -10,7 +10,7 @@ import bpy
 from ..core.capture import Capture, read_capture
 from ..core.concurrency.job import Job, Step
 from ..core.counted import counted
-from ..core.errors import InputError, PatinaError
+from ..core.errors import PatinaError
 from ..core.masks.proposal import MOST_MATERIALS
 from ..core.masks.proposal_job import ProposalJob
 from ..core.masks.write_masks import MasksJob, MasksSettings, WrittenMasks, material_names
@@ -24,6 +24,7 @@ from ..scene.paint.mask_images import (
 )
 from ..scene.photos.lamps import with_dragged_lamps
 from ..scene.scan.face_slots import show_proposal
+from ..scene.session.existing_capture import existing_capture
 from ..scene.session.overlay_shading import leave_overlay
 from ..scene.session.running_job import set_running
 from .stepped import Stepped
@@ -42,12 +43,7 @@ class _CaptureJob(Stepped):
         return cls.idle(context)
 
     def _start(self, context: bpy.types.Context) -> None:
-        path = Path(bpy.path.abspath(context.scene.patina.capture))
-        if not path.is_file():
-            raise InputError(
-                "the file does not exist; import the capture again from its current folder",
-                file=path,
-            )
+        path = existing_capture(context.scene.patina.capture)
         apply_strokes(context.scene)
         capture, _ = with_dragged_lamps(read_capture(path), context.scene)
         self._capture = str(capture.file)

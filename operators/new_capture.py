@@ -20,7 +20,7 @@ from ..core.scan.formats import read_reconstruction
 from ..scene.scan.orientation import set_upright
 from ..scene.scan.scan_collection import create_reconstruction
 from ..scene.session.folders import rectified_folder
-from .import_capture import import_into_scene
+from .import_capture import import_written
 from .report_errors import call_operator, report_and_cancel
 
 
@@ -119,12 +119,7 @@ the mesh if the folder holds several. Without photos, only cameras and sparse po
             )
         except PatinaError as error:
             return report_and_cancel(self, error)
-        done = import_into_scene(self, context, out)
-        if done == {"CANCELLED"}:
-            out.unlink(missing_ok=True)  # import_into_scene has reported the error
-            return done
-        self.report({"INFO"}, f"Capture file written: {out}")
-        return done
+        return import_written(self, context, out)
 
     def _given(self) -> tuple[Path, Path | None, tuple[Path, ...]]:
         """(cameras, mesh, photos) from the selected files, the properties and the dropped files."""

@@ -30,7 +30,7 @@ def draw_measured(
         box.label(text=material["name"], icon="MATERIAL")
         if material["name"] in materials:
             box.template_icon(icon_value=icon_of(materials[material["name"]]), scale=SPHERE)
-        quality = quality_of(material)
+        quality = FitQuality.of_result(material)
         icon = "ERROR" if quality.rating is Rating.POOR else "BLANK1"
         wrapped(box, quality.sentence, icon, IN_BOX)
         if "interval_90" in material["uncertainty"]:
@@ -43,12 +43,6 @@ def draw_measured(
             if LIGHT_MAY_BE_WRONG in warning:
                 box.operator("patina.find_lights")
         _coefficients(layout, material)
-
-
-def quality_of(material: Mapping[str, Any]) -> FitQuality:
-    """The quality of a material of result.json, also of one that an earlier version wrote."""
-    held = material.get("held_out")
-    return FitQuality(held["typical"] if held else None)
 
 
 def _coefficients(layout: bpy.types.UILayout, material: dict[str, Any]) -> None:

@@ -69,12 +69,11 @@ def _camera(shape: tuple[int, int]):
 def _search(mesh, mask, photos, which) -> tuple[Array, Array]:
     """(directions (n, 3), standard errors (n,) in degrees) of some of the photos' lights."""
     from patina.core.basis import default_basis
+    from patina.core.concurrency.steps import drained
     from patina.core.geometry import RayScene
     from patina.core.light import DistantLight
     from patina.core.light_search import UnknownLamp, draw_lamp_pixels, find_lamps
     from patina.core.light_search.brdf_dictionary import BrdfDictionary
-
-    from .bench_find_light import finished
 
     rays, rng, camera, lamps = (
         RayScene.build(mesh),
@@ -86,7 +85,7 @@ def _search(mesh, mask, photos, which) -> tuple[Array, Array]:
         usable = np.where(mask & (photos[i].max(axis=2) < CLIPPED), 0, -1).astype(np.int16)
         part = draw_lamp_pixels(rays, camera, photos[i], usable, PIXELS, rng)
         lamps.append(UnknownLamp(DistantLight(f"{i}", np.array([0.0, 0.0, 1.0])), (part,)))
-    found = finished(find_lamps(lamps, 1, rays, BrdfDictionary.of(default_basis()))).lamps
+    found = drained(find_lamps(lamps, 1, rays, BrdfDictionary.of(default_basis()))).lamps
     spread = np.degrees([one.standard_error for one in found])
     return np.array([one.light.direction for one in found]), spread
 

@@ -1,7 +1,7 @@
-"""Products of vectors along the last axis, component by component.
+"""Products of vectors along the last axis, component by component, and sets of unit vectors.
 
-Written out instead of as a matrix product: the result of a row is then bit-identical whatever rows
-it is computed with, and float32 stays float32.
+Products are written out instead of as a matrix product: the result of a row is then bit-identical
+whatever rows it is computed with, and float32 stays float32.
 """
 
 from __future__ import annotations
@@ -44,3 +44,11 @@ def length(x: Array, y: Array, z: Array) -> Array:
     total += y * y
     total += z * z
     return np.asarray(np.sqrt(total))
+
+
+def even_directions(count: int) -> NDArray[np.float64]:
+    """(count, 3) unit vectors spread evenly over the sphere, on a Fibonacci spiral."""
+    k = np.arange(count)
+    z, turn = 1 - (2 * k + 1) / count, np.pi * (3 - np.sqrt(5)) * k
+    r = np.sqrt(1 - z**2)
+    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry import RayScene
+from ..geometry.pixel_hits import pixel_hits
 from ..geometry.rays import Hits
 from ..scan import Camera
 
@@ -90,21 +91,15 @@ def _calm(
     keep = np.ones(len(row), bool)
     face, u, v = np.full(len(row), -1, np.int32), np.zeros(len(row)), np.zeros(len(row))
     centre = np.zeros((len(row), 3))
-    along = np.zeros((len(row), 3))
+    towards = np.zeros((len(row), 3))
     for k, (down, right) in enumerate(((0, 0), (REACH, 0), (-REACH, 0), (0, REACH), (0, -REACH))):
         some = np.flatnonzero(keep)
         pixels = np.stack([column[some] + right + 0.5, row[some] + down + 0.5], axis=1)
-        directions = camera.rays(pixels)
-        start = camera.ray_starts(pixels)
-        if camera.orthographic:
-            start = rays.just_before(start, directions)
-        hits = rays.first_hits(start, np.nan_to_num(directions, nan=1.0))
-        hit = (hits.face >= 0) & np.isfinite(directions).all(axis=1)
+        hit, met, view = pixel_hits(rays, camera, pixels)
         keep[some[~hit]] = False
-        met = hits.select(hit)
         normal = rays.normals(met)
         if k == 0:
-            centre[some[hit]], along[some[hit]] = normal, directions[hit]
+            centre[some[hit]], towards[some[hit]] = normal, view
             face[some[hit]], u[some[hit]], v[some[hit]] = met.face, met.u, met.v
         else:
             same = np.einsum("ij,ij->i", normal, centre[some[hit]]) > MIN_NORMAL_COSINE
@@ -119,7 +114,7 @@ def _calm(
     hits = Hits(face[keep], u[keep].astype(np.float32), v[keep].astype(np.float32))
     mean = light[keep] / len(window) ** 2
     return CalibrationPixels(
-        camera, rays.points(hits), centre[keep], -along[keep], mean, np.ones(len(mean)),
+        camera, rays.points(hits), centre[keep], towards[keep], mean, np.ones(len(mean)),
         material[row, column][keep],
     )  # fmt: skip
 

@@ -53,7 +53,7 @@ def read_light(section: Section) -> LightEntry:
         refine=section.flag("refine", False),
         guess=section.flag("guess", False),
         standard_error=_standard_error(section, distant),
-        relative_strength=_relative_strength(section),
+        relative_strength=section.optional_number("relative_strength", 1e-6, 1e6),
     )
     if entry.relative_strength is not None and entry.strength_given:
         raise section.error(
@@ -91,17 +91,8 @@ def _direction(section: Section) -> NDArray[np.float64]:
 
 def _standard_error(section: Section, distant: bool) -> float | None:
     """Radians for a direction, scan units for a position or offset."""
-    if "standard_error" not in section:
-        return None
-    if distant:
-        return float(np.radians(section.number("standard_error", 0.0, 0.0, 180.0)))
-    return section.number("standard_error", 0.0, 0.0, MAX_RADIUS)
-
-
-def _relative_strength(section: Section) -> float | None:
-    if "relative_strength" not in section:
-        return None
-    return section.number("relative_strength", 1.0, 1e-6, 1e6)
+    error = section.optional_number("standard_error", 0.0, 180.0 if distant else MAX_RADIUS)
+    return float(np.radians(error)) if distant and error is not None else error
 
 
 def _strength(section: Section, key: str, distant: bool) -> NDArray[np.float64] | None:
@@ -124,10 +115,10 @@ def _strength(section: Section, key: str, distant: bool) -> NDArray[np.float64] 
 def _sphere(section: Section) -> SphereEntry:
     photo, camera = section.file_path("photo"), section.text("camera")
     centre = section.numbers("center", 2)
-    radius = section.number("radius", 0.0, 1.0, MAX_RADIUS_PIXELS) if "radius" in section else None
+    radius = section.optional_number("radius", 1.0, MAX_RADIUS_PIXELS)
     mask = section.optional_file_path("mask")
     surface = section.optional_text("surface") or "chrome"
-    mirror = section.number("reflectance", 0.6, 0.01, 1.0) if "reflectance" in section else None
+    mirror = section.optional_number("reflectance", 0.01, 1.0)
     section.close()
     if surface not in ("chrome", "glossy"):
         raise section.error(f"found {surface!r}; expected 'chrome' or 'glossy'", "surface")
@@ -147,9 +138,6 @@ def _sphere(section: Section) -> SphereEntry:
 
 
 def _sun(section: Section) -> SunEntry:
-    def optional(name: str, low: float, high: float) -> float | None:
-        return section.number(name, 0.0, low, high) if name in section else None
-
     time = section.get("time")
     if time is not None:
         if not isinstance(time, str | datetime):
@@ -159,9 +147,9 @@ def _sun(section: Section) -> SunEntry:
         except InputError as error:
             raise section.error(error.detail, "time") from error
     entry = SunEntry(
-        latitude=optional("latitude", -90.0, 90.0),
-        longitude=optional("longitude", -180.0, 360.0),
-        altitude=optional("altitude", -500.0, 20_000.0),
+        latitude=section.optional_number("latitude", -90.0, 90.0),
+        longitude=section.optional_number("longitude", -180.0, 360.0),
+        altitude=section.optional_number("altitude", -500.0, 20_000.0),
         time=time,
         north=section.vector("north"),
         up=section.vector("up"),

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..counted import listed
 from ..errors import InputError
 from ..files import atomic_path
 from ..photo.container import KIND_OF, RAW
@@ -20,7 +21,6 @@ from .reader import read_capture
 PHOTOS = frozenset((*KIND_OF, *RAW))
 COLMAP = frozenset((".bin", ".txt"))
 CAMERAS = frozenset((*BY_SUFFIX, ".json", *COLMAP))
-MAX_LISTED = 3  # file names in a message
 
 
 @dataclass(frozen=True)
@@ -139,9 +139,8 @@ def write_new_capture(
     labels = {photo: find_camera(found.cameras, photo.name) for photo in photos}
     lost = [photo.name for photo, camera in labels.items() if camera is None]
     if lost:
-        some = ", ".join(lost[:MAX_LISTED]) + (" …" if len(lost) > MAX_LISTED else "")
         raise InputError(
-            f"{len(lost)} of {len(photos)} photos have no camera of the same name: {some}; "
+            f"{len(lost)} of {len(photos)} photos have no camera of the same name: {listed(lost)}; "
             "expected each lit photo to have the name of the scan photo from the same viewpoint: "
             "rename them, or use the command `localise` to find their viewpoints",
             file=cameras,

@@ -94,6 +94,10 @@ class Section:
             raise self.error(f"found {value}; expected a number from {low:g} to {high:g}", name)
         return float(value)
 
+    def optional_number(self, name: str, low: float, high: float) -> float | None:
+        """A finite number from ``low`` to ``high``, or None where the key is absent."""
+        return None if self.get(name) is None else self.number(name, low, low, high)
+
     def integer(self, name: str, default: int, low: int, high: int = 2**31) -> int:
         """A whole number from ``low`` to ``high``, or ``default`` where the key is absent."""
         value = self.get(name)

@@ -22,6 +22,13 @@ def relayed(
         yield convert(step)
 
 
+def scaled(
+    steps: Generator[float, None, Result], start: float, end: float
+) -> Generator[float, None, Result]:
+    """The same work, its fractions done placed between ``start`` and ``end``."""
+    return relayed(steps, lambda done: start + (end - start) * done)
+
+
 def drained(steps: Generator[Any, None, Result]) -> Result:
     """Run stepped work to its end and return its result."""
     while True:

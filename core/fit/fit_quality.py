@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 # of linear light, in which errors are about twice those of the encoded photo that a viewer shows
 MAX_GOOD_ERROR = 0.10  # typical error of a held-out photo; even materials under known lamps: 2–8 %
@@ -24,6 +26,12 @@ class FitQuality:
     """typical: median |L̂ − L| / L of held-out photos; None where no photo was held out."""
 
     typical: float | None
+
+    @classmethod
+    def of_result(cls, material: Mapping[str, Any]) -> FitQuality:
+        """Of a material of result.json, also of one that an earlier version wrote."""
+        held = material.get("held_out")
+        return cls(held["typical"] if held else None)
 
     @property
     def rating(self) -> Rating:

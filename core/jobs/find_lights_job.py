@@ -10,6 +10,7 @@ import numpy as np
 from ..basis import Basis, default_basis
 from ..capture import Capture, LightEntry
 from ..concurrency.job import Job, Step
+from ..concurrency.steps import relayed, scaled
 from ..counted import counted
 from ..errors import PatinaError
 from ..geometry import RayScene
@@ -89,13 +90,9 @@ class FindLightsJob(Job):
         yield Step(SEARCHING, READ_SHARE)
         dictionary = BrdfDictionary.of(self.basis or default_basis())
         steps = find_lamps(lamps, len(capture.materials), rays, dictionary)
-        while True:
-            try:
-                done = next(steps)
-            except StopIteration as stop:
-                found = stop.value
-                break
-            yield Step(SEARCHING, READ_SHARE + (1 - READ_SHARE) * done)
+        found = yield from relayed(
+            scaled(steps, READ_SHARE, 1.0), lambda done: Step(SEARCHING, done)
+        )
         by_name = {n: one for n, one in zip(names, found.lamps, strict=True) if one is not None}
         gains = dict(zip(names, found.gains, strict=True))
         strengths = _relative_strengths(capture, lights, gains)

@@ -19,6 +19,7 @@ from ..concurrency.steps import relayed
 from ..counted import counted
 from ..errors import FitError
 from ..fit import PaperFit
+from ..fit.fit_quality import FitQuality
 from ..fit.held_out import HeldOutErrors, Judge
 from ..fit.measured_result import MeasuredResult
 from ..fit.spread import Spread
@@ -64,6 +65,11 @@ class MaterialResult:
     scale: float
     irradiance_known: bool
     warnings: tuple[str, ...]
+
+    @property
+    def quality(self) -> FitQuality:
+        """How good the fit is, by its error on held-out photos."""
+        return FitQuality(None if self.held_out is None else self.held_out.typical)
 
     @property
     def principled(self) -> PrincipledFit:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..angles.vectors import even_directions
 from ..light import DistantLight, Light, MountedLight, NearLight
 
 Array = NDArray[np.float64]
@@ -37,15 +38,6 @@ def candidate_lights(light: Light, points: Array, reach: float) -> list[Light]:
             for d in even_directions(NEAR_DIRECTIONS)
         ]
     raise TypeError(f"{type(light).__name__} cannot be searched for")
-
-
-def even_directions(count: int) -> Array:
-    """(count, 3) unit vectors spread evenly over the sphere (Fibonacci lattice)."""
-    place = np.arange(count) + 0.5
-    z = 1.0 - 2.0 * place / count
-    azimuth = np.pi * (1.0 + np.sqrt(5.0)) * place
-    across = np.sqrt(1.0 - z * z)
-    return np.stack([across * np.cos(azimuth), across * np.sin(azimuth), z], axis=1)
 
 
 def _flash_offsets() -> list[Array]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry import RayScene
+from ..geometry.pixel_hits import pixel_hits
 from ..scan import Camera
 
 Array = NDArray[np.float64]
@@ -80,13 +81,7 @@ def _surface(
     at grazing view."""
     row, column = np.divmod(pixel, camera.width)
     centres = np.stack([column + 0.5, row + 0.5], axis=1)
-    directions = camera.rays(centres)
-    start = camera.ray_starts(centres)
-    if camera.orthographic:
-        start = rays.just_before(start, directions)
-    hits = rays.first_hits(start, np.nan_to_num(directions, nan=1.0))
-    hit = (hits.face >= 0) & np.isfinite(directions).all(axis=1)
-    found = hits.select(hit)
-    normal, view = rays.normals(found), -directions[hit]
+    hit, found, view = pixel_hits(rays, camera, centres)
+    normal = rays.normals(found)
     facing = np.einsum("ij,ij->i", normal, view) > MIN_VIEW_COSINE
     return rays.points(found)[facing], normal[facing], view[facing], pixel[hit][facing]

@@ -58,11 +58,7 @@ class Measured:
 
     def cost(self, predicted: Array) -> float:
         """Mean capped |residual|."""
-        return float(np.mean(self.each(predicted)))
-
-    def each(self, predicted: Array) -> NDArray[np.float64]:
-        """(n,) capped |residual|."""
-        return np.minimum(np.abs(self.residual(predicted)), MAX_RESIDUAL)
+        return float(np.mean(np.minimum(np.abs(self.residual(predicted)), MAX_RESIDUAL)))
 
     def robust_weight(self, predicted: Array) -> NDArray[np.float64]:
         """(n,) 1 / |residual|, which makes least squares minimise absolute residuals."""

@@ -13,11 +13,11 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..concurrency.steps import scaled
 from ..errors import PatinaError
 from ..geometry import RayScene
 from ..light import DistantLight, Light
@@ -33,7 +33,7 @@ from .materials import shared_materials
 from .shading import LampPixels, predicted
 
 Array = NDArray[np.float64]
-R = TypeVar("R")
+Float32 = NDArray[np.float32]
 
 MIN_PIXELS = 200  # lit ones, of a lamp
 COARSE_PIXELS, FINE_PIXELS = 1600, 6000  # of a lamp
@@ -71,12 +71,10 @@ class FoundLamp:
 
 @dataclass(frozen=True)
 class FoundLamps:
-    """lamps: in the order given, None for a known one. coefficients: (m, k) of the materials in the
-    dictionary, of unknown scale. gains: strength of each lamp, also of known ones, relative to that
-    of its light, in one unknown unit."""
+    """lamps: in the order given, None for a known one. gains: strength of each lamp, also of known
+    ones, relative to that of its light, in one unknown unit."""
 
     lamps: tuple[FoundLamp | None, ...]
-    coefficients: Array
     gains: tuple[float, ...]
 
 
@@ -109,14 +107,14 @@ def find_lamps(
     for place, lamp in enumerate(lamps):
         state, lights = _opened(lamp)
         steps = best_candidates(lights, state.coarse, materials, rays, dictionary)
-        state.candidates = yield from _scaled(
+        state.candidates = yield from scaled(
             steps, COARSE_SHARE * place / len(lamps), COARSE_SHARE * (place + 1) / len(lamps)
         )
         state.light = state.candidates[0].light
         states.append(state)
     coefficients = _shared(states, [state.candidates[0].own for state in states])
     grid = CellGrid.around(np.concatenate([state.fine.points for state in states]))
-    albedo = _albedo(states, coefficients, grid, rays, dictionary)
+    albedo = _albedo(states, coefficients, grid, _even_radiance(states, rays, dictionary))
     if albedo is not None:  # choose the candidates again
         for state in states:
             factor = albedo.at(state.coarse.points).astype(np.float32)[:, None]
@@ -137,10 +135,11 @@ def find_lamps(
                     rays,
                     dictionary,
                 )
-        albedo = _albedo(states, coefficients, grid, rays, dictionary)
+        even = _even_radiance(states, rays, dictionary)
+        albedo = _albedo(states, coefficients, grid, even)
         for state in states:
             state.fine = state.fine.with_albedo(albedo)
-        radiance = [s.fine.dictionary_radiance(s.light, rays, dictionary) for s in states]
+        radiance = [s.fine.times_albedo(one) for s, one in zip(states, even, strict=True)]
         coefficients = shared_materials([s.fine for s in states], radiance, coefficients)
     errors = [float("nan")] * len(states)
     if with_errors:
@@ -150,7 +149,7 @@ def find_lamps(
             [s.fine.first(JACKKNIFE_PIXELS) for s in states],
             [s.reach for s in states], coefficients, rays, dictionary,
         )  # fmt: skip
-        errors = yield from _scaled(steps_of_errors, FINE_SHARE, 1.0)
+        errors = yield from scaled(steps_of_errors, FINE_SHARE, 1.0)
     found: list[FoundLamp | None] = []
     for state, values, error in zip(states, radiance, errors, strict=True):
         cost = cost_with_gain(state.fine, values, coefficients)
@@ -160,19 +159,7 @@ def find_lamps(
         state.fine.measured.gain(predicted(values, coefficients, state.fine.material))
         for state, values in zip(states, radiance, strict=True)
     )
-    return FoundLamps(tuple(found), coefficients, gains)
-
-
-def _scaled(
-    steps: Generator[float, None, R], start: float, end: float
-) -> Generator[float, None, R]:
-    """The same generator, its fractions between ``start`` and ``end``."""
-    while True:
-        try:
-            inner = next(steps)
-        except StopIteration as stop:
-            return stop.value
-        yield start + (end - start) * inner
+    return FoundLamps(tuple(found), gains)
 
 
 def _opened(lamp: UnknownLamp) -> tuple[_State, list[Light]]:
@@ -191,20 +178,24 @@ def _opened(lamp: UnknownLamp) -> tuple[_State, list[Light]]:
     return _State(lamp, coarse, fine, [], lamp.light, reach), lights
 
 
+def _even_radiance(
+    states: Sequence[_State], rays: RayScene, dictionary: BrdfDictionary
+) -> list[Float32]:
+    """Radiance of the fine pixels of each lamp in its present light, for an even albedo."""
+    return [
+        state.fine.without_albedo().dictionary_radiance(state.light, rays, dictionary)
+        for state in states
+    ]
+
+
 def _albedo(
-    states: Sequence[_State],
-    coefficients: Array,
-    grid: CellGrid,
-    rays: RayScene,
-    dictionary: BrdfDictionary,
+    states: Sequence[_State], coefficients: Array, grid: CellGrid, even: Sequence[Float32]
 ) -> CellAlbedo | None:
-    """The albedo of the surface's cells with the present lights and materials."""
+    """The albedo of the surface's cells with the present materials. even: _even_radiance."""
     ratios = []
-    for state in states:
-        even = replace(state.fine, albedo=np.ones(len(state.fine.albedo)))
-        radiance = even.dictionary_radiance(state.light, rays, dictionary)
-        values = predicted(radiance, coefficients, even.material)
-        ratios.append(even.measured.log_ratio(even.measured.gain(values) * values))
+    for state, radiance in zip(states, even, strict=True):
+        values = predicted(radiance, coefficients, state.fine.material)
+        ratios.append(state.fine.measured.log_ratio(state.fine.measured.gain(values) * values))
     return shared_albedo(grid, [state.fine.points for state in states], ratios)
 
 

@@ -61,6 +61,14 @@ class LampPixels:
         """The same pixels with the albedo of their cells."""
         return self if albedo is None else replace(self, albedo=albedo.at(self.points))
 
+    def without_albedo(self) -> LampPixels:
+        """The same pixels with an even albedo."""
+        return replace(self, albedo=np.ones(len(self.albedo)))
+
+    def times_albedo(self, radiance: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(n, k) radiance for an even albedo × the albedo of the pixels."""
+        return radiance * self.albedo[:, None].astype(np.float32)
+
     @property
     def points(self) -> NDArray[np.float64]:
         """(n, 3) scan frame."""
@@ -71,7 +79,7 @@ class LampPixels:
     ) -> NDArray[np.float32]:
         """(n, k) radiance of the BRDFs, for a light of mean irradiance or intensity 1."""
         out = [_photo_radiance(part, light, rays, dictionary) for part in self.parts]
-        return np.concatenate(out) * self.albedo[:, None].astype(np.float32)
+        return self.times_albedo(np.concatenate(out))
 
 
 def _photo_radiance(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -10,9 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from ..capture.new_capture import LampText, PhotoText, write_capture
+from ..counted import listed
 from ..errors import InputError
-
-MAX_LISTED = 3  # names in a sentence
 
 
 class LampKind(Enum):
@@ -117,8 +115,3 @@ def lamp_text(lamp: DraftLamp) -> LampText:
     if make is LampText.distant and not np.linalg.norm(values) > 0:
         values = np.array([0.0, 0.0, 1.0])
     return make(values.tolist(), guess=not lamp.stated)
-
-
-def listed(names: Sequence[str]) -> str:
-    """A few of the names, and an ellipsis if there are more."""
-    return ", ".join(names[:MAX_LISTED]) + (" …" if len(names) > MAX_LISTED else "")

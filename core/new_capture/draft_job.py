@@ -6,12 +6,13 @@ from collections.abc import Generator, Iterator, Sequence
 from pathlib import Path
 
 from ..concurrency.job import Job, Step
-from ..counted import counted
+from ..concurrency.steps import relayed
+from ..counted import counted, listed
 from ..errors import PatinaError
 from ..photo import Transfer, read_photo
 from ..scan import Camera
 from . import match_names
-from .draft import Draft, DraftPhoto, listed
+from .draft import Draft, DraftPhoto
 from .match_photos import matched
 from .opened_scan import opened_scan
 from .propose_lamps import with_lamps
@@ -39,12 +40,12 @@ class DraftJob(Job):
             yield Step(READING, 0.5 * READ_SHARE)
             opened, draft = opened_scan(draft)
         if opened is not None and draft.photos:
-            draft = yield from _relayed(
+            draft = yield from _staged(
                 matched(draft, opened, self.paths), MATCHING, READ_SHARE, MATCH_SHARE
             )
             kept = {photo.file for photo in self.before.photos} if draft.lamps else set()
             steps = with_lamps(draft, opened, kept)
-            draft = yield from _relayed(steps, GROUPING, MATCH_SHARE, 1.0)
+            draft = yield from _staged(steps, GROUPING, MATCH_SHARE, 1.0)
         self.draft = draft
 
     def _read(self) -> Draft:
@@ -106,13 +107,8 @@ def _scan_photos(
     return None, list(photos)
 
 
-def _relayed(
+def _staged(
     steps: Generator[float, None, Draft], stage: str, start: float, end: float
 ) -> Generator[Step, None, Draft]:
     """The steps of one part of the job, between two fractions."""
-    while True:
-        try:
-            done = next(steps)
-        except StopIteration as stop:
-            return stop.value
-        yield Step(stage, start + (end - start) * done)
+    return relayed(steps, lambda done: Step(stage, start + (end - start) * done))

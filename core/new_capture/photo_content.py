@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
+from ..angles.vectors import even_directions
 from ..errors import PatinaError
 from ..geometry import RayScene
+from ..geometry.pixel_hits import pixel_hits
 from ..light import DistantLight
 from ..light_search import LampPhoto, draw_lamp_pixels
 from ..light_search.brdf_dictionary import BrdfDictionary
-from ..light_search.candidates import even_directions
 from ..light_search.materials import own_materials
 from ..light_search.shading import LampPixels, predicted
 from ..scan import Camera
@@ -75,12 +76,7 @@ def outline(camera: Camera, shape: tuple[int, int], rays: RayScene) -> NDArray[n
     rows, columns = np.indices(shape) + 0.5
     across, down = camera.width / width, camera.height / height
     centres = np.stack([columns.ravel() * across, rows.ravel() * down], axis=1)
-    directions = camera.rays(centres)
-    start = camera.ray_starts(centres)
-    if camera.orthographic:
-        start = rays.just_before(start, directions)
-    hits = rays.first_hits(start, np.nan_to_num(directions, nan=1.0))
-    hit = (hits.face >= 0) & np.isfinite(directions).all(axis=1)
+    hit = pixel_hits(rays, camera, centres).hit
     return np.asarray(binary_dilation(hit.reshape(shape), np.ones((3, 3), bool)))
 
 
@@ -92,11 +88,9 @@ def outside_share(picture: Picture, seen: NDArray[np.bool_]) -> float:
 
 @dataclass(frozen=True)
 class ContentMatch:
-    """label: of the camera; direction: (3,) surface → light, scan frame; cost: mean capped |log
-    residual|."""
+    """label: of the camera; cost: mean capped |log residual| + share of lit pixels outside."""
 
     label: str
-    direction: Array
     cost: float
 
 
@@ -127,8 +121,8 @@ def match_content(
     for done, index in enumerate(order[:TRIED_CAMERAS]):
         yield done / min(len(order), TRIED_CAMERAS)
         camera = cameras[index].resized(width, height)
-        direction, cost = lit_from(camera, radiance, usable, rays, dictionary)
-        found.append(ContentMatch(cameras[index].label, direction, cost + outside[index]))
+        cost = lit_cost(camera, radiance, usable, rays, dictionary)
+        found.append(ContentMatch(cameras[index].label, cost + outside[index]))
     found.sort(key=lambda one: one.cost)
     if not found or (len(found) > 1 and found[1].cost < MIN_MARGIN * found[0].cost):
         return None
@@ -144,20 +138,19 @@ def fits_size(camera: Camera, width: int, height: int) -> bool:
     return True
 
 
-def lit_from(
+def lit_cost(
     camera: Camera,
     radiance: NDArray[np.float32],
     usable: NDArray[np.bool_],
     rays: RayScene,
     dictionary: BrdfDictionary,
-    count: int = PIXELS,
-) -> tuple[Array, float]:
-    """((3,) direction of a distant light that explains the photo best, its cost)."""
+) -> float:
+    """The cost of the photo from a camera, under the distant light that explains it best."""
     material = np.where(usable, 0, -1).astype(np.int16)
-    photo = draw_lamp_pixels(rays, camera, radiance, material, count, np.random.default_rng(0))
-    if len(photo.radiance) < count // 10 or not (photo.radiance > 0).any():
-        return np.array([0.0, 0.0, 1.0]), 1.0
-    return best_direction(photo, rays, dictionary)
+    photo = draw_lamp_pixels(rays, camera, radiance, material, PIXELS, np.random.default_rng(0))
+    if len(photo.radiance) < PIXELS // 10 or not (photo.radiance > 0).any():
+        return 1.0
+    return best_direction(photo, rays, dictionary)[1]
 
 
 def best_direction(

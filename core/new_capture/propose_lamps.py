@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..concurrency.steps import scaled
 from ..counted import counted
 from ..light import DistantLight
-from ..light_search import LampPhoto, UnknownLamp, draw_lamp_pixels, find_lamps
+from ..light_search import FoundLamp, LampPhoto, UnknownLamp, draw_lamp_pixels, find_lamps
 from ..light_search.search import MIN_PIXELS as MIN_LIT_PIXELS
 from ..photo import Transfer, read_photo
 from ..scan import Camera, Mesh
@@ -31,6 +32,7 @@ PIXELS = 3000  # of a photo
 FLASH_COSINE = np.cos(np.radians(25.0))  # between light and view, of a flash on the camera
 MIN_FLASH_SHARE = 0.8  # of the photos
 MIN_FLASH_PHOTOS = 3
+COMPARE_SHARE = 0.4  # of the time, before the lamps are searched together
 
 
 def with_lamps(
@@ -51,7 +53,7 @@ def with_lamps(
     parts: list[LampPhoto | None] = []
     directions: list[Array | None] = []
     for done, i in enumerate(used[:MAX_COMPARED_PHOTOS]):
-        yield 0.4 * done / len(used)
+        yield COMPARE_SHARE * done / len(used)
         part = _pixels(draft.photos[i], opened)
         parts.append(part)
         directions.append(None)
@@ -149,14 +151,14 @@ def _searched(
     if not lamps:
         return [None] * len(parts)
     steps = find_lamps(lamps, 1, opened.rays, opened.dictionary, with_errors=False)
-    while True:
-        try:
-            done = next(steps)
-        except StopIteration as stop:
-            found = iter(stop.value.lamps)
-            break
-        yield 0.4 + 0.6 * done
-    return [None if part is None else next(found).light.direction for part in parts]
+    result = yield from scaled(steps, COMPARE_SHARE, 1.0)
+    found = iter(result.lamps)
+    return [None if part is None else _direction(next(found)) for part in parts]
+
+
+def _direction(lamp: FoundLamp | None) -> Array:
+    assert lamp is not None and isinstance(lamp.light, DistantLight)  # as they were searched
+    return lamp.light.direction
 
 
 def _from_camera(direction: Array, camera: Camera, opened: OpenedScan) -> bool:

@@ -13,7 +13,6 @@ import numpy as np
 from ..appearance.lobe_stack import LobeStack
 from ..files import write_text_atomic
 from ..fit import PaperFit
-from ..fit.fit_quality import FitQuality
 from ..fit.measured_result import MeasuredResult
 from ..fit.spread import Spread
 from ..inputs import capture_data
@@ -117,7 +116,7 @@ def parameters(
 
 
 def _quality(material: MaterialResult) -> dict[str, str]:
-    quality = FitQuality(None if material.held_out is None else material.held_out.typical)
+    quality = material.quality
     return {"rating": quality.rating.value, "sentence": quality.sentence}
 
 

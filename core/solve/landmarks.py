@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import InputError
 from ..geometry import RayScene
+from ..geometry.pixel_hits import pixel_hits
 from ..scan import Camera
 from .features import Features
 
@@ -48,14 +49,9 @@ class OnMesh:
         """Points where the rays of a photo's features hit the mesh. camera: of the photo's size."""
         points = np.full((len(found), 3), np.nan)
         if len(found):
-            directions = camera.rays(found.pixels)
-            finite = np.isfinite(directions).all(axis=1)
-            directions[~finite] = (0.0, 0.0, 1.0)
-            hits = self.rays.first_hits(camera.ray_starts(found.pixels), directions)
-            hit = finite & (hits.face >= 0)
-            selected = hits.select(hit)
+            hit, selected, view = pixel_hits(self.rays, camera, found.pixels)
             normal = self.rays.mesh.face_normals[selected.face]
-            not_grazing = np.abs(np.einsum("ij,ij->i", normal, directions[hit])) > MIN_RAY_COSINE
+            not_grazing = np.abs(np.einsum("ij,ij->i", normal, view)) > MIN_RAY_COSINE
             points[np.flatnonzero(hit)[not_grazing]] = self.rays.points(selected)[not_grazing]
         known = np.isfinite(points[:, 0])
         return Landmarks(points[known], found.descriptors[known])

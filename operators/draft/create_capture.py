@@ -10,7 +10,7 @@ from ...core.capture.new_capture import free_name
 from ...core.errors import PatinaError
 from ...scene.scan.capture_draft import clear_draft, draft_of
 from ...scene.session.folders import own_folder
-from ..import_capture import import_into_scene
+from ..import_capture import import_written
 from ..report_errors import report_and_cancel
 
 
@@ -39,12 +39,9 @@ class PATINA_OT_create_capture(bpy.types.Operator):
             draft.write(out)
         except PatinaError as error:
             return report_and_cancel(self, error)
-        done = import_into_scene(self, context, out)
-        if done == {"CANCELLED"}:
-            out.unlink(missing_ok=True)  # import_into_scene has reported the error
-            return done
-        clear_draft(context.scene)
-        self.report({"INFO"}, f"Capture file written: {out}")
+        done = import_written(self, context, out)
+        if done == {"FINISHED"}:
+            clear_draft(context.scene)
         return done
 
 

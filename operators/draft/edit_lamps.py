@@ -7,6 +7,12 @@ import bpy
 from ...scene.scan.capture_draft import clear_draft
 
 ONE, EACH, ADD = "ONE", "EACH", "ADD"
+WAYS = {
+    ONE: ("One Lamp for All", "All photos share one lamp"),
+    EACH: ("One Lamp per Photo", "Each photo has a lamp of its own"),
+    ADD: ("Add Lamp", "Add a lamp for the active photo"),
+}
+"""Identifier → (label, tooltip)."""
 
 
 class PATINA_OT_draft_lamps(bpy.types.Operator):
@@ -19,21 +25,13 @@ class PATINA_OT_draft_lamps(bpy.types.Operator):
     way: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Lamps",
         description="Which photos share a lamp",
-        items=[
-            (ONE, "One Lamp for All", "All photos share one lamp"),
-            (EACH, "One Lamp per Photo", "Each photo has a lamp of its own"),
-            (ADD, "Add Lamp", "Add a lamp for the active photo"),
-        ],
+        items=[(way, label, tooltip) for way, (label, tooltip) in WAYS.items()],
     )
 
     @classmethod
     def description(cls, context: bpy.types.Context, properties: bpy.types.AnyType) -> str:
         """The tooltip of the chosen way."""
-        return {
-            ONE: "All photos share one lamp",
-            EACH: "Each photo has a lamp of its own",
-            ADD: "Add a lamp for the active photo",
-        }[properties.way]
+        return WAYS[properties.way][1]
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

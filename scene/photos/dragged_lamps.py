@@ -18,11 +18,10 @@ from ..property_keys import (
     LAMP_KIND,
     LIGHT_GUESS,
     LIGHT_NAME,
-    ORIGIN,
     STATED_ERROR,
 )
 from . import lamp_placement
-from .found_lights import found_strength, found_values
+from .found_lights import found_strength, found_values, scan_origin
 from .lamp_placement import DISTANT, FROM_CAMERA, MOUNTED, NEAR, Placement
 
 Array = NDArray[np.float64]
@@ -92,9 +91,7 @@ def changed_lights(
     Raises PatinaError if an edited lamp emits no light.
     """
     file = str(capture.file)
-    origin = np.zeros(3)
-    for collection in _collections(scene, file):
-        origin = np.array(collection.get(ORIGIN, (0.0, 0.0, 0.0)), np.float64)
+    origin = scan_origin(scene, file)
     for entry in capture.lights:
         lamp = lamp_of(scene, file, entry.name)
         if lamp is None or lamp.get(LAMP_KIND) != _kind(entry):

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from ...core.capture import Capture, read_capture
-from ...core.errors import InputError
 from ...core.geometry import RayScene
 from ...core.inputs import capture_data
 from ...core.masks.carry import VisibleFaces
 from ...core.scan import Scan
+from ..session.existing_capture import existing_capture
 from ..session.session_state import KeptValue
 
 MAX_PHOTOS = 4  # photos whose visible faces are cached; 200 MB each at 24 megapixels
@@ -46,11 +45,7 @@ _last: KeptValue[ScanRays] = KeptValue()
 def scan_rays(path: str) -> ScanRays:
     """The scan of a capture file; the last one is cached. Raises InputError if a file cannot be
     read."""
-    file = Path(path)
-    if not file.is_file():
-        raise InputError(
-            "the file does not exist; import the capture again from its current folder", file=file
-        )
+    file = existing_capture(path)
     changed, last = file.stat().st_mtime, _last.value
     if last is None or last.capture.file != file or last.changed != changed:
         capture = read_capture(file)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...angles.vectors import even_directions
 from ..forward.diagnosis_context import DiagnosisContext, NearestPixels
 from ..forward.material_brdfs import MaterialBRDFs
 from ..forward.shading_state import ShadingState
@@ -38,7 +38,7 @@ class EnvironmentReflection(AddsRadiance, BuiltFromBRDFs):
 
     @classmethod
     def of(cls, context: DiagnosisContext) -> EnvironmentReflection:
-        return cls._towards(context, _evenly(LOBES), np.full(LOBES, SHARP))
+        return cls._towards(context, even_directions(LOBES), np.full(LOBES, SHARP))
 
     @classmethod
     def _towards(
@@ -59,11 +59,11 @@ class EnvironmentReflection(AddsRadiance, BuiltFromBRDFs):
     def rebuilt(self, context: DiagnosisContext, x: np.ndarray) -> EnvironmentReflection:
         """With more and sharper lobes where the surroundings are bright. The reflected edge of a
         window is sharp; if the lobes were too wide, a tone curve would explain the rest."""
-        finer = _evenly(FINER * LOBES)
+        finer = even_directions(FINER * LOBES)
         radiance = self.radiance(finer, x)
         brightest = np.argsort(-radiance)[:MAX_FINE_LOBES]
         brightest = brightest[radiance[brightest] > DIM * radiance.max()]
-        directions = np.concatenate([_evenly(LOBES), finer[brightest]])
+        directions = np.concatenate([even_directions(LOBES), finer[brightest]])
         sharp = np.repeat([SHARP, FINER * SHARP], [LOBES, len(brightest)])
         return self._towards(context, directions, sharp)
 
@@ -88,11 +88,3 @@ class EnvironmentReflection(AddsRadiance, BuiltFromBRDFs):
             f"{100 * float(radiance.max()):.0f} % of the radiance of a white wall lit by the "
             "lamp."
         )
-
-
-def _evenly(count: int) -> NDArray[np.float64]:
-    """(count, 3) directions on a Fibonacci spiral."""
-    k = np.arange(count)
-    z, turn = 1 - (2 * k + 1) / count, np.pi * (3 - np.sqrt(5)) * k
-    r = np.sqrt(1 - z**2)
-    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
