@@ -84,6 +84,7 @@ MODULES: tuple[str, ...] = (
     "operators.import_capture",
     "operators.new_capture",
     "operators.draft.add_files",
+    "operators.draft.find_cameras",
     "operators.draft.edit_lamps",
     "operators.draft.create_capture",
     "operators.solve",

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import bpy
 
-from ..core.new_capture import LampKind
+from ..core.counted import counted
+from ..core.new_capture import Draft, LampKind, photo_folders
 from ..scene.scan.capture_draft import PatinaDraft, PatinaDraftPhoto, draft_of
 from .wrapped import wrapped
 
 ROWS = 5
+MAX_FOLDERS = 3  # of photos that are offered to be solved
 NAME_SHARE, CAMERA_SHARE = 0.38, 0.6  # of a row's width; of the rest
 CREATE_SCALE = 1.4  # height of the button to press next, in button heights
 VALUE_LABELS = {
@@ -58,15 +60,30 @@ def draw_draft(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         layout.label(text=f"{name}: {path.name if path else 'none yet'}", icon=icon)
     layout.operator("patina.add_files", text="Add or Replace Files…", icon="FILE_FOLDER")
     if draft.cameras is None:
-        layout.operator("patina.solve_photos", icon="CAMERA_DATA")
+        _draw_solve(layout, draft)
     if len(state.photos):
         _draw_photos(layout, state)
+    lost = draft.without_camera
+    if lost and draft.cameras is not None and draft.mesh is not None:
+        text = f"Localise {counted(len(lost), 'Photo')}"
+        layout.operator("patina.localise_draft", text=text, icon="CAMERA_DATA")
     if draft.missing is not None:
         wrapped(layout, draft.missing, "INFO")
     row = layout.row()
     row.scale_y = CREATE_SCALE
     row.operator("patina.create_capture", icon="CHECKMARK")
     layout.operator("patina.cancel_draft", icon="X")
+
+
+def _draw_solve(layout: bpy.types.UILayout, draft: Draft) -> None:
+    """A button for each folder that may hold the photos of the scan."""
+    folders = photo_folders([photo.file for photo in draft.photos])[:MAX_FOLDERS]
+    for folder, count in folders:
+        text = f"Solve {counted(count, 'Photo')} in “{folder.name}”"
+        button = layout.operator("patina.solve_draft", text=text, icon="CAMERA_DATA")
+        button.folder = str(folder)
+    if not folders:
+        layout.operator("patina.solve_photos", icon="CAMERA_DATA")
 
 
 def _draw_photos(layout: bpy.types.UILayout, state: PatinaDraft) -> None:

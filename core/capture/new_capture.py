@@ -157,12 +157,14 @@ def write_capture(
     lamps: Sequence[tuple[str, LampText]],
     images: Path | None = None,
     chunk: str | None = None,
+    extra: Path | None = None,
 ) -> None:
     """Write a capture file. The file appears only after it has been read back. Raises InputError.
 
     lamps: (name, lamp). images: folder of the scan's own photos. chunk: of a project with several.
+    extra: file of localised cameras.
     """
-    scan = {"cameras": cameras, "mesh": mesh, "images": images}
+    scan = {"cameras": cameras, "mesh": mesh, "images": images, "extra": extra}
     lines = ["[scan]", *(f"{k} = {_path(p, out)}" for k, p in scan.items() if p is not None)]
     if chunk is not None:
         lines.append(f"chunk = {_text(chunk)}")

@@ -2,5 +2,16 @@
 
 from .draft import Draft, DraftLamp, DraftPhoto, LampKind
 from .draft_job import DraftJob
+from .localise_draft import LocaliseDraftJob
+from .solve_draft import SolveDraftJob, photo_folders
 
-__all__ = ["Draft", "DraftJob", "DraftLamp", "DraftPhoto", "LampKind"]
+__all__ = [
+    "Draft",
+    "DraftJob",
+    "DraftLamp",
+    "DraftPhoto",
+    "LampKind",
+    "LocaliseDraftJob",
+    "SolveDraftJob",
+    "photo_folders",
+]

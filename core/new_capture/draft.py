@@ -51,9 +51,9 @@ class DraftLamp:
 
 @dataclass(frozen=True)
 class Draft:
-    """cameras, mesh: files, None while unknown. images: folder of the scan's own photos. found:
-    sentences on what was recognised. problems: sentences on what is wrong.
-    camera_labels: of the scan."""
+    """cameras, mesh: files, None while unknown. images: folder of the scan's own photos. extra:
+    file of cameras that were localised. found: sentences on what was recognised. problems:
+    sentences on what is wrong. camera_labels: of the scan."""
 
     cameras: Path | None = None
     mesh: Path | None = None
@@ -63,21 +63,28 @@ class Draft:
     found: tuple[str, ...] = ()
     problems: tuple[str, ...] = ()
     camera_labels: tuple[str, ...] = ()
+    extra: Path | None = None
+
+    @property
+    def without_camera(self) -> tuple[Path, ...]:
+        """The used photos without a camera."""
+        return tuple(p.file for p in self.photos if p.used and p.camera is None)
 
     @property
     def missing(self) -> str | None:
         """What is needed next, None if the capture can be written."""
         if self.cameras is None:
-            return "Add the cameras of the scan, or solve them from the photos"
+            return "Add the cameras of the scan, or solve them from its photos"
         if self.mesh is None:
-            return "Add the mesh of the scan"
+            return "Add the mesh of the scan, in the coordinates of its cameras"
         used = [photo for photo in self.photos if photo.used]
         if not used:
             return "Add the lit photos"
-        lost = [photo.file.name for photo in used if photo.camera is None]
+        lost = [file.name for file in self.without_camera]
         if lost:
             have = "photo has" if len(lost) == 1 else "photos have"
-            return f"{len(lost)} {have} no camera: {listed(lost)}. Choose one or switch them off"
+            localise = "Localise them, choose" if self.images is not None else "Choose"
+            return f"{len(lost)} {have} no camera: {listed(lost)}. {localise} one, or switch off"
         kinds = {self.lamps[photo.lamp].kind for photo in used if photo.lamp < len(self.lamps)}
         if kinds & NEAR_KINDS and kinds - NEAR_KINDS:
             return (
@@ -97,7 +104,7 @@ class Draft:
             out, self.cameras, self.mesh,
             [PhotoText(p.file, p.camera or "", self.lamps[p.lamp].name) for p in used],
             [(self.lamps[index].name, lamp_text(self.lamps[index])) for index in lamps],
-            self.images,
+            self.images, extra=self.extra,
         )  # fmt: skip
 
 

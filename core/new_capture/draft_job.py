@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ..concurrency.job import Job, Step
@@ -14,7 +15,7 @@ from ..scan import Camera
 from . import match_names
 from .draft import Draft, DraftPhoto
 from .match_photos import matched
-from .opened_scan import opened_scan
+from .opened_scan import OpenedScan, opened_scan, with_scan_checked
 from .propose_lamps import with_lamps
 from .recognise import best_cameras, best_mesh, readable_photos, sort_paths, tool_name
 
@@ -35,15 +36,22 @@ class DraftJob(Job):
     def run(self) -> Iterator[Step]:
         """The steps."""
         yield Step(READING, 0.0)
-        draft, opened = self._read(), None
+        draft = self._read()
+        opened: OpenedScan | None = None
         if draft.cameras is not None and draft.mesh is not None:
             yield Step(READING, 0.5 * READ_SHARE)
-            opened, draft = opened_scan(draft)
+            try:
+                opened = opened_scan(draft)
+            except PatinaError as error:
+                draft = replace(draft, problems=(*draft.problems, str(error)))
+            else:
+                draft = with_scan_checked(draft, opened)
+        seen = {photo.file for photo in self.before.photos}
         if opened is not None and draft.photos:
             draft = yield from _staged(
-                matched(draft, opened, self.paths), MATCHING, READ_SHARE, MATCH_SHARE
+                matched(draft, opened, {*self.paths, *seen}), MATCHING, READ_SHARE, MATCH_SHARE
             )
-            kept = {photo.file for photo in self.before.photos} if draft.lamps else set()
+            kept = seen if draft.lamps else set()
             steps = with_lamps(draft, opened, kept)
             draft = yield from _staged(steps, GROUPING, MATCH_SHARE, 1.0)
         self.draft = draft
@@ -55,6 +63,7 @@ class DraftJob(Job):
         found: list[str] = []
         problems: list[str] = []
         cameras, why = best_cameras(files.cameras)
+        extra = files.localised[0] if files.localised else None
         if cameras is None:
             problems += why
         mesh, surface, why = best_mesh(files.meshes)
@@ -71,13 +80,17 @@ class DraftJob(Job):
         images, lit = _scan_photos(photos, () if cameras is None else cameras.cameras)
         if images is not None:
             found.append(f"Photos of the scan in {images.name}")
+        if cameras is None:
+            extra = extra or before.extra
         kept = [photo for photo in before.photos if photo.file not in lit]
+        if cameras is not None and cameras.path != before.cameras:
+            kept = [replace(photo, camera=None, how="") for photo in kept]  # they were of others
         drafted = (*kept, *(DraftPhoto(photo) for photo in lit))
         if lit:
             found.append(_photo_sentence(lit))
         return Draft(
             path, mesh or before.mesh, images or before.images, drafted, before.lamps,
-            tuple(found), tuple(problems),
+            tuple(found), tuple(problems), extra=extra,
         )  # fmt: skip
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Generator, Sequence
+from collections.abc import Collection, Generator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
+import numpy as np
 from numpy.typing import NDArray
 
+from ..concurrency.steps import scaled
 from ..counted import counted
 from ..errors import PatinaError
 from ..photo import Photo, Transfer, read_exif, read_photo
@@ -17,8 +19,18 @@ from ..scan.scan import find_camera
 from . import match_names
 from .draft import Draft
 from .opened_scan import OpenedScan
-from .photo_content import Picture, fits_size, match_content, outline, outside_share
+from .photo_content import (
+    Picture,
+    best_match,
+    content_costs,
+    fits_size,
+    outline,
+    outside_share,
+    refutes,
+)
 
+COMPARED = 3  # photos matched by number or time whose shading is compared
+REFUTE_SHARE = 0.2  # of the time
 MAX_WRONG_OUTSIDE = 0.05  # of a photo's lit pixels outside the mesh, for a camera by number or time
 
 
@@ -44,8 +56,8 @@ def matched(
     """The draft with a camera for each photo that has none: by name, else by number or time if the
     photo's content agrees, else by its content. Yields the fraction done.
 
-    chosen: photos that the user chose one by one. Others that match no camera are left out where
-    some match by name: a folder may also hold masks and textures.
+    chosen: photos that the user chose one by one or has seen already. Others that match no camera
+    are switched off where some match by name: a folder may also hold masks and textures.
     """
     cameras = opened.scan.cameras
     files = [photo.file for photo in draft.photos if photo.camera is None]
@@ -56,36 +68,71 @@ def matched(
         stated, how = _timed(rest, draft.images, cameras), "by time"
     found = {file: (label, "by name") for file, label in named.items()}
     outlines = _Outlines(opened)
-    for place, file in enumerate(stated):  # one photo that disagrees refutes the order of all
-        yield 0.2 * place / len(stated)
-        photo = _read(file)
-        if photo is not None and not _agrees(photo, stated[file], cameras, outlines):
-            stated = {}
-            break
+    refuted = yield from scaled(_refuted(stated, opened, outlines), 0.0, REFUTE_SHARE)
+    if refuted:
+        stated = {}
     found |= {file: (label, how) for file, label in stated.items()}
     rest = [file for file in rest if file not in stated]
+    share = (1 - REFUTE_SHARE) / max(len(rest), 1)
     for place, file in enumerate(rest):
-        yield 0.2 + 0.8 * place / len(rest)
+        yield REFUTE_SHARE + share * place
         photo = _read(file)
         if photo is None:
             continue
-        match = yield from match_content(
-            photo.radiance, ~photo.clipped, cameras, outlines, opened.rays, opened.dictionary
+        costs = yield from scaled(
+            _costs(photo, opened, outlines),
+            REFUTE_SHARE + share * place,
+            REFUTE_SHARE + share * (place + 1),
         )
-        if match is not None:
-            found[file] = match.label, "by content"
+        label = best_match(costs)
+        if label is not None:
+            found[file] = label, "by content"
     photos = [
         replace(photo, camera=found[photo.file][0], how=found[photo.file][1])
         if photo.file in found
         else photo
         for photo in draft.photos
     ]
-    kept = [p for p in photos if p.camera is not None or not named or p.file in chosen]
+    off = {p.file for p in photos if p.camera is None and named and p.file not in chosen}
     sentences = list(draft.found)
-    if len(kept) < len(photos):
-        left = counted(len(photos) - len(kept), "other picture")
-        sentences.append(f"Left out: {left} without a camera of the same name")
-    return replace(draft, photos=tuple(kept), found=tuple(sentences))
+    if off:
+        left = counted(len(off), "other picture")
+        sentences.append(f"Switched off: {left} without a camera of the same name")
+    photos = [replace(p, used=p.used and p.file not in off) for p in photos]
+    return replace(draft, photos=tuple(photos), found=tuple(sentences))
+
+
+def _refuted(
+    stated: Mapping[Path, str], opened: OpenedScan, outlines: _Outlines
+) -> Generator[float, None, bool]:
+    """Whether one photo disagrees with its camera by number or time, which refutes the order of
+    all. All are compared with the outline of the mesh, a few also with the shading seen from other
+    cameras. Yields the fraction done."""
+    files = list(stated)
+    compared = {files[int(i)] for i in np.linspace(0, len(files) - 1, min(len(files), COMPARED))}
+    for place, file in enumerate(files):
+        yield place / len(files)
+        photo = _read(file)
+        if photo is None:
+            continue
+        if not _agrees(photo, stated[file], opened.scan.cameras, outlines):
+            return True
+        if file in compared:
+            costs = yield from scaled(
+                _costs(photo, opened, outlines), place / len(files), (place + 1) / len(files)
+            )
+            if refutes(costs, stated[file]):
+                return True
+    return False
+
+
+def _costs(
+    photo: Photo, opened: OpenedScan, outlines: _Outlines
+) -> Generator[float, None, dict[str, float]]:
+    return content_costs(
+        photo.radiance, ~photo.clipped, opened.scan.cameras, outlines, opened.rays,
+        opened.dictionary,
+    )  # fmt: skip
 
 
 def _read(file: Path) -> Photo | None:

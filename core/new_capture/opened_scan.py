@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..basis import default_basis
-from ..errors import PatinaError
 from ..geometry import RayScene
 from ..light_search.brdf_dictionary import BrdfDictionary
 from ..scan import Scan
-from ..scan.scan import read_scan
+from ..scan.scan import read_scan, with_extra_cameras
 from .draft import Draft
 from .photo_content import outline
 
@@ -29,28 +28,29 @@ class OpenedScan:
     dictionary: BrdfDictionary
 
 
-def opened_scan(draft: Draft) -> tuple[OpenedScan | None, Draft]:
-    """(the scan, None if it cannot be read; the draft with what was found about it)."""
+def opened_scan(draft: Draft) -> OpenedScan:
+    """The scan of a draft with cameras and mesh. Raises PatinaError."""
     assert draft.cameras is not None and draft.mesh is not None  # the caller has both
-    try:
-        scan = read_scan(draft.cameras, draft.mesh, draft.images)
-    except PatinaError as error:
-        return None, replace(draft, problems=(*draft.problems, str(error)))
-    draft = replace(draft, camera_labels=tuple(camera.label for camera in scan.cameras))
-    rays = RayScene.build(scan.mesh)
-    places = np.linspace(0, len(scan.cameras) - 1, min(len(scan.cameras), CHECKED_CAMERAS))
+    scan = read_scan(draft.cameras, draft.mesh, draft.images)
+    if draft.extra is not None:
+        scan = with_extra_cameras(scan, draft.extra)
+    return OpenedScan(scan, RayScene.build(scan.mesh), BrdfDictionary.of(default_basis()))
+
+
+def with_scan_checked(draft: Draft, opened: OpenedScan) -> Draft:
+    """The draft with the labels of the cameras, and a sentence on whether they see the mesh."""
+    cameras = opened.scan.cameras
+    draft = replace(draft, camera_labels=tuple(camera.label for camera in cameras))
+    places = np.linspace(0, len(cameras) - 1, min(len(cameras), CHECKED_CAMERAS))
     seen = [
-        bool(outline(scan.cameras[int(i)], CHECKED_SHAPE, rays).mean() > MIN_SEEN_SHARE)
+        bool(outline(cameras[int(i)], CHECKED_SHAPE, opened.rays).mean() > MIN_SEEN_SHARE)
         for i in places
     ]
-    opened = OpenedScan(scan, rays, BrdfDictionary.of(default_basis()))
     share = f"{sum(seen)} of {len(seen)} cameras"
     if sum(seen) * 2 < len(seen):
         problem = (
             f"Only {share} see the mesh. Check that cameras and mesh are of one scan and were "
             "exported in one coordinate system"
         )
-        return opened, replace(draft, problems=(*draft.problems, problem))
-    return opened, replace(
-        draft, found=(*draft.found, f"The mesh fits the cameras: {share} see it")
-    )
+        return replace(draft, problems=(*draft.problems, problem))
+    return replace(draft, found=(*draft.found, f"The mesh fits the cameras: {share} see it"))

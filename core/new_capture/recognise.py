@@ -16,15 +16,18 @@ from ..scan.readers.colmap import is_colmap
 
 MAX_DEPTH = 3  # of folders inside a chosen folder
 MAX_FILES = 20_000
+LOCALISED = ".cameras.json"  # ending of the files that localise writes
 
 
 @dataclass(frozen=True)
 class FoundFiles:
-    """Files by kind, as their names suggest. cameras: files, or folders of a COLMAP model."""
+    """Files by kind, as their names suggest. cameras: files, or folders of a COLMAP model.
+    localised: files of cameras that were added to a scan later."""
 
     cameras: tuple[Path, ...]
     meshes: tuple[Path, ...]
     photos: tuple[Path, ...]
+    localised: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,15 @@ def sort_paths(paths: Iterable[Path]) -> FoundFiles:
                 meshes[path] = None
             elif suffix == ".json" or suffix in BY_SUFFIX:
                 cameras[path] = None
-    return FoundFiles(tuple(cameras), tuple(meshes), tuple(photos))
+    localised = [path for path in cameras if path.name.endswith(LOCALISED)]
+    if len(localised) == len(cameras):  # nothing that they could be added to
+        localised = []
+    return FoundFiles(
+        tuple(path for path in cameras if path not in localised),
+        tuple(meshes),
+        tuple(photos),
+        tuple(localised),
+    )
 
 
 def _files(folder: Path, depth: int = 0) -> Iterator[Path]:

@@ -42,6 +42,11 @@ class LocalisedPhotos:
     def write(self, folder: Path) -> Path:
         """Write the file for a capture's ``[scan] extra`` into ``folder``. Returns its path."""
         path = folder / OUTPUT_FILE
+        self.write_file(path)
+        return path
+
+    def write_file(self, path: Path, earlier: Path | None = None) -> None:
+        """The same to a path. earlier: a file whose cameras are kept."""
         statistics = [
             {
                 "inliers": found.inliers,
@@ -52,8 +57,8 @@ class LocalisedPhotos:
             }
             for found in self.placed
         ]
-        write_patina_cameras(path, [found.camera for found in self.placed], self.frame, statistics)
-        return path
+        cameras = [found.camera for found in self.placed]
+        write_patina_cameras(path, cameras, self.frame, statistics, earlier)
 
 
 class LocaliseJob(Job):

@@ -64,6 +64,7 @@ class PatinaDraft(bpy.types.PropertyGroup):
     cameras: bpy.props.StringProperty(name="Cameras", subtype="FILE_PATH")  # type: ignore[valid-type]
     mesh: bpy.props.StringProperty(name="Mesh", subtype="FILE_PATH")  # type: ignore[valid-type]
     images: bpy.props.StringProperty(name="Scan Photos", subtype="DIR_PATH")  # type: ignore[valid-type]
+    extra: bpy.props.StringProperty(name="Localised Cameras", subtype="FILE_PATH")  # type: ignore[valid-type]
     photos: bpy.props.CollectionProperty(type=PatinaDraftPhoto)  # type: ignore[valid-type]
     active_photo: bpy.props.IntProperty(name="Photo", min=0)  # type: ignore[valid-type]
     lamps: bpy.props.CollectionProperty(type=PatinaDraftLamp)  # type: ignore[valid-type]
@@ -80,6 +81,7 @@ def draft_of(scene: bpy.types.Scene) -> Draft:
         cameras=_path(state.cameras),
         mesh=_path(state.mesh),
         images=_path(state.images),
+        extra=_path(state.extra),
         photos=tuple(
             DraftPhoto(
                 Path(photo.path),
@@ -109,8 +111,9 @@ def store_draft(scene: bpy.types.Scene, draft: Draft) -> None:
     """Store a draft in the scene."""
     state = scene.patina_draft
     state.is_open = True
-    state.cameras, state.mesh, state.images = (
-        "" if path is None else str(path) for path in (draft.cameras, draft.mesh, draft.images)
+    state.cameras, state.mesh, state.images, state.extra = (
+        "" if path is None else str(path)
+        for path in (draft.cameras, draft.mesh, draft.images, draft.extra)
     )
     state.lamps.clear()
     for lamp in draft.lamps:

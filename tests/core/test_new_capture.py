@@ -81,7 +81,7 @@ def test_named_photos_become_a_capture(loose: Path) -> None:
 
 def test_unreadable_mesh_is_a_problem_and_keeps_the_rest(loose: Path) -> None:
     first = drafted(loose / "sparse", *loose.glob("*.exr"))
-    assert first.missing == "Add the mesh of the scan"
+    assert (first.missing or "").startswith("Add the mesh of the scan")
     (loose / "mesh.ply").write_bytes(b"ply\n")
     second = drafted(loose / "mesh.ply", before=first)
     assert "mesh.ply" in second.problems[0]

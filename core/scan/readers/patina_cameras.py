@@ -60,8 +60,10 @@ def write_patina_cameras(
     cameras: Sequence[Camera],
     frame: str,
     more: Sequence[Mapping[str, object]] = (),
+    earlier: Path | None = None,
 ) -> None:
-    """Write cameras. ``more``: further keys of each camera."""
+    """Write cameras. ``more``: further keys of each camera. earlier: a file whose cameras come
+    first, without those of a label that is written now."""
     entries = [
         {
             "label": camera.label,
@@ -76,6 +78,10 @@ def write_patina_cameras(
         }
         for i, camera in enumerate(cameras)
     ]
+    if earlier is not None:
+        known = {camera.label for camera in cameras}
+        kept = [entry for entry in read_json(earlier)["cameras"] if entry["label"] not in known]
+        entries = [*kept, *entries]
     data = {KEY: VERSION, "frame": frame, "cameras": entries}
     path.write_text(json.dumps(data, indent=1, ensure_ascii=False) + "\n", "utf-8")
 
