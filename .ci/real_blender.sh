@@ -6,6 +6,8 @@
 #   real_blender.sh session DIR OUT     tools/window/session.py in a real window on a virtual screen:
 #                                       screenshots of every stage in OUT (with the extension
 #                                       that `run.py headless` installed)
+#   real_blender.sh own DIR NAME OUT    tools/window/own_shoots.py: an own object by mouse, from the
+#                                       folder NAME in the home folder's Scans, or "demo"
 # Debian's build has no OSL and no USD; these are tested with the bpy wheel.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -66,8 +68,11 @@ blender)
   bind "$dir" "${PATINA_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/patina}"
   bind "$dir" "$PWD"
   exec chroot "$dir" /bin/bash -c 'cd "$0" && exec blender "$@"' "$PWD" "$@" ;;
-session)
-  dir=$1; mkdir -p "$2"; out=$(realpath "$2")
+session | own)
+  dir=$1; shift
+  script=(tools/window/session.py --)
+  if [ "$what" = own ]; then script=(tools/window/own_shoots.py -- "$1"); shift; fi
+  mkdir -p "$1"; out=$(realpath "$1")
   cache=${PATINA_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/patina}
   system "$dir"
   bind "$dir" "$here"
@@ -79,6 +84,6 @@ session)
     cd "$0"; export LIBGL_ALWAYS_SOFTWARE=1
     exec xvfb-run --auto-servernum -s "-screen 0 1600x1000x24 +extension GLX" timeout 1800 \
       blender --factory-startup --addons bl_ext.user_default.patina --window-geometry 0 0 1600 1000 \
-      -P tools/window/session.py -- "$1"' "$here" "$out" ;;
-*) sed -n '2,9p' "$0"; exit 2 ;;
+      -P "$@"' "$here" "${script[@]}" "$out" ;;
+*) sed -n '2,11p' "$0"; exit 2 ;;
 esac

@@ -11,9 +11,10 @@ from ..core.errors import PatinaError
 from ..core.inputs import capture_data
 from ..core.inputs.lights import find_lights
 from ..core.inputs.photos import LitPhotos
-from ..scene.scan.enclosing_objects import hide_enclosing
+from ..scene.scan.objects_in_the_way import hide_in_the_way
 from ..scene.scan.orientation import set_upright
 from ..scene.scan.scan_collection import create_scan_collection, find_earlier_import
+from ..scene.session.camera_view import show_camera_view
 from ..scene.session.folders import rectified_folder
 from .report_errors import report_and_cancel
 
@@ -75,16 +76,17 @@ def import_into_scene(
     set_upright(context.scene)
     context.scene.patina.capture = str(path)
     context.scene.patina.mesh = made.mesh
-    hidden = hide_enclosing(context.scene, made.mesh)
+    context.view_layer.update()  # the world matrices of the new objects
+    hidden = hide_in_the_way(context.scene, made.mesh, list(made.cameras.values()))
     if hidden:
-        operator.report({"INFO"}, f"Hidden, because they enclose the scan: {', '.join(hidden)}.")
+        operator.report({"INFO"}, f"Hidden, because in the way of the scan: {', '.join(hidden)}.")
     for selected in context.selected_objects:
         selected.select_set(False)
     made.mesh.select_set(True)
     context.view_layer.objects.active = made.mesh
     for area in context.screen.areas if context.screen else ():
         if area.type == "VIEW_3D":
-            area.spaces.active.region_3d.view_perspective = "CAMERA"
+            show_camera_view(area, context.scene)
     for note in (
         *scan.notes,
         *photos.notes,

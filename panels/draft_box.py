@@ -104,7 +104,7 @@ def _draw_photos(layout: bpy.types.UILayout, state: PatinaDraft) -> None:
     if lamp is None:
         return
     column = layout.column(align=True)
-    column.prop(lamp, "kind", text="")
+    column.prop(lamp, "kind")
     if lamp.kind in (LampKind.FLASH.value, LampKind.NEAR.value):
         column.prop(lamp, "stated")
     if lamp.kind == LampKind.DISTANT.value or (lamp.stated and lamp.kind in VALUE_LABELS):

@@ -13,6 +13,7 @@ from ..scene.photos.lamp_placement import DISTANT, MOUNTED, NEAR
 from ..scene.property_keys import CAPTURE, LAMP_KIND, LIGHT_NAME
 from ..scene.session.lengths import length
 from ..scene.session.scene_properties import stored_result
+from .wrapped import wrapped
 
 ICONS = {DISTANT: "LIGHT_SUN", NEAR: "LIGHT_POINT", MOUNTED: "LIGHT_SPOT"}
 KINDS = {DISTANT: "Distant Lamp", NEAR: "Near Lamp", MOUNTED: "Flash"}
@@ -31,9 +32,9 @@ def draw_lamp(layout: bpy.types.UILayout, scene: bpy.types.Scene, camera: bpy.ty
     column.label(text=f"{KINDS.get(kind, 'Light')}: {name}", icon=ICONS.get(kind, "LIGHT"))
     known = lamp_knowledge(scene, lamp)
     if known.source is Source.GUESS:
-        column.label(text=known.sentence, icon="ERROR")
+        wrapped(column, known.sentence, "ERROR")
     elif known.source is Source.FOUND:
-        column.label(text=known.sentence, icon="BLANK1")
+        wrapped(column, known.sentence, "BLANK1")
         column.operator("patina.find_lights", text="Find Again from Photos").light = name
     hand = lamp_edits(scene, lamp)
     if hand:

@@ -28,11 +28,11 @@ def draw_measured(
     for material in (result or {}).get("materials", []):
         box = layout.box()
         box.label(text=material["name"], icon="MATERIAL")
-        if material["name"] in materials:
-            box.template_icon(icon_value=icon_of(materials[material["name"]]), scale=SPHERE)
         quality = FitQuality.of_result(material)
         icon = "ERROR" if quality.rating is Rating.POOR else "BLANK1"
         wrapped(box, quality.sentence, icon, IN_BOX)
+        if material["name"] in materials:
+            box.template_icon(icon_value=icon_of(materials[material["name"]]), scale=SPHERE)
         if "interval_90" in material["uncertainty"]:
             median = either_side(material["uncertainty"]["median"])
             interval = f"90 % interval of the BRDF: {median} (median over directions)"

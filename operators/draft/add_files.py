@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 
 import bpy
@@ -11,6 +12,12 @@ from ...core.new_capture import Draft, DraftJob
 from ...scene.scan.capture_draft import draft_of, store_draft
 from ..report_errors import call_operator
 from ..stepped import Stepped
+
+HINT = (
+    "Open the folder with cameras, mesh and photos, and press New Capture. Or select files; more "
+    "can be added later."
+)
+HINT_WIDTH = 32  # characters per line beside the file browser
 
 
 class PATINA_OT_add_files(Stepped, bpy.types.Operator):
@@ -49,6 +56,10 @@ its content; nothing is imported yet"""
             context.window_manager.fileselect_add(self)
             return {"RUNNING_MODAL"}
         return super().invoke(context, event)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        for line in textwrap.wrap(HINT, HINT_WIDTH):
+            self.layout.label(text=line)
 
     def _paths(self) -> list[Path]:
         folder = Path(bpy.path.abspath(self.directory)) if self.directory else None

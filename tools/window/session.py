@@ -10,7 +10,6 @@ from __future__ import annotations
 import importlib
 import json
 import os
-import shutil
 import subprocess
 import sys
 import time
@@ -27,7 +26,6 @@ PACKAGE = "bl_ext.user_default.patina"
 STAGES = ["scan", "photos", "masks", "fit", "check", "material"]
 HEADER, FIRST = 25, 18  # pixels: between headers of closed panels; from the top to the first header
 TIMEOUT = 1500  # seconds for the session (real_blender.sh ends it soon after)
-SHOTS = "hcafbged"  # letters of the own object's photos: an order that matches no camera
 REDRAW_DELAY = 2.0  # seconds after which a window has been redrawn
 found: dict[str, object] = {}
 drawn: set[str] = set()  # stages whose panels were open at the last redraw of the sidebar
@@ -280,68 +278,12 @@ def judge() -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(OUT / "session.blend"))
 
 
-def loose_files() -> Path:
-    """Copy the demo's scan and photos to a folder, without its capture file and masks, and with
-    names of photos that match no camera."""
-    demo, folder = Path(part("operators.import_capture").DEMO).parent, OUT / "own"
-    shutil.copytree(demo / "sparse", folder / "sparse")
-    shutil.copy(demo / "mesh.ply", folder)
-    (folder / "lit").mkdir()
-    for place, photo in enumerate(sorted((demo / "lit").glob("*.exr"))):
-        shutil.copy(photo, folder / "lit" / f"shot_{SHOTS[place]}.exr")
-    return folder
-
-
-def own_object() -> Iterator[float]:
-    """Set up a capture from loose files, and find its lights from the photos."""
-    press("scene.new", type="EMPTY")
-    yield REDRAW_DELAY
-    press("patina.add_files", "INVOKE_DEFAULT", directory=str(loose_files()))
-    yield from until_done()
-    yield REDRAW_DELAY
-    photograph("14_new_capture")
-    scene = bpy.context.scene
-    draft = scene.patina_draft
-    names = sorted(
-        p.stem for p in (Path(part("operators.import_capture").DEMO).parent / "lit").iterdir()
-    )
-    wrong = []
-    for photo in draft.photos:
-        photo.use = bool(photo.camera)  # as a user switches off what has no camera
-        true = names[SHOTS.index(Path(photo.name).stem[-1])]
-        wrong += [photo.name] if photo.camera and Path(photo.camera).stem != true else []
-    found["own object, wrong cameras"] = wrong
-    found["own object, matched by content"] = sum(p.how == "by content" for p in draft.photos)
-    found["own object, lamps"] = len(draft.lamps)
-    press("patina.create_capture")
-    yield REDRAW_DELAY
-    press("patina.find_lights", "INVOKE_DEFAULT")
-    yield from until_done()
-    yield REDRAW_DELAY
-    photograph("15_lights_found")
-    read, stages = part("core.capture").read_capture, part("scene.views.workflow_stages")
-    true = [light.direction for light in read(part("operators.import_capture").DEMO).lights]
-    path = Path(part("scene.session.scene_properties").capture_path(scene))
-    now, _ = part("scene.photos.dragged_lamps").with_dragged_lamps(read(path), scene)
-    found["own object, degrees off"] = [
-        round(float(np.degrees(np.arccos(min(max(d @ light.direction for d in true), 1.0)))), 2)
-        for light in now.lights
-    ]
-    found["own object, doubts"] = list(stages.stages(scene)["photos"].doubts)
-    assert not wrong and found["own object, matched by content"] >= 7, found
-    assert found["own object, lamps"] == 4, found
-    assert max(found["own object, degrees off"]) < 5, found
-    assert not found["own object, doubts"], found
-
-
 def session() -> Iterator[float]:
     """Run all stages; yields the seconds to wait after each step."""
     for stage in (begin, scan_and_photos, materials_and_masks, fit_and_check):
         print("session:", stage.__name__, flush=True)
         yield from stage()
     judge()
-    print("session:", own_object.__name__, flush=True)
-    yield from own_object()
 
 
 def end(code: int) -> None:
