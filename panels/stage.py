@@ -53,7 +53,10 @@ class StagePanel:
                 row.scale_y = NEXT_BUTTON_SCALE
             row.operator(own.press)
         elif own.again:
-            layout.operator(own.press, text=own.again, icon="FILE_REFRESH")
+            row = layout.row()
+            if own.outdated:
+                row.scale_y = NEXT_BUTTON_SCALE
+            row.operator(own.press, text=own.again, icon="FILE_REFRESH")
         self.draw_more(layout, context)
 
     def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..fit import PaperFit
-from ..fit.held_out import HeldOutErrors
 from ..fit.measured_result import NINETY_PERCENT, MeasuredResult
 from ..fit.spread import Spread
 from ..jobs import MaterialResult
@@ -25,7 +24,7 @@ def figures(material: MaterialResult, photos: Sequence[str]) -> list[tuple[str, 
     p = material.principled.principled
     colour = ", ".join(f"{c:.3f}" for c in p.base_color)
     return [
-        ("Held-out photos", _held_out(material.held_out)),
+        ("Held-out photos", _held_out(material)),
         *own,
         (
             "Principled",
@@ -47,12 +46,13 @@ def half_width(deviation: float) -> float:
     return float(np.expm1(NINETY_PERCENT * deviation))
 
 
-def _held_out(held: HeldOutErrors | None) -> str:
+def _held_out(material: MaterialResult) -> str:
+    held = material.held_out
     if held is None:
         return "Not tested: too few photos show the material, or the test was switched off."
     return (
-        f"Each photo is predicted from the others: median relative error {100 * held.typical:.0f} "
-        f"%, relative RMS error {100 * held.error:.0f} % (dominated by highlights)."
+        f"{material.quality.sentence}. Each photo is predicted from the others; relative RMS error "
+        f"{100 * held.error:.0f} % (dominated by highlights)."
     )
 
 

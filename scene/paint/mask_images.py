@@ -162,6 +162,8 @@ def _saved(image: bpy.types.Image, capture: Capture, place: int, kind: str) -> P
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_png(file, read_pixels(image)[..., 0])
+        if image.is_dirty:
+            image.pack()  # later strokes are then noticed (views/outdated.py)
     except OSError as error:
         raise PatinaError(f"The mask {image.name!r} cannot be written ({error})") from error
     return file

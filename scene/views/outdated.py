@@ -26,7 +26,7 @@ CHANGES = {
     "scale": "the mesh was scaled",
     "slots": "materials of the mesh were painted or changed",
     "lamps": "a lamp was moved or deleted",
-    "masks": "masks were added or removed",
+    "masks": "masks were painted, added or removed",
     "capture": "the capture file was changed",
 }
 
@@ -46,7 +46,8 @@ def inputs_now(scene: bpy.types.Scene) -> dict[str, str]:
         lamp = lamp_of(scene, capture, name)
         lamps.append(f"{name} {_lamp_state(scene, lamp)}")
     found["lamps"] = _short("\n".join(lamps).encode())
-    found["masks"] = _short(repr(sorted(mask_images(capture))).encode())
+    masks = [f"{key} {_mask_state(image)}" for key, image in mask_images(capture).items()]
+    found["masks"] = _short("\n".join(sorted(masks)).encode())
     found["capture"] = _file_state(Path(capture)) if capture else ""
     return found
 
@@ -79,6 +80,12 @@ def changes_since(
         return ()
     now = now or inputs_now(scene)
     return tuple(CHANGES[key] for key in CHANGES if key in before and before[key] != now[key])
+
+
+def _mask_state(image: bpy.types.Image) -> str:
+    """Changes when the mask is painted: masks are packed when a fit reads them."""
+    packed = image.packed_file
+    return f"{image.is_dirty} {packed.size if packed is not None else 0}"
 
 
 def _lamp_state(scene: bpy.types.Scene, lamp: bpy.types.Object | None) -> str:

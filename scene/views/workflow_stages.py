@@ -27,7 +27,8 @@ class Stage:
     has: lines on what is present; missing: what remains to be done, None if nothing; press: the
     operator for it; again: label of its button when the stage is done, "" for no button; optional:
     whether later stages can start without it; doubts: sentences on what makes the stage's result
-    doubtful; remedy: the operator that may resolve them, "" if there is none.
+    doubtful; remedy: the operator that may resolve them, "" if there is none; outdated: whether
+    something changed since the result was made.
     """
 
     has: tuple[str, ...] = ()
@@ -37,6 +38,7 @@ class Stage:
     optional: bool = False
     doubts: tuple[str, ...] = ()
     remedy: str = ""
+    outdated: bool = False
 
     @property
     def done(self) -> bool:
@@ -132,7 +134,9 @@ def _fit(result: dict | None, changes: tuple[str, ...]) -> Stage:  # type: ignor
         if FitQuality.of_result(material).rating is Rating.POOR
     ]
     doubts = _outdated(changes) + ((f"Poor fit: {listed(poor)}",) if poor else ())
-    return Stage((has,), press="patina.fit", again="Fit Again", doubts=doubts)
+    return Stage(
+        (has,), press="patina.fit", again="Fit Again", doubts=doubts, outdated=bool(changes)
+    )
 
 
 def _outdated(changes: tuple[str, ...]) -> tuple[str, ...]:
@@ -145,7 +149,10 @@ def _check(diagnosis: dict | None, changes: tuple[str, ...]) -> Stage:  # type: 
         return Stage((), missing, "patina.check", optional=True)
     causes = [cause_label(cause).lower() for cause in diagnosis["named"] if cause != "none"]
     has = f"Found: {', '.join(causes)}" if causes else "No known cause found"
-    return Stage((has,), press="patina.check", again="Check Again", doubts=_outdated(changes))
+    doubts, outdated = _outdated(changes), bool(changes)
+    return Stage(
+        (has,), press="patina.check", again="Check Again", doubts=doubts, outdated=outdated
+    )
 
 
 def _material(capture: str) -> Stage:

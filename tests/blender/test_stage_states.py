@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bpy
+import numpy as np
 from support import extension
 from test_find_lights import guessed_capture
 
@@ -128,6 +129,27 @@ def test_edits_after_a_fit_make_it_outdated() -> None:
     stored_fit()
     bpy.data.objects.remove(lamp)
     assert outdated() == ("a lamp was moved or deleted",)
+
+
+def test_painting_a_mask_makes_a_fit_outdated() -> None:
+    path, _ = guessed_capture()
+    bpy.ops.patina.import_capture(filepath=str(path))
+    masks = extension("scene.paint.mask_images")
+    capture = extension("scene.session.scene_properties").capture_path(bpy.context.scene)
+    grey = np.zeros((90, 120), np.uint8)
+    image = masks.store_mask(capture, 0, "lit_1.exr", "ignore", grey)
+    stored_fit()
+    assert not outdated()
+    image.pixels[400] = 1.0  # as a brush in the Image Editor does
+    image.update()
+    assert image.is_dirty and outdated() == ("masks were painted, added or removed",)
+    assert stage("fit").outdated
+    masks.with_mask_images(extension("core.capture").read_capture(path))  # as a fit does
+    stored_fit()
+    assert not image.is_dirty and not outdated()
+    grey[20:40, 30:60] = 255
+    masks.store_mask(capture, 0, "lit_1.exr", "ignore", grey)
+    assert outdated() == ("masks were painted, added or removed",)
 
 
 def test_turning_the_whole_scan_is_no_change() -> None:

@@ -24,6 +24,7 @@ Box = tuple[int, int, int, int]  # left, top, right, bottom, screen pixels
 MIN_MATCH = 0.8  # correlation of a text with the screenshot: other texts stay below 0.7
 FONT_POINTS = 11.0  # of Blender's labels, at a scale of 1
 TEXT_HEIGHT, TEXT_BASE = 18, 5  # pixels of a template, and of its baseline from below
+REST = 700, 500  # a place without buttons, pixels of the screen
 SCALES = (1.0, 12 / 11)  # of the font: labels, and titles of panels
 
 
@@ -128,7 +129,9 @@ class Mouse:
         """Click a place; returns the seconds to wait."""
         self.clicks += times
         self.log.append(f"{'click' if times == 1 else 'double click'} {what}")
-        words: list[object] = ["mousemove", round(x) - 5, round(y), "sleep", 0.3]
+        # a button under a resting pointer keeps the state that it had when it was entered
+        words: list[object] = ["mousemove", *REST, "sleep", 0.3]
+        words += ["mousemove", round(x) - 5, round(y), "sleep", 0.3]
         words += ["mousemove", round(x), round(y), "sleep", 0.4]
         words += ["click", "--repeat", times, "--delay", 80, 1]
         self.act(*words)
