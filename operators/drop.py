@@ -1,5 +1,6 @@
 """Files dropped onto a 3D viewport: a capture is imported, a file of cameras starts a new capture,
-and for photos the user is asked what they are.
+and for photos the user is asked what they are. Meshes and photos are added to a new capture that is
+being set up.
 
 Blender selects the handler by file suffix; a folder has none and cannot be dropped.
 """
@@ -15,6 +16,7 @@ from ..core.capture import read_capture
 from ..core.capture.new_capture import CAMERAS, PHOTOS
 from ..core.counted import counted
 from ..core.errors import PatinaError
+from ..core.scan.mesh import READERS
 from ..scene.session.running_job import running
 from ..scene.session.scene_properties import capture_path
 from .report_errors import call_operator, report_and_cancel
@@ -69,6 +71,8 @@ The open capture is not changed"""
         layout.column().prop(self, "use", expand=True)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if context.scene.patina_draft.is_open:
+            return self._add([])
         return context.window_manager.invoke_props_dialog(self, width=420)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -81,16 +85,21 @@ The open capture is not changed"""
                 properties = self._scan(context.scene)
             except PatinaError as error:
                 return report_and_cancel(self, error)
-            photos = [{"name": one.name} for one in self.files]
-            if "cameras" not in properties:  # the rest of a new capture is added in the panel
-                return call_operator(
-                    self, bpy.ops.patina.add_files, _execution_context(),
-                    directory=self.directory, files=photos,
-                )  # fmt: skip
-            properties["photos_directory"], properties["photos"] = self.directory, photos
+            if "chunk" not in properties:  # the rest of a new capture is added in the panel
+                return self._add(list(properties.values()))
+            properties["photos_directory"] = self.directory
+            properties["photos"] = [{"name": one.name} for one in self.files]
             return call_operator(self, bpy.ops.patina.new_capture, "EXEC_DEFAULT", **properties)
         self.report({"INFO"}, "Nothing was imported.")
         return {"CANCELLED"}
+
+    def _add(self, others: list[str]) -> set[str]:
+        """Add the photos, and other files by their absolute paths, to the new capture."""
+        names = [*others, *(one.name for one in self.files)]
+        return call_operator(
+            self, bpy.ops.patina.add_files, _execution_context(),
+            directory=self.directory, files=[{"name": name} for name in names],
+        )  # fmt: skip
 
     def _scan(self, scene: bpy.types.Scene) -> dict[str, Any]:
         """The scan of the open capture, as properties of patina.new_capture; {} without a
@@ -145,5 +154,24 @@ class PATINA_FH_photos(ViewportDropHandler, bpy.types.FileHandler):
     bl_file_extensions = ";".join(sorted(PHOTOS))
 
 
-CLASSES = (PATINA_OT_drop_photos, PATINA_FH_capture, PATINA_FH_cameras, PATINA_FH_photos)
+class PATINA_FH_mesh(ViewportDropHandler, bpy.types.FileHandler):
+    """Add a dropped mesh to the new capture; without one, Blender imports it."""
+
+    bl_idname = "PATINA_FH_mesh"
+    bl_label = "Patina: Mesh of the Scan"
+    bl_import_operator = "patina.add_files"
+    bl_file_extensions = ";".join(sorted(READERS))
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        return super().poll_drop(context) and context.scene.patina_draft.is_open
+
+
+CLASSES = (
+    PATINA_OT_drop_photos,
+    PATINA_FH_capture,
+    PATINA_FH_cameras,
+    PATINA_FH_photos,
+    PATINA_FH_mesh,
+)
 register, unregister = bpy.utils.register_classes_factory(CLASSES)
