@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -64,6 +65,15 @@ class Draft:
     problems: tuple[str, ...] = ()
     camera_labels: tuple[str, ...] = ()
     extra: Path | None = None
+
+    @property
+    def folder(self) -> Path | None:
+        """The folder that holds all of its files, None without files."""
+        files = [*filter(None, (self.cameras, self.mesh)), *(p.file for p in self.photos)]
+        try:
+            return Path(os.path.commonpath([file.parent for file in files])) if files else None
+        except ValueError:  # on several drives
+            return files[0].parent
 
     @property
     def without_camera(self) -> tuple[Path, ...]:

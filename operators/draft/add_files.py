@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import textwrap
 from pathlib import Path
 
@@ -53,6 +54,9 @@ its content; nothing is imported yet"""
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not self._paths():
             self._picked = True
+            folder = draft_of(context.scene).folder  # the browser opens there
+            if folder is not None:
+                self.directory = str(folder) + os.sep
             context.window_manager.fileselect_add(self)
             return {"RUNNING_MODAL"}
         return super().invoke(context, event)
