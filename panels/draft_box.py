@@ -94,7 +94,8 @@ def _draw_photos(layout: bpy.types.UILayout, state: PatinaDraft) -> None:
     column = layout.column(align=True)
     column.prop_search(photo, "camera", state, "labels", icon="CAMERA_DATA")
     if photo.how:
-        column.label(text=f"Matched {photo.how}", icon="BLANK1")
+        how = f"matched {photo.how}" if photo.how.startswith("by ") else photo.how
+        column.label(text=how[0].upper() + how[1:], icon="BLANK1")
     column.prop_search(photo, "lamp", state, "lamps", icon="LIGHT")
     row = layout.row(align=True)
     row.operator("patina.draft_lamps", text="One Lamp").way = "ONE"

@@ -93,8 +93,8 @@ class Draft:
         lost = [file.name for file in self.without_camera]
         if lost:
             have = "photo has" if len(lost) == 1 else "photos have"
-            localise = "Localise them, choose" if self.images is not None else "Choose"
-            return f"{len(lost)} {have} no camera: {listed(lost)}. {localise} one, or switch off"
+            localise = "Localise them, choose cameras" if self.images is not None else "Choose one"
+            return f"{len(lost)} {have} no camera: {listed(lost)}. {localise} or switch them off"
         kinds = {self.lamps[photo.lamp].kind for photo in used if photo.lamp < len(self.lamps)}
         if kinds & NEAR_KINDS and kinds - NEAR_KINDS:
             return (

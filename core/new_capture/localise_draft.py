@@ -15,12 +15,13 @@ from ..errors import InputError
 from ..files import atomic_path
 from ..scan.scan import with_extra_cameras
 from ..solve import Localised, LocaliseJob
-from .draft import Draft
+from .draft import Draft, LampKind
 from .opened_scan import opened_scan
 from .propose_lamps import with_lamps
 
 READING, GROUPING = "reading files", "grouping photos by lamp"
 READ_SHARE, LOCALISE_SHARE = 0.02, 0.9  # of the job's time, at the ends of these parts
+PROPOSED = {LampKind.UNKNOWN, LampKind.FLASH}  # kinds of lamps that nobody has edited
 
 
 class LocaliseDraftJob(Job):
@@ -77,10 +78,19 @@ class LocaliseDraftJob(Job):
         placed_before = {
             p.file for p in draft.photos if p.camera is not None and p.file not in by_file
         }
+        if all(lamp.kind in PROPOSED and not lamp.stated for lamp in draft.lamps):
+            draft, placed_before = _without_lamps(draft), set()  # all photos are grouped anew
         steps = with_lamps(draft, opened, placed_before)
         self.draft = yield from relayed(
             steps, lambda done: Step(GROUPING, LOCALISE_SHARE + (1 - LOCALISE_SHARE) * done)
         )
+
+
+def _without_lamps(draft: Draft) -> Draft:
+    """The draft without lamps, and without the sentence about them."""
+    start = f"{counted(len(draft.lamps), 'lamp')} for "
+    found = tuple(line for line in draft.found if not line.startswith(start))
+    return replace(draft, lamps=(), found=found)
 
 
 def _how(found: Localised) -> str:

@@ -17,8 +17,8 @@ def show_camera_view(area: bpy.types.Area, scene: bpy.types.Scene) -> None:
     width, height = sizes["WINDOW"]
     if width <= 1 or height <= 1:  # an area that was not drawn yet
         return
-    beside = max(sizes.get("UI", (0, 0))[0], sizes.get("TOOLS", (0, 0))[0])
-    free = MARGIN * max(width - 2 * beside, width / 4), MARGIN * height
+    margin = max(sizes.get("UI", (0, 0))[0], sizes.get("TOOLS", (0, 0))[0])
+    free = MARGIN * max(width - 2 * margin, width / 4), MARGIN * height
     frame = scene.render.resolution_x, scene.render.resolution_y
     longer = min(f / n for f, n in zip(free, frame, strict=True)) * max(frame)
     share = longer / max(width, height)

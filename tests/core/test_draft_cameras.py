@@ -76,6 +76,7 @@ def test_photos_alone_become_a_capture(shoot: Path) -> None:
     assert draft.missing is None and not draft.problems, (draft.missing, draft.problems)
     how = {photo.file.stem: photo.how for photo in draft.photos}
     assert all(how[f"new_{k}"].startswith("localised, ±") for k in (0, 1)), how
+    assert sum(" lamps for " in line for line in draft.found) == 1, draft.found
 
     out = shoot / "new.capture.toml"
     draft.write(out)
