@@ -96,6 +96,7 @@ MODULES: tuple[str, ...] = (
     "operators.look_through",
     "operators.save_lights",
     "operators.find_lights",
+    "operators.find_ball",
     "operators.mark_assets",
     "operators.reset_traits",
     "operators.export",

@@ -36,6 +36,8 @@ def draw_lamp(layout: bpy.types.UILayout, scene: bpy.types.Scene, camera: bpy.ty
     elif known.source is Source.FOUND:
         wrapped(column, known.sentence, "BLANK1")
         column.operator("patina.find_lights", text="Find Again from Photos").light = name
+    if kind == DISTANT:
+        column.operator("patina.find_ball", text="Find from Ball in This Photo")
     hand = lamp_edits(scene, lamp)
     if hand:
         moved = hand.moved and known.source is not Source.FOUND

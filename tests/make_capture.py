@@ -80,6 +80,24 @@ def photo(rotation, translation, light, radius=1.0, brdf=blinn, lamp=None):
     return image.reshape(HEIGHT, WIDTH, 3)
 
 
+def write_ball_photo(path: Path, place: int, radius: float) -> None:
+    """Write the photo of the view ``place`` of a dark glossy ball before a grey wall."""
+    rotation, translation = list(poses())[place]
+    light = list(light_directions())[place]
+
+    def dark(normal, light, view):
+        half = light + view
+        half = half / np.linalg.norm(half, axis=-1, keepdims=True)
+        lobe = np.maximum(np.sum(normal * half, axis=-1), 0.0) ** 2000
+        return np.full(3, 0.003) + 20 * lobe[:, None]
+
+    eye = -rotation.T @ translation
+    inside = photo(rotation, translation, light, radius, lamp=(eye, 1.0)).max(axis=2) > 0
+    image = photo(rotation, translation, light, radius, brdf=dark)
+    image[~inside] = 0.2
+    write_exr(path, image)
+
+
 def sphere_mesh(subdivisions=5):
     """Return (vertices, faces) of a subdivided icosahedron around CENTRE, radius 1."""
     g = (1 + 5**0.5) / 2

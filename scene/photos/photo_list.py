@@ -12,7 +12,7 @@ from ..property_keys import CAPTURE, LIGHT_NAME, LIT_PHOTO, LIT_PHOTO_INDEX
 from ..session.handlers import attach, detach, register_property_factory
 from ..session.overlay_shading import leave_overlay
 from ..session.scene_properties import capture_path
-from . import cameras, lamps
+from . import ball_outline, cameras, lamps
 from .exposed_photo import exposed
 
 
@@ -138,6 +138,7 @@ def look_at(scene: bpy.types.Scene, photo: PatinaPhoto) -> None:
     mark_lit(camera, photo.name, photo.place, photo.light)
     cameras.look_through(scene, camera)
     lamps.shine_only(scene, camera)
+    ball_outline.show_only(scene, capture_path(scene), photo.place)
     _blend(scene)
 
 

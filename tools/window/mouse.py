@@ -25,6 +25,7 @@ MIN_MATCH = 0.8  # correlation of a text with the screenshot: other texts stay b
 FONT_POINTS = 11.0  # of Blender's labels, at a scale of 1
 TEXT_HEIGHT, TEXT_BASE = 18, 5  # pixels of a template, and of its baseline from below
 REST = 700, 500  # a place without buttons, pixels of the screen
+MAX_LOST_CLICKS = 3
 SCALES = (1.0, 12 / 11)  # of the font: labels, and titles of panels
 
 
@@ -145,9 +146,11 @@ class Mouse:
         timeout: float = 20.0,
         turned: bool = False,
         shift: int | None = None,
+        vanishes: bool = False,
     ) -> Iterator[float]:
         """Click a text of the screen, waiting until it appears. box: where to look for it; turned:
         the text of a tab; shift: pixels to the right of its left end, to click what is beside it.
+        vanishes: whether the text disappears then; a click that a busy window loses is repeated.
         Raises AssertionError after ``timeout`` seconds."""
         until = time.monotonic() + timeout
         while True:
@@ -162,3 +165,10 @@ class Mouse:
         if shift is not None:
             x += shift - drawn(text).shape[1] / 2
         yield self.click_at(x, y, text if shift is None else f"beside {text}", times)
+        for _ in range(MAX_LOST_CLICKS if vanishes else 0):
+            yield 2.0
+            if find(text, box, turned)[1] < MIN_MATCH:
+                break
+            self.log.append(f"lost click {text}")
+            self.clicks -= 1
+            yield self.click_at(x, y, text, times)

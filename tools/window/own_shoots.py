@@ -96,7 +96,7 @@ def choose_folder() -> Iterator[float]:
     yield from hand.click("Scans", times=2)
     yield from hand.click(NAME, times=2)
     photograph("folder")
-    yield from hand.click("New Capture", browser_buttons())
+    yield from hand.click("New Capture", browser_buttons(), vanishes=True)
     yield from idle()
     photograph("recognised")
 
@@ -208,7 +208,7 @@ def solve_and_add_mesh() -> Iterator[float]:
     yield REDRAW_DELAY
     photograph("browser_again")
     yield from hand.click("model.ply")
-    yield from hand.click("New Capture", browser_buttons())
+    yield from hand.click("New Capture", browser_buttons(), vanishes=True)
     yield from idle()
     photograph("mesh_added")
     lost = [p.name for p in bpy.context.scene.patina_draft.photos if p.use and not p.camera]
@@ -234,7 +234,7 @@ def whole_way() -> Iterator[float]:
         if photo.use and not photo.camera:  # no camera explains it: its box in the list
             yield from hand.click(photo.name, sidebar(), shift=BOX_OF_ROW)
             assert not photo.use, photo.name
-    yield from hand.click("Create Capture", sidebar())
+    yield from hand.click("Create Capture", sidebar(), vanishes=True)
     yield REDRAW_DELAY
     photograph("imported")
     marks["imported"] = time.perf_counter() - start
