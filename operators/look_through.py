@@ -5,6 +5,8 @@ from __future__ import annotations
 import bpy
 
 from ..scene.photos.photo_list import has_camera, lit_photos, looked_at
+from ..scene.session.overlay_shading import leave_overlay
+from ..scene.views.lamp_shading import toggle_lamp_shading
 
 
 class PATINA_OT_next_photo(bpy.types.Operator):
@@ -69,5 +71,22 @@ on"""
         return {"FINISHED"}
 
 
-CLASSES = (PATINA_OT_next_photo, PATINA_OT_look_through_photo)
+class PATINA_OT_lamp_shading(bpy.types.Operator):
+    """Shade the mesh with the lamp of this photo, to compare shading and shadows with the photo \
+while the lamp is moved. Other visible lamps of the scene shine too"""
+
+    bl_idname = "patina.lamp_shading"
+    bl_label = "Shade with Lamp"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        leave_overlay()
+        toggle_lamp_shading(context.screen, context.area)
+        return {"FINISHED"}
+
+
+CLASSES = (PATINA_OT_next_photo, PATINA_OT_look_through_photo, PATINA_OT_lamp_shading)
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -12,6 +12,7 @@ from ..scene.photos.photo_list import (
     looked_at,
 )
 from ..scene.session.scene_properties import capture_path
+from ..scene.views.lamp_shading import lamp_shading
 
 ROWS = 5
 MESH_OVER = "scene.patina_photos.mesh_over"
@@ -53,7 +54,9 @@ class PATINA_UL_photos(bpy.types.UIList):
         right.label(text="", icon=state if available else "ERROR")
 
 
-def draw_photos(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+def draw_photos(
+    layout: bpy.types.UILayout, scene: bpy.types.Scene, area: bpy.types.Area | None
+) -> None:
     """Draw the list of photos, and the display settings of the active one."""
     state = scene.patina_photos
     if not len(state.photos):
@@ -76,5 +79,7 @@ def draw_photos(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
         button.data_path, button.value = MESH_OVER, value
     column.prop(state, "mesh_over", slider=True)
     column.prop(state, "view_exposure", slider=True)
+    shaded = area is not None and area.type == "VIEW_3D" and lamp_shading(area)
+    column.operator("patina.lamp_shading", icon="SHADING_RENDERED", depress=shaded)
     if photo.exposure:
         column.label(text=f"Exposure: {photo.exposure:.4g}")

@@ -52,7 +52,7 @@ class PATINA_PT_photos(StagePanel, bpy.types.Panel):
     stage = "photos"
 
     def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-        draw_photos(layout, context.scene)
+        draw_photos(layout, context.scene, context.area)
         if looked_at(context.scene) is not None:
             draw_lamp(layout, context.scene, context.scene.camera)
 

@@ -45,6 +45,7 @@ MASK_PHOTO_INDEX = "patina_shadow_of"  # on the image: index of its photo in the
 MASK_PHOTO_NAME = "patina_photo"  # on the image: name of its photo
 MASK_KIND = "patina_mask"  # on the image: what it masks, one of EXCLUDED_MASKS
 BALL_PHOTO = "patina_ball"  # on the outline of a ball: index of its photo in the capture
+LAMP_SHADING = "patina_lamp_shading"  # on the screen: shading of its viewports before, JSON
 FOUND_UP = "patina_found_up"  # on the collection of a scan: up axis, standard error, agreement
 APPLIED_UP = "patina_up"  # on the collection of a scan: its axis that was turned to +z
 ORIGIN = "patina_origin"  # on the collection of a scan: offset of its frame, scan units

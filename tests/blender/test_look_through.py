@@ -7,6 +7,25 @@ from support import extension
 from test_workflow import folder, make_capture_module
 
 
+def test_lamp_shading_is_a_toggle() -> None:
+    module = extension("scene.views.lamp_shading")
+    screen = (
+        bpy.context.window_manager.windows[0].screen
+        if bpy.context.window_manager.windows
+        else bpy.data.screens["Layout"]
+    )
+    area = next(a for a in screen.areas if a.type == "VIEW_3D")
+    shading = area.spaces.active.shading
+    shading.type = "SOLID"
+    before = shading.use_scene_lights, shading.use_scene_world
+    assert not module.lamp_shading(area)
+    assert module.toggle_lamp_shading(screen, area)
+    assert shading.type == "MATERIAL" and shading.use_scene_lights and shading.use_scene_world
+    assert not module.toggle_lamp_shading(screen, area)
+    assert shading.type == "SOLID"
+    assert (shading.use_scene_lights, shading.use_scene_world) == before
+
+
 def perspective() -> str:
     areas = bpy.context.window_manager.windows[0].screen.areas
     view = next(area for area in areas if area.type == "VIEW_3D").spaces.active

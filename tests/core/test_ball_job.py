@@ -43,7 +43,9 @@ def test_ball_gives_the_direction(ball: Path) -> None:
     centre = rotation @ made.CENTRE + translation
     ring = result.ring / np.linalg.norm(result.ring, axis=1, keepdims=True)
     angles = np.arccos(ring @ centre / np.linalg.norm(centre))
-    assert np.allclose(angles, np.arcsin(RADIUS / np.linalg.norm(centre)), atol=4e-3)  # half a pixel
+    half_pixel = 0.5 / made.FOCAL
+    true = np.arcsin(RADIUS / np.linalg.norm(centre))
+    assert np.allclose(angles, true, atol=1.6 * half_pixel)
 
 
 def test_outline_near_the_ball_is_enough(ball: Path) -> None:
