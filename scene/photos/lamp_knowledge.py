@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import bpy
 
-from ..property_keys import LAMP_KIND, LIGHT_GUESS, LIGHT_NAME, STATED_ERROR
+from ..property_keys import INTENSITY_KNOWN, LAMP_KIND, LIGHT_GUESS, LIGHT_NAME, STATED_ERROR
 from ..session.lengths import length
 from .dragged_lamps import lamp_edits, lamp_of
 from .found_lights import found_values
@@ -27,12 +27,14 @@ class Source(Enum):
 
 @dataclass(frozen=True)
 class LampKnowledge:
-    """name: of the light; error: standard error, radians of a direction or scan units."""
+    """name: of the light; error: standard error, radians of a direction or scan units; strength:
+    whether its irradiance or intensity is known."""
 
     name: str
     source: Source
     error: float | None = None
     distant: bool = True
+    strength: bool = False
 
     @property
     def sentence(self) -> str:
@@ -45,6 +47,11 @@ class LampKnowledge:
 
 def lamp_knowledge(scene: bpy.types.Scene, lamp: bpy.types.Object) -> LampKnowledge:
     """What is known of a lamp as it is now."""
+    known = _placement_knowledge(scene, lamp)
+    return replace(known, strength=bool(lamp.get(INTENSITY_KNOWN)))
+
+
+def _placement_knowledge(scene: bpy.types.Scene, lamp: bpy.types.Object) -> LampKnowledge:
     name, distant = lamp.get(LIGHT_NAME, lamp.name), lamp.get(LAMP_KIND) == DISTANT
     edits = lamp_edits(scene, lamp)
     if edits is not None and edits.moved:

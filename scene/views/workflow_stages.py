@@ -87,9 +87,11 @@ def _photos(scene: bpy.types.Scene, capture: str, lit: list[PatinaPhoto]) -> Sta
     if not lit:
         return Stage(missing="No lit photos yet; import a capture, which lists them")
     names = list(dict.fromkeys(photo.light for photo in lit))
-    has = f"{counted(len(lit), 'lit photo')}, {counted(len(names), 'light')}"
+    has = [f"{counted(len(lit), 'lit photo')}, {counted(len(names), 'light')}"]
     known = [knowledge_of(scene, capture, name) for name in names]
     guesses = [one.name for one in known if one.source is Source.GUESS]
+    if not any(one.strength for one in known):
+        has.append("Strength of the light unknown: reflectance up to one scale")
     lost = [one.name for one in known if one.source is Source.MISSING]
     doubts = []
     if guesses:
@@ -100,7 +102,7 @@ def _photos(scene: bpy.types.Scene, capture: str, lit: list[PatinaPhoto]) -> Sta
             f"No lamp in the scene for {listed(lost)}: the fit uses the capture file's light"
         )
     remedy = "patina.find_lights" if guesses else ""
-    return Stage((has,), doubts=tuple(doubts), remedy=remedy)
+    return Stage(tuple(has), doubts=tuple(doubts), remedy=remedy)
 
 
 def _masks(
