@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..property_keys import CAPTURE
 
 SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
+INNER = 0.6  # of the scan's bounding box: what its cameras must see
 MAX_INSIDE = 0.5  # of an object's bounding box inside that of the scan
 
 Array = NDArray[np.float64]
@@ -20,23 +21,35 @@ def hide_in_the_way(
     scene: bpy.types.Scene, mesh: bpy.types.Object, cameras: Sequence[bpy.types.Object]
 ) -> list[str]:
     """Hide the visible objects of the scene whose bounding box contains the centre of the scanned
-    mesh or one of the cameras, or lies mostly inside that of the mesh. Returns their names."""
+    mesh or one of the cameras, stands between them, or lies mostly inside that of the mesh. Returns
+    their names."""
     low, high = _box(mesh)
-    places = np.array([(low + high) / 2, *(camera.matrix_world.translation for camera in cameras)])
+    centre = (low + high) / 2
+    eyes = np.array([centre, *(camera.matrix_world.translation for camera in cameras)])
+    seen = centre + INNER * (np.array(list(np.ndindex(2, 2, 2))) - 0.5) * (high - low)
     own = {o for c in mesh.users_collection for o in c.all_objects}
     hidden = []
     for other in scene.objects:
         if other in own or other.type not in SURFACES or CAPTURE in other or other.hide_get():
             continue
         bottom, top = _box(other)
-        encloses = ((bottom <= places) & (places <= top)).all(axis=1).any()
+        blocks = _crosses(eyes[:, None], seen[None], bottom, top).any()
         size = np.maximum(top - bottom, 1e-12)
         inside = np.prod(np.clip(np.minimum(top, high) - np.maximum(bottom, low), 0, size) / size)
-        if encloses or inside > MAX_INSIDE:
+        if blocks or inside > MAX_INSIDE:
             other.hide_set(True)
             other.hide_render = True
             hidden.append(other.name)
     return hidden
+
+
+def _crosses(start: Array, end: Array, low: Array, high: Array) -> NDArray[np.bool_]:
+    """Whether the lines from start to end (..., 3) cross a box, or lie in it."""
+    along = np.where(np.abs(end - start) < 1e-12, 1e-12, end - start)
+    one, other = (low - start) / along, (high - start) / along
+    enter = np.maximum(np.minimum(one, other).max(axis=-1), 0.0)
+    leave = np.minimum(np.maximum(one, other).min(axis=-1), 1.0)
+    return np.asarray(enter <= leave)
 
 
 def _box(thing: bpy.types.Object) -> tuple[Array, Array]:

@@ -25,7 +25,7 @@ MIN_MATCH = 0.8  # correlation of a text with the screenshot: other texts stay b
 FONT_POINTS = 11.0  # of Blender's labels, at a scale of 1
 TEXT_HEIGHT, TEXT_BASE = 18, 5  # pixels of a template, and of its baseline from below
 REST = 700, 500  # a place without buttons, pixels of the screen
-MAX_LOST_CLICKS = 3
+MAX_LOST_CLICKS, CHECKS = 3, 5  # checks, two seconds apart, before a click counts as lost
 SCALES = (1.0, 12 / 11)  # of the font: labels, and titles of panels
 
 
@@ -166,8 +166,13 @@ class Mouse:
             x += shift - drawn(text).shape[1] / 2
         yield self.click_at(x, y, text if shift is None else f"beside {text}", times)
         for _ in range(MAX_LOST_CLICKS if vanishes else 0):
-            yield 2.0
-            if find(text, box, turned)[1] < MIN_MATCH:
+            gone = False
+            for _ in range(CHECKS):
+                yield 2.0
+                gone = find(text, box, turned)[1] < MIN_MATCH
+                if gone:
+                    break
+            if gone:
                 break
             self.log.append(f"lost click {text}")
             self.clicks -= 1
