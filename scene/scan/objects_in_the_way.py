@@ -26,7 +26,8 @@ def hide_in_the_way(
     low, high = _box(mesh)
     centre = (low + high) / 2
     eyes = np.array([centre, *(camera.matrix_world.translation for camera in cameras)])
-    seen = centre + INNER * (np.array(list(np.ndindex(2, 2, 2))) - 0.5) * (high - low)
+    corners = np.array([(0.5, 0.5, 0.5), *np.ndindex(2, 2, 2)])  # and the centre
+    seen = centre + INNER * (corners - 0.5) * (high - low)
     own = {o for c in mesh.users_collection for o in c.all_objects}
     hidden = []
     for other in scene.objects:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import bpy
 import mathutils
+import numpy as np
 from support import extension
 from test_workflow import counts, folder, make_capture_module
 
@@ -108,12 +109,14 @@ def test_what_is_in_the_way_of_the_scan_is_hidden() -> None:
     centre = mesh.matrix_world @ (
         sum((mathutils.Vector(c) for c in mesh.bound_box), mathutils.Vector()) / 8
     )
+    offsets = np.array([camera.matrix_world.translation - centre for camera in cameras])
+    axis = np.cross(offsets[0], offsets[1]) / np.linalg.norm(np.cross(offsets[0], offsets[1]))
     things = {}
     for name, place, edge in (
         ("inside", corner + mathutils.Vector((0.3, 0.3, 0.3)) * size, 0.2 * size),
         ("around a camera", cameras[0].matrix_world.translation, 0.1 * size),
         ("before a camera", 0.6 * cameras[1].matrix_world.translation + 0.4 * centre, 0.1 * size),
-        ("table", centre - mathutils.Vector((0, 0, 2)) * size, size),
+        ("table", centre + mathutils.Vector(axis) * 2 * size, size),
     ):
         bpy.ops.mesh.primitive_cube_add(size=edge, location=place)
         things[name] = bpy.context.object
