@@ -41,10 +41,11 @@ class PATINA_UL_draft_photos(bpy.types.UIList):
         names.active = item.use
         names.label(text=item.name)
         if item.use:
-            right = names.split(factor=CAMERA_SHARE, align=True)
+            right = names.split(factor=CAMERA_SHARE, align=True) if item.lamp else names
             icon = "NONE" if item.camera else "ERROR"
-            right.label(text=item.camera or "No camera", icon=icon)
-            right.label(text=item.lamp)
+            right.label(text=item.camera or "none", icon=icon)
+            if item.lamp:
+                right.label(text=item.lamp)
 
 
 def draw_draft(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:

@@ -99,6 +99,7 @@ def _photo_sentence(photos: Sequence[Path]) -> str:
     kinds = sorted({photo.suffix.lstrip(".").upper() for photo in photos})
     try:
         encoding = read_photo(photos[0], Transfer.named("auto")).info.transfer.name
+        encoding = {"srgb": "sRGB"}.get(encoding, encoding)
     except PatinaError:
         encoding = ""
     count = counted(len(photos), "photo")

@@ -85,6 +85,8 @@ def _scan(mesh: bpy.types.Object | None) -> Stage:
 
 def _photos(scene: bpy.types.Scene, capture: str, lit: list[PatinaPhoto]) -> Stage:
     if not lit:
+        if scene.patina_draft.is_open:
+            return Stage(missing="No lit photos yet; they come with the new capture")
         return Stage(missing="No lit photos yet; import a capture, which lists them")
     names = list(dict.fromkeys(photo.light for photo in lit))
     has = [f"{counted(len(lit), 'lit photo')}, {counted(len(names), 'light')}"]
