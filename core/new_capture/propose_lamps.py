@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Generator
+from collections.abc import Collection, Generator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from ..concurrency.steps import scaled
 from ..counted import counted
+from ..errors import PatinaError
 from ..light import DistantLight
 from ..light_search import FoundLamp, LampPhoto, UnknownLamp, draw_lamp_pixels, find_lamps
 from ..light_search.search import MIN_PIXELS as MIN_LIT_PIXELS
-from ..photo import Transfer, read_photo
+from ..photo import Transfer, read_exif, read_photo
 from ..scan import Camera, Mesh
 from ..scan.scan import find_camera
 from . import group_lamps
@@ -31,6 +32,7 @@ MAX_SEARCHED_PHOTOS = 24  # the same, all together: about a second each
 PIXELS = 3000  # of a photo
 FLASH_COSINE = np.cos(np.radians(25.0))  # between light and view, of a flash on the camera
 MIN_FLASH_SHARE = 0.8  # of the photos
+FIRED_COSINE, MIN_FIRED_SHARE = np.cos(np.radians(45.0)), 0.5  # where EXIF says that it fired
 MIN_FLASH_PHOTOS = 3
 COMPARE_SHARE = 0.4  # of the time, before the lamps are searched together
 
@@ -61,11 +63,12 @@ def with_lamps(
             few = part.first(COARSE_PIXELS)
             directions[-1], _ = best_direction(few, opened.rays, opened.dictionary)
     directions += [None] * (len(used) - len(directions))
-    flashes = sum(
-        part is not None and one is not None and _from_camera(one, part.camera, opened)
+    cosines = [
+        -1.0 if part is None or one is None else _cosine_to_camera(one, part.camera, opened)
         for part, one in zip(parts, directions, strict=False)
-    )
-    if len(used) >= MIN_FLASH_PHOTOS and flashes >= MIN_FLASH_SHARE * len(used):
+    ]
+    fired = all(_flash_fired(draft.photos[i].file) for i in used)
+    if len(used) >= MIN_FLASH_PHOTOS and is_flash(cosines, len(used), fired):
         lamps, how = [0] * len(used), "the light comes from the camera"
         made = [DraftLamp("flash", LampKind.FLASH, (0.0, 0.0, 0.0))]
     else:
@@ -90,6 +93,23 @@ def with_lamps(
     return replace(
         draft, photos=tuple(photos), lamps=(*draft.lamps, *made), found=(*draft.found, note)
     )
+
+
+def is_flash(cosines: Sequence[float], photos: int, fired: bool) -> bool:
+    """Whether the light of the photos comes from a flash on the camera.
+
+    cosines: between light and view, of the photos that were compared. fired: whether a flash fired
+    in every photo by its EXIF, which may be one beside the camera; less agreement is then enough.
+    """
+    limit, share = (FIRED_COSINE, MIN_FIRED_SHARE) if fired else (FLASH_COSINE, MIN_FLASH_SHARE)
+    return sum(cosine > limit for cosine in cosines) >= share * photos
+
+
+def _flash_fired(file: Path) -> bool:
+    try:
+        return bool(read_exif(file).flash_fired)
+    except PatinaError:
+        return False
 
 
 def _groups(draft: Draft, used: list[int], directions: list[Array | None]) -> tuple[list[int], str]:
@@ -161,13 +181,12 @@ def _direction(lamp: FoundLamp | None) -> Array:
     return lamp.light.direction
 
 
-def _from_camera(direction: Array, camera: Camera, opened: OpenedScan) -> bool:
-    """Whether the light comes from the direction of the camera."""
+def _cosine_to_camera(direction: Array, camera: Camera, opened: OpenedScan) -> float:
+    """Cosine between the directions to the light and to the camera."""
     towards = camera.pose.centre - _centre(opened.scan.mesh)
     if camera.orthographic:
         towards = -camera.pose.rotation[2]
-    cosine = float(direction @ towards / max(float(np.linalg.norm(towards)), 1e-30))
-    return cosine > FLASH_COSINE
+    return float(direction @ towards / max(float(np.linalg.norm(towards)), 1e-30))
 
 
 def _centre(mesh: Mesh) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, timezone
 from fractions import Fraction
@@ -25,7 +26,8 @@ class Exif:
     camera's clock WITHOUT time zone (DateTimeOriginal, never ModifyDate); offset_original: its
     offset from UTC; latitude, longitude: degrees (north and east positive); altitude: m above sea
     level; gps_utc: UTC time of the GPS receiver; orientation: 1..8, how a viewer would rotate the
-    picture. Patina never applies it.
+    picture. Patina never applies it. flash_fired: a flash, also one beside the camera that it set
+    off.
     """
 
     exposure_time: float | None = None
@@ -43,6 +45,7 @@ class Exif:
     model: str | None = None
     lens: str | None = None
     orientation: int | None = None
+    flash_fired: bool | None = None
 
     @property
     def relative_exposure(self) -> float | None:
@@ -111,6 +114,7 @@ def read_exif(path: Path) -> Exif:
         model=_text(main, 0x0110),
         lens=_text(exif, 0xA434),
         orientation=_orientation(main),
+        flash_fired=_flash_fired(_numbers(exif, 0x9209)),
     )
 
 
@@ -138,7 +142,7 @@ def _from_exr(found: dict[str, object]) -> Exif:
     latitude, longitude = number("latitude"), number("longitude")
     placed = latitude is not None and longitude is not None
     placed = placed and abs(latitude or 0) <= 90 and abs(longitude or 0) <= 180
-    turned = number("Orientation")
+    turned, flash = number("Orientation"), number("Exif:Flash")
     return Exif(
         exposure_time=positive("ExposureTime"),
         f_number=positive("FNumber"),
@@ -154,6 +158,7 @@ def _from_exr(found: dict[str, object]) -> Exif:
         model=text("cameraModel", "Model"),
         lens=text("lensModel", "Exif:LensModel"),
         orientation=int(turned) if turned is not None and turned in range(1, 9) else None,
+        flash_fired=_flash_fired([flash] if flash is not None else []),
     )
 
 
@@ -262,6 +267,12 @@ def _gps_time(gps: Tags) -> datetime | None:
         return day.replace(tzinfo=UTC) + offset
     except OverflowError:
         return None
+
+
+def _flash_fired(values: Sequence[float | None]) -> bool | None:
+    """Bit 0 of Exif's Flash."""
+    first = values[0] if values else None
+    return bool(int(first) & 1) if first is not None and 0 <= first < 256 else None
 
 
 def _orientation(main: Tags) -> int | None:

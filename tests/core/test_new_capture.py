@@ -20,6 +20,7 @@ from patina.core.new_capture import (
     LampKind,
     group_lamps,
     match_names,
+    propose_lamps,
 )
 from patina.core.new_capture.draft import lamp_text
 from patina.core.new_capture.recognise import sort_paths
@@ -191,3 +192,13 @@ def test_incomplete_draft_says_what_is_missing(tmp_path: Path) -> None:
         assert draft.missing is not None and words in draft.missing
         with pytest.raises(InputError, match="not complete"):
             draft.write(tmp_path / "x.capture.toml")
+
+
+def test_exif_flash_needs_less_agreement_of_the_shading() -> None:
+    """A flash that fired may stand beside the camera: where most light comes from elsewhere, it
+    is none on the camera."""
+    near, wide, elsewhere = (float(np.cos(np.radians(d))) for d in (10, 40, 80))
+    assert propose_lamps.is_flash([near] * 9 + [elsewhere], 10, fired=False)
+    assert not propose_lamps.is_flash([wide] * 10, 10, fired=False)
+    assert propose_lamps.is_flash([wide] * 6 + [elsewhere] * 4, 10, fired=True)
+    assert not propose_lamps.is_flash([elsewhere] * 8 + [near] * 2, 10, fired=True)

@@ -26,6 +26,7 @@ EXIF = {
     0x8827: (3, [200]),
     0x920A: made.rationals((24, 1)),
     0xA405: (3, [36]),
+    0x9209: (3, [0x19]),
     0xA434: made.ascii_tag("A lens  24mm "),
     0x9003: made.ascii_tag("2018:06:01 12:30:15"),
     0x9011: made.ascii_tag("+09:00"),
@@ -91,7 +92,7 @@ def test_all_file_formats_give_same_metadata(files: list[Path]) -> None:
         assert found.longitude == pytest.approx(151.2, abs=1e-9)
         assert found.altitude == -17.5
         assert (found.make, found.model, found.lens) == ("Maker", "Model 1", "A lens 24mm")
-        assert found.orientation == 6
+        assert found.orientation == 6 and found.flash_fired is True
         assert found.relative_exposure == pytest.approx(1 / 125 * 200 / 100 / 13**2)
         assert found.missing == ()
 
@@ -100,6 +101,14 @@ def exif_of(tmp_path: Path, main=None, exif=None, gps=None) -> Exif:
     path = tmp_path / "p.tif"
     made.write_tiff(path, PIXELS, main, exif=exif or {}, gps=gps or {})
     return read_exif(path)
+
+
+@pytest.mark.parametrize(
+    ("value", "fired"),
+    [((3, [0x10]), False), ((3, [0x5F]), True), (None, None), ((3, [300]), None)],
+)
+def test_flash_is_known_only_if_stated(tmp_path: Path, value, fired) -> None:
+    assert exif_of(tmp_path, exif={} if value is None else {0x9209: value}).flash_fired is fired
 
 
 def test_relative_exposure_is_proportional_to_light(tmp_path: Path) -> None:
