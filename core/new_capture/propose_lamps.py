@@ -99,7 +99,7 @@ def is_flash(cosines: Sequence[float], photos: int, fired: bool) -> bool:
     """Whether the light of the photos comes from a flash on the camera.
 
     cosines: between light and view, of the photos that were compared. fired: whether a flash fired
-    in every photo by its EXIF, which may be one beside the camera; less agreement is then enough.
+    in every photo by its EXIF, which may stand away from the camera; less agreement is then enough.
     """
     limit, share = (FIRED_COSINE, MIN_FIRED_SHARE) if fired else (FLASH_COSINE, MIN_FLASH_SHARE)
     return sum(cosine > limit for cosine in cosines) >= share * photos

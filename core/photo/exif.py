@@ -26,8 +26,8 @@ class Exif:
     camera's clock WITHOUT time zone (DateTimeOriginal, never ModifyDate); offset_original: its
     offset from UTC; latitude, longitude: degrees (north and east positive); altitude: m above sea
     level; gps_utc: UTC time of the GPS receiver; orientation: 1..8, how a viewer would rotate the
-    picture. Patina never applies it. flash_fired: a flash, also one beside the camera that it set
-    off.
+    picture. Patina never applies it. flash_fired: a flash, also one away from the camera that it
+    set off.
     """
 
     exposure_time: float | None = None
