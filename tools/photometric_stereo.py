@@ -28,21 +28,22 @@ def found_lights(folder: Path) -> Iterable[tuple[str, list[float], list[float]]]
     """Yield (name, errors, standard errors) in degrees, against the chrome sphere's lights."""
     true = np.loadtxt(folder / "lights_chrome_mine.txt").reshape(PHOTOS, 3)
     true /= np.linalg.norm(true, axis=1, keepdims=True)
-    mask, photos = _read(folder / "data" / "gray", "gray")
-    directions, spread = _search(_sphere(mask), mask, photos, range(PHOTOS))
+    mask, photos = read(folder / "data" / "gray", "gray")
+    directions, spread = _search(sphere(mask), mask, photos, range(PHOTOS))
     yield "grey sphere", _degrees(directions, true), spread.tolist()
-    mask, photos = _read(folder / "data" / "owl", "owl")
+    mask, photos = read(folder / "data" / "owl", "owl")
     errors, spreads = np.zeros(PHOTOS), np.zeros(PHOTOS)
     for half in range(2):
         own = np.arange(half, PHOTOS, 2)
         others = np.arange(1 - half, PHOTOS, 2)
-        mesh = _integrated(mask, _normals(mask, [photos[i] for i in others], directions[others]))
+        mesh = integrated(mask, normals(mask, [photos[i] for i in others], directions[others]))
         found, spread = _search(mesh, mask, photos, own)
         errors[own], spreads[own] = _degrees(found, true[own]), spread
     yield "owl", errors.tolist(), spreads.tolist()
 
 
-def _read(folder: Path, name: str) -> tuple[NDArray[np.bool_], list[NDArray[np.float32]]]:
+def read(folder: Path, name: str) -> tuple[NDArray[np.bool_], list[NDArray[np.float32]]]:
+    """(mask, linear photos) of one of the objects."""
     import OpenImageIO as oiio
 
     def pixels(path: Path) -> NDArray[np.float32]:
@@ -90,7 +91,7 @@ def _search(mesh, mask, photos, which) -> tuple[Array, Array]:
     return np.array([one.light.direction for one in found]), spread
 
 
-def _sphere(mask: NDArray[np.bool_]):
+def sphere(mask: NDArray[np.bool_]):
     """The sphere that fills a mask."""
     from patina.core.scan import Mesh
 
@@ -113,7 +114,7 @@ def _faces(index: NDArray, right: NDArray) -> NDArray[np.int32]:
     return np.concatenate([first, second]).astype(np.int32)
 
 
-def _normals(mask: NDArray[np.bool_], photos: list, directions: Array) -> Array:
+def normals(mask: NDArray[np.bool_], photos: list, directions: Array) -> Array:
     """(h, w, 3) Lambertian normals of the masked pixels from their lit photos."""
     levels = np.stack([photo.mean(axis=2)[mask] for photo in photos], axis=1).astype(np.float64)
     weight = (levels > MIN_LEVEL * levels.max()) * 1.0
@@ -125,7 +126,7 @@ def _normals(mask: NDArray[np.bool_], photos: list, directions: Array) -> Array:
     return out
 
 
-def _integrated(mask: NDArray[np.bool_], normals: Array):
+def integrated(mask: NDArray[np.bool_], normals: Array):
     """The surface with these normals: least squares of the slopes between neighbours."""
     from patina.core.scan import Mesh
 

@@ -83,7 +83,8 @@ def make(folder: Path, cause: str, strength: float, seed: int) -> Truth:
     """
     scene, material = _scene(seed)
     scene = replace(scene, plain=scene.once(PLAIN), strength=strength)
-    hidden = _hidden(scene, [] if cause == "none" else cause.split("+"))
+    makers = {**MAKERS, **OUTSIDERS}
+    hidden = hidden_by(makers, scene, [] if cause == "none" else cause.split("+"))
     photos = camera_faults.with_noise(hidden.photos, scene.rng)
     _write(folder, hidden.surface or scene.surface, hidden.stated_shots or scene.shots, photos)
     return Truth(cause, hidden.strength, hidden.parameters, material, seed)
@@ -114,11 +115,13 @@ def _scene(seed: int) -> tuple[Scene, int]:
     return Scene(studio, surface, brdf, random_shots(rng), [], 0.0, rng, _kept(seed)), material
 
 
-def _hidden(scene: Scene, causes: Sequence[str]) -> Hidden:
-    """Apply one effect after the other."""
+def hidden_by(
+    makers: Mapping[str, Callable[[Scene], Hidden]], scene: Scene, causes: Sequence[str]
+) -> Hidden:
+    """Apply one effect after the other. makers: cause → function that hides it."""
     found = Hidden(scene.plain)
     for cause in causes:
-        made = {**MAKERS, **OUTSIDERS}[cause](replace(scene, plain=found.photos))
+        made = makers[cause](replace(scene, plain=found.photos))
         found = replace(
             made,
             parameters={**found.parameters, **made.parameters},

@@ -24,7 +24,16 @@ if TYPE_CHECKING:
 
 
 def main() -> int:
-    """Make and diagnose captures; print one line per capture, then the tables."""
+    """Make and diagnose captures; print one line per capture, then the tables. With --field or
+    --evidence first: captures of scans as they are (tools/field_hunt)."""
+    if sys.argv[1:2] == ["--field"]:
+        from ..field_hunt import table as field_table
+
+        return field_table.main(sys.argv[2:])
+    if sys.argv[1:2] == ["--evidence"]:
+        from ..field_hunt import evidence
+
+        return evidence.main(sys.argv[2:])
     load_patina()
     from .judged import judged
     from .make import MAKERS, ON_PICTURES, OUTSIDERS

@@ -1,0 +1,1 @@
+"""Captures of scans as they are, with and without a hidden effect, to test the diagnosis."""

@@ -1,0 +1,75 @@
+"""`run.py hunt --evidence CAPTURE ...`: what one step of every effect gains on the baseline.
+
+Not the diagnosis that Patina ships: the evidence with which the next one is to be calibrated. Gains
+are in thousandths of a nat a pixel and channel; those of held-out regions, photos and parts of the
+surface with their mean over the standard error.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..package import load_patina
+
+PARTS = 6  # of the surface, across
+
+
+def main(words: Sequence[str]) -> int:
+    """Fit each capture, and print its table."""
+    load_patina()
+    parser = argparse.ArgumentParser(prog="run.py hunt --evidence", description=__doc__)
+    parser.add_argument("captures", nargs="+", type=Path, metavar="CAPTURE")
+    for path in parser.parse_args(words).captures:
+        _print(path)
+    return 0
+
+
+def _print(path: Path) -> None:
+    from patina.core.capture import read_capture
+    from patina.core.concurrency.steps import drained
+    from patina.core.diagnose.effects import EFFECTS
+    from patina.core.diagnose.effects.base.capabilities import JudgedByPixel
+    from patina.core.diagnose.effects.base.patch_effect import PatchEffect
+    from patina.core.diagnose.effects.base.surface_patches import surface_patches
+    from patina.core.diagnose.nuisances.surface_variation import WAYS
+    from patina.core.diagnose.selection.baseline import fit_baseline
+    from patina.core.diagnose.selection.one_step import ProjectedBaseline, one_step
+    from patina.core.jobs import FitJob
+    from patina.core.jobs.diagnose_job import context_of, normal_deviation
+
+    job = FitJob(read_capture(path), portable=False)
+    job.keep = True
+    job.drain()
+    assert job.result is not None
+    context = drained(context_of(job.result))
+    baseline = fit_baseline(context, np.radians(normal_deviation(job.result)))
+    projected = ProjectedBaseline.of(baseline.fitted)
+    count = baseline.fitted.residual.size
+    print(f"\n{path}\n")
+    if baseline.scales is not None:
+        scales = (f"{w} {s:.4f}" for w, s in zip(WAYS, baseline.scales, strict=True))
+        print(f"scales of the surface: {', '.join(scales)}\n")
+    print("| effect | gain | held-out regions | photos | parts of the surface | RMS change |")
+    print("|---|---|---|---|---|---|")
+    groups = context.pixels.block, context.pixels.photo, surface_patches(context, PARTS)
+    for kind in EFFECTS:
+        effect = kind.of(context)
+        if effect is None or isinstance(effect, PatchEffect | JudgedByPixel):
+            continue
+        if not len(effect.parameters):
+            continue
+        step = one_step(projected, effect)
+        cells = []
+        for group in groups:
+            gains = step.held_out(group)
+            spread = float(np.sqrt(np.sum((gains - gains.mean()) ** 2)))
+            cells.append(f"{1e3 * gains.sum() / count:.2f} ({gains.sum() / max(spread, 1e-9):.1f})")
+        print(
+            f"| {effect.cause} | {1e3 * step.gain / count:.2f} | {' | '.join(cells)} | "
+            f"{100 * step.change:.2f} % |",
+            flush=True,
+        )
