@@ -74,7 +74,7 @@ def try_effect(now: ModelFit, costs: HeldOutCosts, candidate: Candidate) -> Tria
     fitted = fit(now.model.with_effect(effect, start), now.deviation)
     for _ in range(PRIOR_ROUNDS):
         if isinstance(effect, PatchEffect):
-            effect = effect.with_prior(_patch_prior(fitted))
+            effect = effect.with_prior(patch_prior(fitted))
             model = now.model.with_effect(effect)
             model = replace(model, brdfs=fitted.model.brdfs, x=fitted.model.x)
             fitted = fit(model, now.deviation)
@@ -157,7 +157,7 @@ def _residual_where_bright(now: ModelFit) -> Array:
     return np.where(counted, now.model.pixels.observed - now.predicted, 0.0)
 
 
-def _patch_prior(fitted: ModelFit) -> Vector:
+def patch_prior(fitted: ModelFit) -> Vector:
     """(e,) standard deviations of the parameters of patches: root mean square of the estimates with
     their variances added (one step of expectation and maximisation)."""
     model, effect = fitted.model, fitted.model.patch_effect

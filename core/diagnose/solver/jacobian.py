@@ -96,6 +96,22 @@ def jacobian_of(fit: ModelFit) -> Jacobian:
     return Jacobian(per_log, q, joined, columns, first, local, patch, patches)
 
 
+def effect_derivatives(model: Model, deviation: Array, place: int) -> Array:
+    """(n, 3, p) derivatives of the prediction with respect to all parameters of one effect, in
+    units of the deviation."""
+    state = model.lamp_light.state
+    recorded = model.photographed(state, model.lamp_light.reflected)
+    parameters, index = model.effects[place].parameters, model.parameter_index(place)
+    out = np.zeros((len(deviation), 3, len(parameters)), np.float32)
+    for slot in index.T:
+        used = np.unique(slot[slot >= 0])
+        step = parameters.step[used[0]] if len(used) else 1.0
+        change = (_stepped(model, place, used, step) - recorded) / (step * deviation)
+        rows = np.flatnonzero(slot >= 0)
+        out[rows, :, slot[rows]] = change[rows]
+    return out
+
+
 def _basis_rows(model: Model, light: LampLight) -> Array:
     """Q̂ (n, k): means over a few parts of the lamp, weighted by their contributions."""
     parts, brdfs = model.lamp_parts(light.state), model.brdfs

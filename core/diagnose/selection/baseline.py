@@ -1,0 +1,63 @@
+"""The baseline of a diagnosis on a real scan: BRDFs and what varies over the surface, in one fit.
+
+The scales of the surface's priors are found from the photos by expectation and maximisation
+(empirical Bayes), but never beyond what scans usually have: a wrong light direction would otherwise
+be explained by normals that are all wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..forward.diagnosis_context import DiagnosisContext
+from ..nuisances.surface_variation import SurfaceVariation
+from ..solver.gauss_newton import fit
+from ..solver.model import Model
+from ..solver.model_fit import ModelFit
+from ..solver.residual_scale import expected_deviation, rescaled_deviation
+from .effect_trials import patch_prior
+
+ACROSS = 36  # patches over the object's size: finer ones hold too few pixels, coarser ones leave
+# more of the errors of a stereo mesh (held-out regions of ../shared/data are predicted worse)
+PRIOR_ROUNDS = 2
+STEPS, STEPS_OF_ROUND = 4, 3
+USUAL_SCALES = (*(np.radians(0.6),) * 2, *(np.radians(0.4),) * 3, 0.4, *(0.05,) * 3, 0.02)
+"""Largest standard deviations of the priors (SurfaceVariation): normals of stereo meshes are off by
+0.8° in the median and by 3 to 4° at the 95th percentile, less in the mean over a patch; paint and
+patina vary by up to 40 %."""
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """plain: the fit with one BRDF for each material and an exact surface. fitted: with the
+    surface's variation; scales: (e,) of its priors; None: the surface is too small for patches."""
+
+    plain: ModelFit
+    fitted: ModelFit
+    scales: NDArray[np.float64] | None
+
+
+def fit_baseline(
+    context: DiagnosisContext, normal_deviation: float, across: int = ACROSS
+) -> Baseline:
+    """normal_deviation: radians along each tangent, of the scan's normals. across: patches over the
+    object's size."""
+    expected = expected_deviation(context.pixels, context.brdfs, normal_deviation)
+    plain = fit(Model(context.pixels, context.brdfs), expected)
+    deviation = rescaled_deviation(expected, plain.residual, plain.predicted, context.pixels)
+    plain = fit(plain.model, deviation)
+    variation = SurfaceVariation.across(context, across)
+    if variation is None:
+        return Baseline(plain, plain, None)
+    now = fit(plain.model.with_effect(variation), deviation, STEPS)
+    scales = np.array(variation.prior)
+    for _ in range(PRIOR_ROUNDS):
+        scales = np.minimum(patch_prior(now), USUAL_SCALES)
+        model = plain.model.with_effect(variation.with_prior(scales))
+        model = replace(model, brdfs=now.model.brdfs, x=now.model.x)
+        deviation = rescaled_deviation(deviation, now.residual, now.predicted, context.pixels)
+        now = fit(model, deviation, STEPS_OF_ROUND)
+    return Baseline(plain, now, scales)

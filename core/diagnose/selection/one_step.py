@@ -1,0 +1,192 @@
+"""One Newton step of an effect's parameters on top of the baseline, and how well it predicts parts
+of the photos that it was not fitted to.
+
+The baseline's unknowns (BRDFs, the patches of the surface, poses) are projected out of the effect's
+derivatives once (Frisch and Waugh 1933): what is left of a derivative is what only this effect can
+explain. A step, its standard error, its gain and its gain on held-out regions, photos or parts of
+the surface then are sums over pixels of a few columns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...statistics.student_t import robust_cost, robust_weights
+from ..effects.base.effect import Effect
+from ..solver.jacobian import Jacobian, effect_derivatives, jacobian_of
+from ..solver.model_fit import ModelFit
+from ..solver.normal_equations import NormalEquations
+from .relative_change import relative_rms_change
+
+Array = NDArray[np.floating]
+Vector = NDArray[np.float64]
+
+REWEIGHTINGS = 4  # a large effect looks like outliers until a part of it is explained
+
+
+@dataclass(frozen=True)
+class ProjectedBaseline:
+    """The baseline's derivatives, ready to be projected out of others.
+
+    jacobian, equations: of the baseline. weight: (n, 3) robust weights. inverse: (P, e, e) of the
+    patches' blocks. side: (M + p, P · e) coupling of the other unknowns with the patches. dense:
+    (M + p, M + p) inverse of what is left of these when the patches are eliminated.
+    """
+
+    fit: ModelFit
+    jacobian: Jacobian
+    weight: Array
+    inverse: Array
+    side: Array
+    dense: Array
+
+    @classmethod
+    def of(cls, fit: ModelFit) -> ProjectedBaseline:
+        """fit: the baseline at its optimum."""
+        jacobian = jacobian_of(fit)
+        equations = NormalEquations.of(fit, jacobian, np.arange(len(fit.residual)))
+        model = fit.model
+        k = equations.blocks.shape[-1]
+        size, p = len(equations.pull), len(equations.own)
+        matrix = np.zeros((size + p, size + p))
+        for index, block in enumerate(equations.blocks.reshape(-1, k, k)):
+            rows = slice(k * index, k * index + k)
+            matrix[rows, rows] = block + np.diag(1 / model.brdfs.variance)
+        matrix[:size, size:], matrix[size:, :size] = equations.coupling, equations.coupling.T
+        prior = fit.joined(lambda parameters: parameters.deviation)
+        matrix[size:, size:] = equations.own + np.diag(1 / prior**2)
+        side = np.concatenate([equations.local_coupling, equations.local_own])
+        inverse = np.zeros((0, 0, 0))
+        if len(equations.local):
+            assert model.patch_place is not None
+            deviation = model.effects[model.patch_place].parameters.deviation
+            count, e, _ = equations.local.shape
+            blocks = equations.local.copy()
+            blocks[:, range(e), range(e)] += (1 / deviation**2).reshape(count, e)
+            inverse = np.linalg.inv(blocks)
+            matrix -= _blockwise(side, inverse) @ side.T
+        weight = robust_weights(fit.residual)
+        return cls(fit, jacobian, weight, inverse, side, np.linalg.inv(matrix))
+
+    def solve(self, columns: Array, local: Array) -> tuple[Array, Array]:
+        """Baseline unknowns (M + p, q), (P · e, q) that imitate an effect: the inverse Hessian
+        times columns (M + p, q), local (P · e, q)."""
+        if not len(self.inverse):
+            return self.dense @ columns, local
+        eliminated = _blockwise(local.T, self.inverse).T  # (P e, q)
+        first = self.dense @ (columns - self.side @ eliminated)
+        second = eliminated - _blockwise((self.side.T @ first).T, self.inverse).T
+        return first, second
+
+    def project(self, derivative: Array) -> Array:
+        """(n, 3, q) the part of derivatives (n, 3, q), in units of the pixels' deviations, that the
+        baseline cannot imitate."""
+        fit, jacobian = self.fit, self.jacobian
+        m, _, k = fit.model.brdfs.coefficients.shape
+        material, q = fit.model.pixels.material, derivative.shape[2]
+        weighted = derivative * self.weight[..., None].astype(np.float32)
+        columns = np.zeros((m, 3, k, q))
+        for index in range(m):
+            mine = np.flatnonzero(material == index)
+            for c in range(3):
+                rows = weighted[mine, c] * jacobian.rho[mine, c, None]
+                columns[index, c] = jacobian.q[mine].T @ rows
+        everything = np.arange(len(derivative))
+        own = np.zeros((jacobian.count, q))
+        local = np.zeros((jacobian.patches * jacobian.local.shape[2], q))
+        for c in range(3):
+            own += jacobian.matrix(everything, c).T @ weighted[:, c]
+            if jacobian.patches:
+                local += jacobian.local_matrix(everything, c).T @ weighted[:, c]
+        joined = np.concatenate([columns.reshape(m * 3 * k, q), own])
+        first, second = self.solve(joined, local)
+        coefficients = first[: m * 3 * k].reshape(m, 3, k, q)
+        left = np.array(derivative, np.float32)
+        for index in range(m):
+            mine = np.flatnonzero(material == index)
+            for c in range(3):
+                imitated = jacobian.q[mine] @ coefficients[index, c].astype(np.float32)
+                left[mine, c] -= jacobian.rho[mine, c, None] * imitated
+        for c in range(3):
+            left[:, c] -= jacobian.matrix(everything, c) @ first[m * 3 * k :]
+            if jacobian.patches:
+                left[:, c] -= jacobian.local_matrix(everything, c) @ second
+        return left
+
+
+@dataclass(frozen=True)
+class OneStep:
+    """x: (q,) parameters of the effect after one step; covariance: (q, q) of these, the baseline's
+    unknowns free; prior: (q,) their standard deviations before. gain: nats. change: RMS change of
+    the photos by the step, relative, the baseline's unknowns unchanged. left: (n, 3, q) what only
+    this effect explains; score: (n, q) derivatives of the log-likelihood of each pixel;
+    residual: (n, 3) before the step; weight: (n, 3) robust weights after it."""
+
+    effect: Effect
+    x: Vector
+    covariance: Array
+    prior: Vector
+    gain: float
+    change: float
+    left: Array
+    score: Array
+    residual: Array
+    weight: Array
+
+    def held_out(self, group: NDArray[np.integer]) -> NDArray[np.float64]:
+        """(g,) nats by which each group of pixels is predicted better by the step that the other
+        groups give. group: (n,)."""
+        _, of = np.unique(group, return_inverse=True)
+        of = of.ravel()
+        count, q = int(of.max()) + 1, len(self.x)
+        scores = np.stack([np.bincount(of, self.score[:, j], count) for j in range(q)], axis=1)
+        order = np.argsort(of, kind="stable")
+        members = np.split(order, np.cumsum(np.bincount(of, minlength=count))[:-1])
+        information = np.zeros((count, q, q))
+        for g, rows in enumerate(members):
+            part = self.left[rows].reshape(-1, q)
+            information[g] = part.T @ (self.weight[rows].reshape(-1, 1) * part)
+        whole, total = information.sum(axis=0) + np.diag(1 / self.prior**2), scores.sum(axis=0)
+        out = np.zeros(count)
+        for g, rows in enumerate(members):
+            step = np.linalg.solve(whole - information[g], total - scores[g]).astype(np.float32)
+            residual = self.residual[rows]
+            rest = residual - self.left[rows] @ step
+            out[g] = (robust_cost(residual) - robust_cost(rest)).sum()
+        return out
+
+
+def one_step(baseline: ProjectedBaseline, effect: Effect) -> OneStep:
+    """The step of an effect that is not in the model."""
+    fit = baseline.fit
+    model = fit.model.with_effect(effect, np.zeros(len(effect.parameters)))
+    derivative = effect_derivatives(model, fit.deviation, len(model.effects) - 1)
+    left = baseline.project(derivative)
+    residual = np.where(np.isfinite(fit.residual), fit.residual, 0.0).astype(np.float32)
+    prior, q = effect.parameters.deviation, left.shape[2]
+    flat, x, weight = left.reshape(-1, q).astype(np.float64), np.zeros(q), baseline.weight
+    for _ in range(REWEIGHTINGS):
+        weighted = left * weight[..., None].astype(np.float32)
+        score = np.einsum("ncq,nc->nq", weighted, residual).astype(np.float64)
+        information = flat.T @ weighted.reshape(-1, q)
+        covariance = np.linalg.inv(information + np.diag(1 / prior**2))
+        x = covariance @ score.sum(axis=0)
+        rest = residual - left @ x.astype(np.float32)
+        weight = robust_weights(rest)
+    saved = float((robust_cost(residual) - robust_cost(rest)).sum())
+    gain = saved - 0.5 * float(np.sum((x / prior) ** 2))
+    moved = np.einsum("ncq,q->nc", derivative, effect.identified(x))
+    moved = np.where(np.isfinite(fit.deviation), moved * fit.deviation, 0.0)
+    change = relative_rms_change(fit.predicted + moved, fit.predicted, fit.deviation)
+    return OneStep(effect, x, covariance, prior, gain, change, left, score, residual, weight)
+
+
+def _blockwise(rows: Array, inverse: Array) -> Array:
+    """(r, P · e) rows (r, P · e) times blocks (P, e, e)."""
+    count, e, _ = inverse.shape
+    return np.asarray(
+        np.einsum("rpe,pef->rpf", rows.reshape(len(rows), count, e), inverse).reshape(len(rows), -1)
+    )
