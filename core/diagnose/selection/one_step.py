@@ -179,7 +179,7 @@ def one_step(baseline: ProjectedBaseline, effect: Effect) -> OneStep:
     saved = float((robust_cost(residual) - robust_cost(rest)).sum())
     gain = saved - 0.5 * float(np.sum((x / prior) ** 2))
     moved = np.einsum("ncq,q->nc", derivative, effect.identified(x))
-    moved = np.where(np.isfinite(fit.deviation), moved * fit.deviation, 0.0)
+    moved = moved * np.where(np.isfinite(fit.deviation), fit.deviation, 0.0)
     change = relative_rms_change(fit.predicted + moved, fit.predicted, fit.deviation)
     return OneStep(effect, x, covariance, prior, gain, change, left, score, residual, weight)
 
