@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from patina.core.diagnose.effects.camera_pose import CameraPose
 from patina.core.diagnose.effects.light_direction import LightDirection
 from patina.core.diagnose.effects.light_intensity import LightIntensity
 from patina.core.diagnose.effects.vignetting import Vignetting
+from patina.core.diagnose.nuisances.pose_jitter import PoseJitter
 from patina.core.diagnose.nuisances.surface_variation import SurfaceVariation
 from patina.core.diagnose.selection.baseline import USUAL_SCALES, fit_baseline
 from patina.core.diagnose.selection.one_step import ProjectedBaseline, one_step
@@ -108,3 +110,23 @@ def test_albedo_of_patches_is_found():
         for one in (baseline.plain, baseline.fitted)
     )
     assert after < 0.5 * before
+
+
+@pytest.mark.parametrize("pixels_off", [0.3, 3.0])
+def test_pose_errors_belong_to_the_baseline(pixels_off):
+    """Photos of a ball with a steep gradient, shifted: the baseline says by how much, and no step
+    of camera_pose explains more. Whether that is unusual is told by the size of the errors."""
+    context = lit_ball(5, GLOSSY)
+    pixels = context.pixels
+    slope = np.zeros_like(pixels.slope)
+    slope[:, 0] = 0.01 * pixels.observed.mean(axis=0) * np.sin(40 * pixels.x)[:, None]
+    shift = pixels_off * np.where(pixels.photo % 2, 1, -1)
+    moved = (pixels.observed + shift[:, None] * slope[:, 0]).astype(np.float32)
+    edge = np.zeros(len(pixels), np.float32)  # the light is taken as linear near an edge
+    context = replace(context, pixels=replace(pixels, slope=slope, observed=moved, edge=edge))
+    baseline = fit_baseline(context, NORMALS, ACROSS)
+    right = baseline.fitted.model.parameters_of(PoseJitter.cause)[0::3]
+    signs = np.where(np.arange(len(right)) % 2, 1, -1)
+    assert np.median(right * signs) == pytest.approx(pixels_off, rel=0.35)
+    step = one_step(ProjectedBaseline.of(baseline.fitted), CameraPose.of(context))
+    assert step.held_out(pixels.block).sum() < 30

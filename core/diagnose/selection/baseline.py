@@ -1,4 +1,4 @@
-"""The baseline of a diagnosis on a real scan: BRDFs and what varies over the surface, in one fit.
+"""The baseline of a diagnosis on a real scan: BRDFs, poses, and what varies over the surface.
 
 The scales of the surface's priors are found from the photos by expectation and maximisation
 (empirical Bayes), but never beyond what scans usually have: a wrong light direction would otherwise
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..forward.diagnosis_context import DiagnosisContext
+from ..nuisances.pose_jitter import PoseJitter
 from ..nuisances.surface_variation import SurfaceVariation
 from ..solver.gauss_newton import fit
 from ..solver.model import Model
@@ -32,8 +33,9 @@ patina vary by up to 40 %."""
 
 @dataclass(frozen=True)
 class Baseline:
-    """plain: the fit with one BRDF for each material and an exact surface. fitted: with the
-    surface's variation; scales: (e,) of its priors; None: the surface is too small for patches."""
+    """plain: the fit with one BRDF for each material, an exact surface and exact poses. fitted:
+    with errors of poses and the surface's variation; scales: (e,) of the priors of the latter;
+    None: the surface is too small for patches."""
 
     plain: ModelFit
     fitted: ModelFit
@@ -49,14 +51,15 @@ def fit_baseline(
     plain = fit(Model(context.pixels, context.brdfs), expected)
     deviation = rescaled_deviation(expected, plain.residual, plain.predicted, context.pixels)
     plain = fit(plain.model, deviation)
+    posed = plain.model.with_effect(PoseJitter.of(context))
     variation = SurfaceVariation.across(context, across)
     if variation is None:
-        return Baseline(plain, plain, None)
-    now = fit(plain.model.with_effect(variation), deviation, STEPS)
+        return Baseline(plain, fit(posed, deviation), None)
+    now = fit(posed.with_effect(variation), deviation, STEPS)
     scales = np.array(variation.prior)
     for _ in range(PRIOR_ROUNDS):
         scales = np.minimum(patch_prior(now), USUAL_SCALES)
-        model = plain.model.with_effect(variation.with_prior(scales))
+        model = posed.with_effect(variation.with_prior(scales))
         model = replace(model, brdfs=now.model.brdfs, x=now.model.x)
         deviation = rescaled_deviation(deviation, now.residual, now.predicted, context.pixels)
         now = fit(model, deviation, STEPS_OF_ROUND)
