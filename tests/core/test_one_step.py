@@ -19,6 +19,8 @@ from patina.core.diagnose.selection.one_step import ProjectedBaseline, one_step
 from patina.core.diagnose.solver.gauss_newton import fit
 from tests.make_lit_ball import GLOSSY, changed, lit_ball
 
+pytestmark = pytest.mark.slow
+
 GAINS = 0.03 * np.array([1.0, -1.0, 0.5, -0.5, 1.0, -1.0])  # ln, of the photos
 NORMALS = np.radians(0.3)  # expected error of the ball's exact normals
 ACROSS = 8  # patches: the ball has few pixels
