@@ -63,8 +63,8 @@ class Truth:
 
 
 def setting(seed: int) -> tuple[str, str, str, str, bool]:
-    """(lamp, scan, material, encoding, whether the albedo varies) of a seed: every combination of
-    lamp and scan in turn; the rest is drawn."""
+    """(lamp, scan, material, encoding, whether the albedo varies) of a seed. Half of
+    the seeds have distant lamps; the rest is drawn."""
     rng = np.random.default_rng([seed, 11])
     lamp = LAMPS[0] if seed % 2 == 0 else LAMPS[1 + (seed // 2) % 2]
     scan = (*BUNNIES, *OWN)[int(rng.integers(len(BUNNIES) + len(OWN)))]

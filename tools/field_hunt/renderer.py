@@ -58,11 +58,13 @@ class Renderer:
     material: Callable[[Array], NDArray[np.intp]] | None = None
     factor: Callable[[Array], Array] | None = None
     blocked: Callable[[Array, Array], Array] | None = None
+    rays: RayScene | None = None
     _seen: dict[tuple[bytes, bytes, tuple[int, int]], Seen] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        mesh = Mesh(self.surface.points, self.surface.triangles.astype(np.int32))
-        self.rays = RayScene.build(mesh)
+        if self.rays is None:  # a copy with another material or shadow has the same surface
+            mesh = Mesh(self.surface.points, self.surface.triangles.astype(np.int32))
+            self.rays = RayScene.build(mesh)
 
     def photo(self, camera: Camera, lamp: Lamp) -> NDArray[np.float64]:
         """(h, w, 3) linear radiance."""

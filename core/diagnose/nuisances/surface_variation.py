@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...angles.vectors import tangents
 from ..effects.base.effect import Array
 from ..effects.base.image_formation import AddsRadiance, ChangesShading
 from ..effects.base.parameters import Parameters
 from ..effects.base.patch_effect import PatchEffect
-from ..effects.base.surface_patches import surface_patches
+from ..effects.base.patch_frames import PatchFrames
+from ..effects.base.surface_patches import ACROSS, surface_patches
 from ..forward.diagnosis_context import DiagnosisContext, NearestPixels
 from ..forward.material_brdfs import MaterialBRDFs
 from ..forward.shading_state import ShadingState
@@ -34,45 +34,31 @@ STEPS = (*(1e-3,) * 9, 5e-3)  # for difference quotients
 
 @dataclass(frozen=True)
 class SurfaceVariation(PatchEffect, ChangesShading, AddsRadiance):
-    """Parameters of a patch: WAYS. first, other: (n, 3) tangents of its mean normal; middle:
-    (P, 3) its centre; place: (n, 2) position of a pixel in it, in half widths; received: (n, 3)
-    irradiance on the surface; width: of a patch, scan units."""
+    """Parameters of a patch: WAYS. received: (n, 3) irradiance on the surface."""
 
-    first: Array
-    other: Array
-    middle: Array
-    place: Array
+    frames: PatchFrames
     received: Array
-    width: float
     cause = "surface_variation"
     deciding_photo = ""
 
     @classmethod
     def of(cls, context: DiagnosisContext) -> SurfaceVariation | None:
-        return cls.across(context, 24)
+        return cls.across(context, ACROSS)
 
     @classmethod
     def across(cls, context: DiagnosisContext, across: int) -> SurfaceVariation | None:
         """across: patches over the object's size. None where no patch has enough pixels."""
         patch = surface_patches(context, across)
-        known = np.flatnonzero(patch >= 0)
-        if not len(known):
+        if not (patch >= 0).any():
             return None
-        mean = _means(patch[known], context.pixels.normal[known])
-        mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9)
-        first, other = (v[patch].astype(np.float32) for v in tangents(mean))
-        middle = _means(patch[known], context.pixels.point[known])
-        width = context.size / across
-        place = _place(context, middle[patch], first, other, width)
-        received = ShadingState.of(context.pixels).received
-        return cls(patch, START_SCALES, first, other, middle, place, received, width)
+        frames = PatchFrames.of(context, patch, context.size / across)
+        return cls(patch, START_SCALES, frames, ShadingState.of(context.pixels).received)
 
     def at_pixels(self, context: DiagnosisContext, nearest: NearestPixels) -> SurfaceVariation:
-        at = nearest.surface
-        patch, first, other = self.patch[at], self.first[at], self.other[at]
-        place = _place(context, self.middle[patch], first, other, self.width)
+        patch = self.patch[nearest.surface]
+        frames = self.frames.at_pixels(context, nearest.surface, patch)
         received = ShadingState.of(context.pixels).received
-        return replace(self, patch=patch, first=first, other=other, place=place, received=received)
+        return replace(self, patch=patch, frames=frames, received=received)
 
     @property
     def parameters(self) -> Parameters:
@@ -85,11 +71,8 @@ class SurfaceVariation(PatchEffect, ChangesShading, AddsRadiance):
         )
 
     def shading(self, state: ShadingState, x: np.ndarray) -> ShadingState:
-        first, second, along, across, aside, more, _, _, _, gloss = self.at_patch(x).T
-        u, v = self.place.T
-        tilt = np.stack([first + along * u + across * v, second + across * u + aside * v], axis=1)
-        normal = state.normal + tilt[:, :1] * self.first + tilt[:, 1:] * self.other
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        first, second, *bends, more, _, _, _, gloss = self.at_patch(x).T
+        normal = self.frames.tilted(state.normal, first, second, bends)
         stretch = gloss if state.stretch is None else state.stretch + gloss
         irradiance = state.irradiance * (1 + more)[:, None]
         return replace(state, normal=normal, irradiance=irradiance, stretch=stretch)
@@ -99,21 +82,3 @@ class SurfaceVariation(PatchEffect, ChangesShading, AddsRadiance):
 
     def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
         return ""
-
-
-def _means(patch: np.ndarray, values: Array) -> np.ndarray:
-    """(P, 3) means of values (n, 3) over each patch; patch: (n,) its number."""
-    count = np.maximum(np.bincount(patch), 1)
-    sums = [np.bincount(patch, values[:, k].astype(np.float64)) for k in range(3)]
-    return np.stack(sums, axis=1) / count[:, None]
-
-
-def _place(
-    context: DiagnosisContext, middle: Array, first: Array, other: Array, width: float
-) -> Array:
-    """(n, 2) positions of the context's pixels relative to the centres (n, 3) of their patches, in
-    half widths, clipped to ±1.5: a pixel outside its nearest patch does not extrapolate the
-    curvature far beyond the edge."""
-    away = (context.pixels.point - middle) / (0.5 * width)
-    place = np.stack([np.sum(away * along, axis=1) for along in (first, other)], axis=1)
-    return np.clip(place, -1.5, 1.5).astype(np.float32)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...statistics.student_t import robust_cost, robust_weights
 from ..effects.base.effect import Effect
+from ..solver.block_elimination import dense_matrix, patch_blocks, times_blocks
 from ..solver.jacobian import Jacobian, effect_derivatives, jacobian_of
 from ..solver.model_fit import ModelFit
 from ..solver.normal_equations import NormalEquations
@@ -49,25 +50,15 @@ class ProjectedBaseline:
         jacobian = jacobian_of(fit)
         equations = NormalEquations.of(fit, jacobian, np.arange(len(fit.residual)))
         model = fit.model
-        k = equations.blocks.shape[-1]
-        size, p = len(equations.pull), len(equations.own)
-        matrix = np.zeros((size + p, size + p))
-        for index, block in enumerate(equations.blocks.reshape(-1, k, k)):
-            rows = slice(k * index, k * index + k)
-            matrix[rows, rows] = block + np.diag(1 / model.brdfs.variance)
-        matrix[:size, size:], matrix[size:, :size] = equations.coupling, equations.coupling.T
-        prior = fit.joined(lambda parameters: parameters.deviation)
-        matrix[size:, size:] = equations.own + np.diag(1 / prior**2)
+        matrix = dense_matrix(equations, fit)
         side = np.concatenate([equations.local_coupling, equations.local_own])
         inverse = np.zeros((0, 0, 0))
         if len(equations.local):
             assert model.patch_place is not None
             deviation = model.effects[model.patch_place].parameters.deviation
-            count, e, _ = equations.local.shape
-            blocks = equations.local.copy()
-            blocks[:, range(e), range(e)] += (1 / deviation**2).reshape(count, e)
-            inverse = np.linalg.inv(blocks)
-            matrix -= _blockwise(side, inverse) @ side.T
+            free = np.zeros(len(deviation), bool)
+            inverse = np.linalg.inv(patch_blocks(equations.local, deviation, free))
+            matrix -= times_blocks(side, inverse) @ side.T
         weight = robust_weights(fit.residual)
         return cls(fit, jacobian, weight, inverse, side, np.linalg.inv(matrix))
 
@@ -76,9 +67,9 @@ class ProjectedBaseline:
         times columns (M + p, q), local (P · e, q)."""
         if not len(self.inverse):
             return self.dense @ columns, local
-        eliminated = _blockwise(local.T, self.inverse).T  # (P e, q)
+        eliminated = times_blocks(local.T, self.inverse).T  # (P e, q)
         first = self.dense @ (columns - self.side @ eliminated)
-        second = eliminated - _blockwise((self.side.T @ first).T, self.inverse).T
+        second = eliminated - times_blocks((self.side.T @ first).T, self.inverse).T
         return first, second
 
     def project(self, derivative: Array) -> Array:
@@ -182,11 +173,3 @@ def one_step(baseline: ProjectedBaseline, effect: Effect) -> OneStep:
     moved = moved * np.where(np.isfinite(fit.deviation), fit.deviation, 0.0)
     change = relative_rms_change(fit.predicted + moved, fit.predicted, fit.deviation)
     return OneStep(effect, x, covariance, prior, gain, change, left, score, residual, weight)
-
-
-def _blockwise(rows: Array, inverse: Array) -> Array:
-    """(r, P · e) rows (r, P · e) times blocks (P, e, e)."""
-    count, e, _ = inverse.shape
-    return np.asarray(
-        np.einsum("rpe,pef->rpf", rows.reshape(len(rows), count, e), inverse).reshape(len(rows), -1)
-    )

@@ -64,6 +64,25 @@ def with_prior(equations: NormalEquations, fit: ModelFit) -> Array:
     return np.asarray(equations.own + np.diag(1 / prior**2))
 
 
+def dense_matrix(equations: NormalEquations, fit: ModelFit) -> Array:
+    """(M + p, M + p) matrix of coefficients and global parameters with their priors."""
+    k, size = equations.blocks.shape[-1], len(equations.pull)
+    dense = np.zeros((size + len(equations.own),) * 2)
+    for index, block in enumerate(equations.blocks.reshape(-1, k, k)):
+        rows = slice(k * index, k * index + k)
+        dense[rows, rows] = block + np.diag(1 / fit.model.brdfs.variance)
+    dense[:size, size:], dense[size:, :size] = equations.coupling, equations.coupling.T
+    dense[size:, size:] = with_prior(equations, fit)
+    return dense
+
+
+def times_blocks(rows: Array, blocks: Array) -> Array:
+    """(r, P · e) rows (r, P · e) times blocks (P, e, e)."""
+    count, e, _ = blocks.shape
+    each = np.einsum("spe,pef->spf", rows.reshape(-1, count, e), blocks)
+    return np.asarray(each.reshape(len(rows), -1))
+
+
 def solve(equations: NormalEquations, fit: ModelFit, spread: bool = False) -> Step:
     """The step of the maximum a posteriori; parameters that a bound holds do not move. spread: with
     the variances of the patches' parameters, which take longest."""
@@ -93,12 +112,7 @@ def _solve_with_patches(equations: NormalEquations, fit: ModelFit, spread: bool)
     parameters, y = model.effects[model.patch_place].parameters, model.x[model.patch_place]
     m, _, k = model.brdfs.coefficients.shape
     size, p = len(equations.pull), len(equations.own)
-    dense = np.zeros((size + p, size + p))
-    for index, block in enumerate(equations.blocks.reshape(-1, k, k)):
-        rows = slice(k * index, k * index + k)
-        dense[rows, rows] = block + np.diag(1 / model.brdfs.variance)
-    dense[:size, size:], dense[size:, :size] = equations.coupling, equations.coupling.T
-    dense[size:, size:] = with_prior(equations, fit)
+    dense = dense_matrix(equations, fit)
     coefficients = (model.brdfs.coefficients / model.brdfs.variance).ravel()
     own_pull = equations.own_pull - fit.identified / _prior(fit) ** 2
     right = np.concatenate([equations.pull - coefficients, own_pull])
@@ -106,9 +120,8 @@ def _solve_with_patches(equations: NormalEquations, fit: ModelFit, spread: bool)
     pull = equations.local_pull.ravel() - y / parameters.deviation**2
     held = _at_bound(y, pull, parameters)
     side, pull = np.where(held, 0, side), np.where(held, 0, pull)
-    inverse = np.linalg.inv(_patch_blocks(equations.local, parameters.deviation, held))
-    shape = (-1, *equations.local.shape[:2])
-    projected = np.einsum("spe,pef->spf", side.reshape(shape), inverse).reshape(len(side), -1)
+    inverse = np.linalg.inv(patch_blocks(equations.local, parameters.deviation, held))
+    projected = times_blocks(side, inverse)
     dense -= projected @ side.T
     right = right - projected @ pull
     stuck = np.concatenate([np.zeros(size, bool), _held(fit, right[size:])])
@@ -131,7 +144,7 @@ def _prior(fit: ModelFit) -> Vector:
     return fit.joined(lambda parameters: parameters.deviation)
 
 
-def _patch_blocks(local: Array, deviation: Vector, held: NDArray[np.bool_]) -> Array:
+def patch_blocks(local: Array, deviation: Vector, held: NDArray[np.bool_]) -> Array:
     """(P, e, e) blocks with the prior; parameters that a bound holds are decoupled."""
     count, e, _ = local.shape
     out = local.copy()

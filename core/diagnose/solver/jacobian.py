@@ -73,14 +73,7 @@ def jacobian_of(fit: ModelFit) -> Jacobian:
     per_log = (light.log_derivative * camera / deviation).astype(np.float32)
 
     def by_slot(place: int) -> list[Array]:
-        effect = model.effects[place]
-        found = []
-        for slot in model.parameter_index(place).T:
-            step = effect.parameters.step[slot[slot >= 0][0]] if (slot >= 0).any() else 1.0
-            stepped = _stepped(model, place, np.unique(slot[slot >= 0]), step)
-            derivative = (stepped - recorded) / (step * deviation)
-            found.append(np.where(slot[:, None] >= 0, derivative, 0).astype(np.float32))
-        return found
+        return _slot_derivatives(model, fit.deviation, place, recorded)
 
     n, first = len(model.pixels), 0
     x, column = [np.zeros((n, 3, 0), np.float32)], [np.zeros((n, 0), np.int32)]
@@ -99,17 +92,25 @@ def jacobian_of(fit: ModelFit) -> Jacobian:
 def effect_derivatives(model: Model, deviation: Array, place: int) -> Array:
     """(n, 3, p) derivatives of the prediction with respect to all parameters of one effect, in
     units of the deviation."""
-    state = model.lamp_light.state
-    recorded = model.photographed(state, model.lamp_light.reflected)
-    parameters, index = model.effects[place].parameters, model.parameter_index(place)
-    out = np.zeros((len(deviation), 3, len(parameters)), np.float32)
-    for slot in index.T:
-        used = np.unique(slot[slot >= 0])
-        step = parameters.step[used[0]] if len(used) else 1.0
-        change = (_stepped(model, place, used, step) - recorded) / (step * deviation)
+    index = model.parameter_index(place)
+    out = np.zeros((len(deviation), 3, len(model.effects[place].parameters)), np.float32)
+    found = _slot_derivatives(model, deviation, place, model.predicted())
+    for slot, derivative in zip(index.T, found, strict=True):
         rows = np.flatnonzero(slot >= 0)
-        out[rows, :, slot[rows]] = change[rows]
+        out[rows, :, slot[rows]] = derivative[rows]
     return out
+
+
+def _slot_derivatives(model: Model, deviation: Array, place: int, recorded: Array) -> list[Array]:
+    """For each slot of an effect: (n, 3) derivatives with respect to the pixel's parameter, 0 where
+    it has none. recorded: (n, 3) the prediction."""
+    parameters, found = model.effects[place].parameters, []
+    for slot in model.parameter_index(place).T:
+        step = parameters.step[slot[slot >= 0][0]] if (slot >= 0).any() else 1.0
+        stepped = _stepped(model, place, np.unique(slot[slot >= 0]), step)
+        derivative = (stepped - recorded) / (step * deviation)
+        found.append(np.where(slot[:, None] >= 0, derivative, 0).astype(np.float32))
+    return found
 
 
 def _basis_rows(model: Model, light: LampLight) -> Array:
