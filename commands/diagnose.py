@@ -68,6 +68,7 @@ def _print_causes(found: Diagnosis) -> None:
         print(f"unknown: {found.residual.sentence()}")
     if not found.causes:
         print("none: No known cause found. Noise and errors of the scan explain the residuals.")
+    print(found.quality.sentence())
     before, after = found.error_before, found.error_after
     print(
         f"RMS error of held-out regions of the photos: {100 * before.parts:.1f} % without and "

@@ -75,6 +75,8 @@ def draw_check(
         row = layout.row()
         row.alert = changed
         row.operator("patina.refit", icon="FILE_REFRESH" if changed else "CHECKMARK")
+    if "scan_quality" in diagnosis:  # not in results of earlier versions
+        wrapped(layout, diagnosis["scan_quality"]["sentence"], "INFO")
     if diagnosis["unexplained"]:
         wrapped(layout, with_lengths(diagnosis["left"]["sentence"]), "QUESTION")
 

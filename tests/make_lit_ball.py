@@ -10,6 +10,7 @@ from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.diagnose.forward.diagnosis_context import DiagnosisContext
 from patina.core.diagnose.forward.material_brdfs import MaterialBRDFs
 from patina.core.diagnose.forward.pixels import Pixels
+from patina.core.diagnose.forward.rig import Rig
 from patina.core.diagnose.forward.shading_state import ShadingState
 from patina.core.geometry import RayScene
 from patina.core.scan import Mesh
@@ -69,7 +70,8 @@ def lit_ball(seed: int = 0, material: int = SHARP) -> DiagnosisContext:
     triangle = Mesh(np.eye(3) * 1e-3, np.array([[0, 1, 2]], np.int32))
     return DiagnosisContext(
         pixels, MaterialBRDFs.of([brdf]), RayScene.build(triangle), np.arange(PHOTOS) // 2,
-        ("a", "b", "c"), np.ones(3, bool), np.zeros(3), SIZE, np.pi, np.ones(1, np.float32),
+        ("a", "b", "c"), np.ones(3, bool), Rig.distant(PHOTOS), np.zeros(3), SIZE, np.pi,
+        np.ones(1, np.float32),
     )  # fmt: skip
 
 

@@ -16,12 +16,13 @@ from ..concurrency.thread_pool import thread_count, thread_pool
 from ..diagnose.effects import effects_for
 from ..diagnose.forward.diagnosis_context import DiagnosisContext
 from ..diagnose.forward.material_brdfs import MaterialBRDFs
+from ..diagnose.forward.rig import Rig
 from ..diagnose.pixels.pixel_selection import select_pixels
 from ..diagnose.selection.diagnosis import Diagnosis
 from ..diagnose.selection.search import search
-from ..diagnose.solver.model import Model
-from ..diagnose.solver.residual_scale import expected_deviation
 from ..fit.measured_result import MeasuredResult
+from ..inputs import capture_data
+from ..light import MountedLight, NearLight
 from .fit_job import CaptureResult, FitJob
 
 Result = TypeVar("Result")
@@ -61,11 +62,8 @@ class DiagnoseJob(Job):
 
     def _search(self, pool: ThreadPoolExecutor | None) -> Generator[float, None, Diagnosis]:
         result, context = finished(self.result), finished(self.context)
-        deviation = expected_deviation(
-            context.pixels, context.brdfs, np.radians(normal_deviation(result))
-        )
-        model, effects = Model(context.pixels, context.brdfs), effects_for(context)
-        return (yield from search(model, deviation, effects, context, pool))
+        tilt = float(np.radians(normal_deviation(result)))
+        return (yield from search(context, tilt, effects_for(context), pool))
 
 
 def context_of(
@@ -90,12 +88,28 @@ def context_of(
         light=np.array([names.index(photo.light) for photo in capture.photos]),
         lights=tuple(names),
         distant=np.array([light.distant for light in capture.lights]),
+        rig=_rig(result),
         centre=middle,
         size=2 * float(np.percentile(np.linalg.norm(pixels.point - middle, axis=1), 99)),
         level=level,
         scale=scale,
         materials=tuple(material.name for material in result.materials),
     )
+
+
+def _rig(result: CaptureResult) -> Rig:
+    """Where camera and lamp of each photo are."""
+    capture, photos = result.capture, len(result.capture.photos)
+    rig = Rig.distant(photos)
+    for place in range(photos):
+        camera = capture_data.camera_of(capture, result.scan, place)
+        light = result.lights.of(capture, place)
+        rig.axes[place] = camera.pose.rotation
+        if isinstance(light, MountedLight):
+            rig.lamp[place], rig.mounted[place] = light.position(camera), True
+        elif isinstance(light, NearLight):
+            rig.lamp[place] = light.position
+    return rig
 
 
 def normal_deviation(result: CaptureResult) -> float:

@@ -70,6 +70,7 @@ def section(found: Diagnosis, context: DiagnosisContext) -> str:
     named = ", ".join(found.causes) or "No known cause found."
     return (
         f"<h2>Causes</h2><p><b>{escape(named)}</b></p>{left}"
+        f"<p>{escape(found.quality.sentence())}</p>"
         "<p class='sub'>Gain: improvement of the prediction of held-out regions of the photos by "
         "the model with this cause, in standard errors.</p>"
         f"{_errors(found)}<table><tr><th>Cause</th><th>Gain</th><th></th><th>Meaning"

@@ -11,7 +11,7 @@ from ..jobs import CaptureResult
 from .diagnosis import evidence_file
 from .result_json import parameters, program_version, write_json
 
-FORMAT = 2
+FORMAT = 3
 
 
 def describe(found: Diagnosis, before: CaptureResult, after: CaptureResult) -> dict[str, Any]:
@@ -27,6 +27,13 @@ def describe(found: Diagnosis, before: CaptureResult, after: CaptureResult) -> d
         "baseline": _errors(found.error_before),
         "extended": _errors(found.error_after),
         "causes": [_cause(t, found) for t in found.ranked],
+        "scan_quality": {
+            "normals": found.quality.normals,
+            "poses": found.quality.poses,
+            "outside_basis": found.quality.outside,
+            "albedo_variation": found.quality.albedo,
+            "sentence": found.quality.sentence(),
+        },
         "unexplained": found.unexplained,
         "left": {
             "gain": found.residual.gain,

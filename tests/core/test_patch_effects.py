@@ -7,17 +7,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from patina.core.basis import PrincipalBRDF, default_basis
-from patina.core.diagnose.effects.normal_error import NormalError
-from patina.core.diagnose.effects.second_material import SecondMaterial
 from patina.core.diagnose.forward import basis_slack
 from patina.core.diagnose.forward.diagnosis_context import DiagnosisContext
 from patina.core.diagnose.forward.material_brdfs import MaterialBRDFs
 from patina.core.diagnose.forward.shading_state import ShadingState
-from patina.core.diagnose.selection import effect_trials
-from patina.core.diagnose.selection.significance import Candidate
-from patina.core.diagnose.selection.trial import MIN_STANDARD_ERRORS
+from patina.core.diagnose.nuisances.surface_variation import SurfaceVariation
+from patina.core.diagnose.selection.baseline import fit_baseline
+from patina.core.diagnose.selection.scan_quality import ScanQuality
+from patina.core.diagnose.selection.unusual_scan import unusual_causes, with_unusual_normals
 from patina.core.diagnose.solver.gauss_newton import fit
 from patina.core.diagnose.solver.model import Model
 from patina.core.diagnose.solver.residual_scale import expected_deviation
@@ -52,10 +52,11 @@ def test_patch_normals_recover_bumps_a_few_patches_wide():
     more.
     """
     context, normal = bumpy(1, 0.4)
-    effect = NormalError.of(context)
+    effect = SurfaceVariation.of(context)
+    tilts, bends, rest = (2 * BUMP_TILT / 3,) * 2, BUMP_TILT / 3, (1e-4,) * 5
     left = {}
     for way, stiff in (("bent", 1.0), ("flat", 1e-4)):
-        usual = (*effect.prior[:2], *(stiff * u for u in effect.prior[2:]))
+        usual = (*tilts, *(stiff * bends,) * 3, *rest)
         model = Model(context.pixels, context.brdfs).with_effect(replace(effect, prior=usual))
         fitted = fit(model, deviation_of(context))
         found = fitted.model.shading().normal
@@ -68,19 +69,30 @@ def test_patch_normals_recover_bumps_a_few_patches_wide():
     assert left["bent"] < 0.8 * left["flat"]
 
 
-def test_bumps_are_not_also_explained_as_albedo():
-    """Next to accepted patches, other patches are judged against a model that includes the accepted
-    ones in held-out squares too. Otherwise all that they explain is gained twice: 16,000 nats here
-    for albedo variation that does not exist.
-    """
+def test_deep_bumps_are_named_as_unusual_normals_and_not_as_albedo():
     context, _ = bumpy(2, 0.5)
-    model = Model(context.pixels, context.brdfs).with_effect(NormalError.of(context))
-    now = fit(model, deviation_of(context))
-    paint = effect_trials.try_effect(
-        now, effect_trials.held_out_costs(now), Candidate(SecondMaterial.of(context), 0.0, 0.0)
-    )
-    assert paint.gain < MIN_STANDARD_ERRORS * paint.error
-    assert not paint.is_accepted
+    baseline = fit_baseline(context, np.radians(0.2), 12)
+    found = with_unusual_normals(baseline.fitted)
+    (trial,) = unusual_causes(baseline.plain, found)
+    assert trial.effect.cause == "normal_error"
+    assert ScanQuality.of(found).albedo < 0.08
+
+
+def test_paint_on_a_part_of_the_surface_is_a_second_material():
+    """A part of the ball reflects half as much. Stains that vary smoothly are none."""
+    context = replace(lit_ball(2), size=2.0)
+    part = context.pixels.point[:, 0] > 0.33
+    painted = changed(context, np.where(part[:, None], 0.5, 1.0) * context.pixels.observed)
+    baseline = fit_baseline(painted, np.radians(0.2), 12)
+    (trial,) = unusual_causes(baseline.plain, baseline.fitted)
+    assert trial.effect.cause == "second_material"
+    share, factor = trial.effect.measured
+    assert share == pytest.approx(part.mean(), rel=0.3) and -0.6 < factor < -0.4
+    stains = np.exp(0.15 * np.sin(5 * context.pixels.point.sum(axis=1)))[:, None]
+    baseline = fit_baseline(
+        changed(context, stains * context.pixels.observed), np.radians(0.2), 12
+    )  # fmt: skip
+    assert unusual_causes(baseline.plain, baseline.fitted) == []
 
 
 def test_white_lambertian_wall_needs_little_slack():

@@ -7,12 +7,15 @@ from .ambient_light import AmbientLight
 from .anisotropy import Anisotropy
 from .area_light import AreaLight
 from .base.effect import Effect
+from .black_level import BlackLevel
 from .camera_pose import CameraPose
 from .camera_response import CameraResponse
 from .cast_shadow import CastShadow
 from .clipping import Clipping
 from .environment_reflection import EnvironmentReflection
+from .flash_offset import FlashOffset
 from .interreflection import Interreflection
+from .lamp_position import LampPosition
 from .light_direction import LightDirection
 from .light_intensity import LightIntensity
 from .near_light import NearLight
@@ -27,9 +30,12 @@ EFFECTS: tuple[type[Effect], ...] = (
     LightDirection,
     LightIntensity,
     NearLight,
+    LampPosition,
+    FlashOffset,
     AreaLight,
     AmbientLight,
     CameraResponse,
+    BlackLevel,
     Clipping,
     Vignetting,
     VeilingGlare,

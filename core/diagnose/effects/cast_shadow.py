@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..forward.diagnosis_context import DiagnosisContext, NearestPixels
 from ..forward.direct_radiance import direct_radiance
 from ..forward.shading_state import ShadingState
+from ..pixels.certain_shadows import certain_shadows
 from ..pixels.unexplained_shadows import unexplained_shadows
 from .base.capabilities import JudgedByPixel
 from .base.effect import Array
@@ -36,6 +37,16 @@ class CastShadow(PatchEffect, ChangesShading, JudgedByPixel):
     def of(cls, context: DiagnosisContext) -> CastShadow | None:
         pixels = context.pixels
         spot = unexplained_shadows(pixels, direct_radiance(pixels, context.brdfs))
+        return None if (spot < 0).all() else cls(spot, (PRIOR_SCALE,), pixels.photo)
+
+    @classmethod
+    def in_residual(
+        cls, context: DiagnosisContext, predicted: Array, residual: Array
+    ) -> CastShadow | None:
+        """Spots that are darker than a model predicts, and that are not errors of the scan. None
+        where there are none. predicted: (n, 3); residual: (n, 3) in standard deviations."""
+        pixels = context.pixels
+        spot = certain_shadows(context, unexplained_shadows(pixels, predicted), residual)
         return None if (spot < 0).all() else cls(spot, (PRIOR_SCALE,), pixels.photo)
 
     def at_pixels(self, context: DiagnosisContext, nearest: NearestPixels) -> CastShadow:

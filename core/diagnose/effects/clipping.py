@@ -16,6 +16,7 @@ from .base.parameters import Parameters
 SOFT = 0.01  # fraction of the plateau over which the transition is smooth
 # values of a channel near a plateau that confirm it; relative distance that counts as near
 MIN_VALUES, NEAR_PLATEAU = 12, 0.03
+PILED_UP = 4.0  # values near a plateau for each one in an interval of the same width below it
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,20 @@ class Clipping(CameraEffect, AffectsHighlightsOnly, JudgedByPixel):
         """(3,) radiance that no photo exceeds."""
         return self.top * 8.0 * np.exp(-x)
 
+    def shows_plateau(self, predicted: Array, deviation: Array) -> bool:
+        """Whether far more values lie just below the largest ones than below these: of all values,
+        or of those that should be larger. predicted: (n, 3) without clipping. deviation: (n, 3),
+        inf for pixels that are known to be clipped."""
+        counted = np.isfinite(deviation).all(axis=1)
+        for seen, expected in zip(self.observed[counted].T, predicted[counted].T, strict=True):
+            if len(seen) < MIN_VALUES:
+                return False
+            top = float(np.sort(seen)[-MIN_VALUES])
+            higher = seen[expected > (1 + NEAR_PLATEAU) * top]
+            if _piled_up(seen, top, 3 * MIN_VALUES) or _piled_up(higher, top, MIN_VALUES):
+                return True
+        return False
+
     def is_relevant(self, x: np.ndarray) -> bool:
         near = np.abs(self.observed / self.plateau(x) - 1) < NEAR_PLATEAU
         return bool((near.sum(axis=0) >= MIN_VALUES).any())
@@ -62,3 +77,9 @@ class Clipping(CameraEffect, AffectsHighlightsOnly, JudgedByPixel):
             f"{', '.join(f'{v:.3g}' for v in self.plateau(x))} (red, green, blue), although the "
             "surface is brighter."
         )
+
+
+def _piled_up(values: Array, top: float, least: int) -> bool:
+    near = np.count_nonzero(values > (1 - NEAR_PLATEAU) * top)
+    below = np.count_nonzero(values > (1 - 2 * NEAR_PLATEAU) * top) - near
+    return near >= least and near > PILED_UP * below

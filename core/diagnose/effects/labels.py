@@ -15,6 +15,8 @@ LABELS = {
     "camera_response": "Camera Response",
     "area_light": "Area Light",
     "outside_basis": "Material Outside the Basis",
+    "flash_offset": "Wrong Flash Position",
+    "black_level": "Black Level",
     "near_light": "Near Light",
     "vignetting": "Vignetting",
     "environment_reflection": "Environment Reflections",

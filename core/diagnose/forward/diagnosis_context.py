@@ -13,6 +13,7 @@ from .face_radiosity import face_radiosity
 from .material_brdfs import MaterialBRDFs
 from .pixels import Pixels
 from .radiosity import visible_faces
+from .rig import Rig
 from .surroundings import Surroundings
 
 Array = NDArray[np.floating]
@@ -24,7 +25,8 @@ class DiagnosisContext:
 
     pixels: the pixels of all photos that the diagnosis uses. brdfs: of the fit without effects.
     rays: the scanned mesh. light: (photos,) index of the light of each photo. lights: their names;
-    distant: (lights,) whether each is distant. centre: (3,) of the visible surface; size: its
+    distant: (lights,) whether each is distant. rig: cameras and lamps of the photos. centre: (3,)
+    of the visible surface; size: its
     extent, both in scan units. level: median irradiance. scale: (materials,) factor by which each
     material's reflectance was multiplied and the irradiance on it divided, where the irradiance is
     unknown. materials: their names. ray_count: rays per pixel and sampling strategy
@@ -38,6 +40,7 @@ class DiagnosisContext:
     light: NDArray[np.intp]
     lights: tuple[str, ...]
     distant: NDArray[np.bool_]
+    rig: Rig
     centre: NDArray[np.float64]
     size: float
     level: float

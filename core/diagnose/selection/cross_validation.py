@@ -143,16 +143,14 @@ def parameter_variances(fitted: ModelFit) -> tuple[Array, ...]:
     return _by_effect(fitted, change, [change])
 
 
-def parameter_variances_by_photo(fitted: ModelFit, before: tuple[Array, ...]) -> tuple[Array, ...]:
-    """Variances of the parameters of each effect, at least those of a jackknife over photos: an
-    error of a photo's camera pose or exposure is common to all its pixels. before: the variances
-    without that."""
+def parameter_variances_by_photo(fitted: ModelFit) -> tuple[Array, ...] | None:
+    """Variances of the parameters of each effect by a jackknife over photos: an error of a photo's
+    camera pose or exposure is common to all its pixels. None where there are too few photos."""
     of = _photos(fitted, MAX_GROUPS)
     if of.max() < MIN_GROUPS - 1:
-        return before
+        return None
     whole, others, _ = _steps_without_folds(fitted, jacobian_of(fitted), of)
-    found = _by_effect(fitted, whole, others)
-    return tuple(np.maximum(a, b) for a, b in zip(found, before, strict=True))
+    return _by_effect(fitted, whole, others)
 
 
 def sum_by_region(region: NDArray[np.int32], values: Array) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ from ..solver.model_fit import ModelFit
 from .cross_validation import HeldOutPrediction
 from .held_out_error import HeldOutErrors
 from .residual_structure import ResidualStructure
+from .scan_quality import ScanQuality
 from .trial import Trial
 
 Array = NDArray[np.floating]
@@ -25,12 +26,13 @@ in their models than to show a further cause."""
 class Diagnosis:
     """The causes that were found, and the evidence for them.
 
-    accepted: the effect with the largest gain in the full model first; ``outside_basis`` last.
-    rounds: the trials of each round, best first; the last round accepted nothing. before, after:
-    the fits without and with the named effects. residual: structure that these do not explain.
-    error_before, error_after: of held-out regions and photos. expected: (n, 3) standard deviation
-    before anything was fitted. contradicted: causes that gain, each with a sentence that gives the
-    evidence against it: a material that contradicts it, or a second fit that does not confirm it.
+    accepted: the effect with the largest gain in the full model first; what the baseline measures
+    itself last. rounds: the trials of each round, best first; the last round accepted nothing.
+    before, after: the joint fits without and with the named effects. residual: structure that these
+    do not explain. error_before, error_after: of held-out regions and photos. expected: (n, 3)
+    standard deviation of the baseline. quality: of the scan. contradicted: causes that gain, each
+    with a sentence that gives the evidence against it: a material that contradicts it, or a second
+    fit that does not confirm it.
     """
 
     accepted: tuple[Trial, ...]
@@ -43,6 +45,7 @@ class Diagnosis:
     error_before: HeldOutErrors
     error_after: HeldOutErrors
     expected: Array
+    quality: ScanQuality
     contradicted: Mapping[str, str] = field(default_factory=dict)
 
     @property

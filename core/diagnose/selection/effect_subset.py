@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
+from ..effects.camera_pose import CameraPose
+from ..nuisances.pose_jitter import PoseJitter
 from ..solver.gauss_newton import fit
 from ..solver.model_fit import ModelFit
 from .cross_validation import predict_held_out_regions
@@ -12,7 +14,8 @@ from .diagnosis import Diagnosis, Trial
 from .held_out_error import held_out_errors
 from .residual_structure import residual_structure
 
-NO_CORRECTION = ("outside_basis",)  # it frees the BRDF, and changes no sample
+NO_CORRECTION = ("outside_basis", "second_material", "normal_error")
+"""What the baseline measures itself: in the model already, or nothing that changes a sample."""
 
 
 def correctable_effects(found: Diagnosis) -> tuple[Trial, ...]:
@@ -24,15 +27,13 @@ def with_causes(found: Diagnosis, causes: Collection[str]) -> ModelFit:
     """The model at its optimum with some of the accepted causes; if it lacks any of them, the
     parameters of the others are fitted again."""
     selected = [t for t in correctable_effects(found) if t.effect.cause in causes]
-    if set(found.after.model.causes).difference(NO_CORRECTION) == {
-        t.effect.cause for t in selected
-    }:
+    ignored = {*NO_CORRECTION, *found.before.model.causes}  # what every scan gets wrong
+    if set(found.after.model.causes) - ignored == {t.effect.cause for t in selected} - ignored:
         return found.after
-    relaxing = [t for t in found.accepted if t.effect.cause in NO_CORRECTION]
-    if not set(found.after.model.causes).intersection(NO_CORRECTION):
-        relaxing = []  # it was accepted for the small slack that every material has
     model = found.before.model
-    for trial in (*selected, *relaxing):
+    if any(isinstance(trial.effect, CameraPose) for trial in selected):
+        model = model.without_effect(PoseJitter.cause)
+    for trial in selected:
         model = model.with_effect(trial.effect, trial.x)
     return fit(model, found.before.deviation)
 
@@ -51,9 +52,9 @@ def with_contradicted(
 
     def anew(trial: Trial) -> Trial:
         cause, model = trial.effect.cause, after.model
-        if cause not in sound.difference(NO_CORRECTION) or model.is_frozen(cause):
+        if cause not in model.causes or model.is_frozen(cause):
             return trial
-        return replace(trial, fitted=after, held_out=held_out).with_photo_errors()
+        return trial.in_fit(after, held_out.variance).with_photo_errors()
 
     return replace(
         found,

@@ -25,21 +25,23 @@ from ..solver.gauss_newton import fit
 from ..solver.model import Model
 from ..solver.model_fit import ModelFit
 from .cross_validation import (
+    HeldOutPrediction,
     parameter_variances,
     predict_held_out_regions,
     regions,
     standard_error_of_sum,
     sum_by_region,
 )
+from .held_out_error import held_out_rms
 from .relative_change import relative_rms_change
-from .significance import Candidate
 from .trial import Trial
 
 Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
-HeldOutCosts = Callable[[bool, bool], Array]
-"""(single pixels are held out, patches are frozen) → (n,) nats of every held-out pixel."""
+HeldOutPredictions = Callable[[bool, bool], HeldOutPrediction]
+"""(single pixels are held out, patches are frozen) → the prediction of every held-out pixel."""
 
+STEPS = 8  # of a joint fit, which starts at the optimum without the effect
 PRIOR_ROUNDS = 1  # rounds of expectation and maximisation for the prior of patches
 MAX_RAY_ROUNDS = 3  # rounds in which rays are traced anew for a moved lamp or photo
 MIN_RAY_GAIN = 0.02  # of the gain, that another such round has to bring
@@ -47,85 +49,89 @@ CONTRADICTION = 2.0  # standard errors that a material loses by a camera effect
 MIN_REGIONS = 10  # of a material, below which it cannot contradict anything
 
 
-def held_out_costs(now: ModelFit) -> HeldOutCosts:
-    """The held-out costs of a model, computed when first needed, and only once."""
+def held_out_predictions(now: ModelFit) -> HeldOutPredictions:
+    """The held-out predictions of a model, computed when first needed, and only once."""
     one_at_a_time = Lock()
 
     @cache
-    def costs(by_pixel: bool, patches_frozen: bool) -> Array:
+    def predicted(by_pixel: bool, patches_frozen: bool) -> HeldOutPrediction:
         base = replace(now, model=now.model.with_patches_frozen()) if patches_frozen else now
-        return predict_held_out_regions(base, by_pixel).cost
+        return predict_held_out_regions(base, by_pixel)
 
-    def locked(by_pixel: bool, patches_frozen: bool) -> Array:
+    def locked(by_pixel: bool, patches_frozen: bool) -> HeldOutPrediction:
         with one_at_a_time:
-            return costs(by_pixel, patches_frozen)
+            return predicted(by_pixel, patches_frozen)
 
     return locked
 
 
-def try_effect(now: ModelFit, costs: HeldOutCosts, candidate: Candidate) -> Trial:
-    """Fit one effect together with the model. costs: held_out_costs(now)."""
-    effect = candidate.effect
+def try_effect(
+    now: ModelFit, before: HeldOutPredictions, effect: Effect, p_value: float = 0.0
+) -> Trial:
+    """Fit one effect together with the model. before: held_out_predictions(now); p_value: of its
+    step."""
     by_pixel, in_patches = isinstance(effect, JudgedByPixel), isinstance(effect, PatchEffect)
     # another patch effect freezes the patches of the model, so they must be frozen without it too:
     # the parameters of a held-out region are then known
     frozen = in_patches and now.model.patch_place is not None
     start = effect.initial(_residual_where_bright(now), now.predicted)
-    fitted = fit(now.model.with_effect(effect, start), now.deviation)
+    fitted = fit(now.model.with_effect(effect, start), now.deviation, STEPS)
     for _ in range(PRIOR_ROUNDS):
         if isinstance(effect, PatchEffect):
             effect = effect.with_prior(patch_prior(fitted))
             model = now.model.with_effect(effect)
             model = replace(model, brdfs=fitted.model.brdfs, x=fitted.model.x)
-            fitted = fit(model, now.deviation)
+            fitted = fit(model, now.deviation, STEPS)
     held_out = predict_held_out_regions(fitted, by_pixel)
     # single pixels, since the gain of an effect in a few regions could never be significant
-    saved = costs(by_pixel, frozen) - held_out.cost
+    without_it = before(by_pixel, frozen)
+    saved = without_it.cost - held_out.cost
     by_region = sum_by_region(regions(now, by_pixel), saved)
-    removable = not in_patches and len(effect.parameters) > 0
-    without = fitted.model.predicted_without(effect.cause) if removable else now.predicted
+    place = fitted.model.place_of(effect.cause)
+    without = fitted.model.predicted_without(effect.cause) if not in_patches else now.predicted
     highlights = isinstance(effect, AffectsHighlightsOnly)
     change = relative_rms_change(fitted.predicted, without, now.deviation, highlights)
     contradicted = _materials_that_lose(now, saved) if isinstance(effect, CameraEffect) else ()
     return Trial(
-        effect, fitted, held_out, by_region, change, candidate.p_value, contradicted_by=contradicted
-    )
+        effect, fitted.model.x[place], np.asarray(held_out.variance[place], np.float64), by_region,
+        fitted.residual.size, change, p_value, fitted, contradicted_by=contradicted,
+        growth=held_out_rms(fitted, held_out) / max(held_out_rms(now, without_it), 1e-30),
+    )  # fmt: skip
 
 
 def try_rebuilt(
-    now: ModelFit, costs: HeldOutCosts, best: Trial, context: DiagnosisContext
+    now: ModelFit, before: HeldOutPredictions, best: Trial, context: DiagnosisContext
 ) -> Trial:
     """The trial with the BRDFs of the fit that includes the effect, since the BRDFs of the fit
     without it have absorbed a part of it. In finer detail where that gains more. Unchanged where no
-    BRDF
-    matters."""
-    if not isinstance(best.effect, BuiltFromBRDFs):
+    BRDF matters."""
+    if not isinstance(best.effect, BuiltFromBRDFs) or best.fitted is None:
         return best
     context = replace(context, brdfs=best.fitted.model.brdfs)
     effects: list[Effect] = [best.effect.rebuilt(context, best.x)]
     if len(effects[0].parameters) != len(best.effect.parameters):
         plain = best.effect.of(context)
         effects += [] if plain is None else [plain]
-    tried = [try_effect(now, costs, Candidate(e, best.gain, best.p_value)) for e in effects]
-    return replace(max(tried, key=lambda trial: trial.gain), ties=best.ties)
+    tried = [try_effect(now, before, effect, best.p_value) for effect in effects]
+    return max(tried, key=lambda trial: trial.gain)
 
 
 def try_with_rays(
-    now: ModelFit, costs: HeldOutCosts, best: Trial, context: DiagnosisContext
+    now: ModelFit, before: HeldOutPredictions, best: Trial, context: DiagnosisContext
 ) -> Trial:
     """The trial with visibility traced again for the displaced lamp or photos; unchanged if the
     effect displaces neither."""
     for _ in range(MAX_RAY_ROUNDS):
-        if not isinstance(best.effect, TracesRays):
+        if not isinstance(best.effect, TracesRays) or best.fitted is None:
             break
         predict = partial(_predicted_with_last, best.fitted.model)
         x = best.effect.ray_parameters(context, best.x, predict)
         effect = best.effect.with_rays(context, x)
-        again = try_effect(now, costs, Candidate(effect, best.gain, best.p_value))
+        again = try_effect(now, before, effect, best.p_value)
         if again.gain < best.gain:  # the mesh is too coarse to locate the edges of shadows
             break
         converged = again.gain < (1 + MIN_RAY_GAIN) * best.gain
-        best = replace(again, ties=best.ties)
+        best = again
         if converged:
             break
     return best

@@ -36,7 +36,7 @@ def held_out_errors(
     was fitted."""
     noise = np.sqrt(fitted.model.pixels.noise)
     return HeldOutErrors(
-        _rms(fitted, held_out),
+        held_out_rms(fitted, held_out),
         held_out_photo_error(fitted),
         _typical(fitted, held_out, expected),
         max(0.0, 1 - 1 / max(_typical(fitted, held_out, noise), 1e-9) ** 2),
@@ -47,7 +47,7 @@ def held_out_photo_error(fitted: ModelFit) -> float | None:
     """RMS error of held-out photos, relative to their radiance clipped at white; None if there is
     only one photo."""
     whole = predict_held_out_photos(fitted)
-    return None if whole is None else _rms(fitted, whole)
+    return None if whole is None else held_out_rms(fitted, whole)
 
 
 def _typical(fitted: ModelFit, held_out: HeldOutPrediction, unit: Array) -> float:
@@ -58,7 +58,8 @@ def _typical(fitted: ModelFit, held_out: HeldOutPrediction, unit: Array) -> floa
     return float(np.median(error)) / NORMAL if len(error) else 0.0
 
 
-def _rms(fitted: ModelFit, held_out: HeldOutPrediction) -> float:
+def held_out_rms(fitted: ModelFit, held_out: HeldOutPrediction) -> float:
+    """RMS error of a held-out prediction, relative to the photos' radiance clipped at white."""
     observed = fitted.model.pixels.observed
     error = held_out.residual * np.where(np.isfinite(fitted.deviation), fitted.deviation, 0)
     return relative_rms_change(observed, observed - error, fitted.deviation)

@@ -9,13 +9,16 @@ the surface then are sums over pixels of a few columns.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 from ...statistics.student_t import robust_cost, robust_weights
 from ..effects.base.effect import Effect
+from ..effects.base.parameters import Parameters
 from ..solver.block_elimination import dense_matrix, patch_blocks, times_blocks
 from ..solver.jacobian import Jacobian, effect_derivatives, jacobian_of
 from ..solver.model_fit import ModelFit
@@ -114,7 +117,8 @@ class OneStep:
     unknowns free; prior: (q,) their standard deviations before. gain: nats. change: RMS change of
     the photos by the step, relative, the baseline's unknowns unchanged. left: (n, 3, q) what only
     this effect explains; score: (n, q) derivatives of the log-likelihood of each pixel;
-    residual: (n, 3) before the step; weight: (n, 3) robust weights after it."""
+    residual: (n, 3) before the step; weight: (n, 3) robust weights after it. free: (q,) parameters
+    that no bound holds."""
 
     effect: Effect
     x: Vector
@@ -126,6 +130,7 @@ class OneStep:
     score: Array
     residual: Array
     weight: Array
+    free: NDArray[np.bool_]
 
     def held_out(self, group: NDArray[np.integer]) -> NDArray[np.float64]:
         """(g,) nats by which each group of pixels is predicted better by the step that the other
@@ -142,8 +147,13 @@ class OneStep:
             information[g] = part.T @ (self.weight[rows].reshape(-1, 1) * part)
         whole, total = information.sum(axis=0) + np.diag(1 / self.prior**2), scores.sum(axis=0)
         out = np.zeros(count)
+        declared, free = self.effect.parameters, np.flatnonzero(self.free)
+        at = np.ix_(free, free)
         for g, rows in enumerate(members):
-            step = np.linalg.solve(whole - information[g], total - scores[g]).astype(np.float32)
+            step = np.where(self.free, 0.0, self.x)
+            pull = total - scores[g] - (whole - information[g]) @ step
+            step[free] = np.linalg.solve((whole - information[g])[at], pull[free])
+            step = np.clip(step, declared.low, declared.high).astype(np.float32)
             residual = self.residual[rows]
             rest = residual - self.left[rows] @ step
             out[g] = (robust_cost(residual) - robust_cost(rest)).sum()
@@ -151,25 +161,77 @@ class OneStep:
 
 
 def one_step(baseline: ProjectedBaseline, effect: Effect) -> OneStep:
-    """The step of an effect that is not in the model."""
-    fit = baseline.fit
-    model = fit.model.with_effect(effect, np.zeros(len(effect.parameters)))
-    derivative = effect_derivatives(model, fit.deviation, len(model.effects) - 1)
+    """The step of an effect that is not in the model. An effect with a starting value is linear
+    between 0 and that value."""
+    fit, start = baseline.fit, effect.parameters.initial
+    absent = fit.model.with_effect(effect, np.zeros(len(effect.parameters)))
+    place = len(absent.effects) - 1
+    if len(start) == 1 and start[0] != 0:
+        present = replace(absent, x=(*absent.x[:-1], start))
+        rise = (present.predicted() - fit.predicted) / start[0] / fit.deviation
+        derivative = rise[..., None].astype(np.float32)
+    else:
+        derivative = effect_derivatives(absent, fit.deviation, place)
     left = baseline.project(derivative)
     residual = np.where(np.isfinite(fit.residual), fit.residual, 0.0).astype(np.float32)
-    prior, q = effect.parameters.deviation, left.shape[2]
-    flat, x, weight = left.reshape(-1, q).astype(np.float64), np.zeros(q), baseline.weight
+    found = _minimum(left, residual, [effect.parameters])
+    moved = np.einsum("ncq,q->nc", derivative, effect.identified(found.x))
+    moved = moved * np.where(np.isfinite(fit.deviation), fit.deviation, 0.0)
+    change = relative_rms_change(fit.predicted + moved, fit.predicted, fit.deviation)
+    return OneStep(
+        effect, found.x, np.linalg.inv(found.matrix), effect.parameters.deviation, found.gain,
+        change, left, found.score, residual, found.weight, found.free,
+    )  # fmt: skip
+
+
+def joint_step(steps: Sequence[OneStep]) -> float:
+    """Nats that several effects gain together."""
+    left = np.concatenate([step.left for step in steps], axis=2)
+    return _minimum(left, steps[0].residual, [step.effect.parameters for step in steps]).gain
+
+
+@dataclass(frozen=True)
+class _Minimum:
+    """x: (q,); matrix: (q, q) second derivatives of the cost; score, weight, free, gain: as of
+    OneStep."""
+
+    x: Vector
+    matrix: Array
+    score: Array
+    weight: Array
+    free: NDArray[np.bool_]
+    gain: float
+
+
+def _minimum(left: Array, residual: Array, declared: Sequence[Parameters]) -> _Minimum:
+    """The parameters that explain a residual (n, 3) best by columns left (n, 3, q)."""
+    low, high, prior = (
+        np.concatenate([getattr(one, name) for one in declared])
+        for name in ("low", "high", "deviation")
+    )
+    q = left.shape[2]
+    flat, weight = left.reshape(-1, q).astype(np.float64), robust_weights(residual)
     for _ in range(REWEIGHTINGS):
         weighted = left * weight[..., None].astype(np.float32)
         score = np.einsum("ncq,nc->nq", weighted, residual).astype(np.float64)
-        information = flat.T @ weighted.reshape(-1, q)
-        covariance = np.linalg.inv(information + np.diag(1 / prior**2))
-        x = covariance @ score.sum(axis=0)
+        matrix = flat.T @ weighted.reshape(-1, q) + np.diag(1 / prior**2)
+        x, free = _bounded(matrix, score.sum(axis=0), low, high)
         rest = residual - left @ x.astype(np.float32)
         weight = robust_weights(rest)
     saved = float((robust_cost(residual) - robust_cost(rest)).sum())
     gain = saved - 0.5 * float(np.sum((x / prior) ** 2))
-    moved = np.einsum("ncq,q->nc", derivative, effect.identified(x))
-    moved = moved * np.where(np.isfinite(fit.deviation), fit.deviation, 0.0)
-    change = relative_rms_change(fit.predicted + moved, fit.predicted, fit.deviation)
-    return OneStep(effect, x, covariance, prior, gain, change, left, score, residual, weight)
+    return _Minimum(x, matrix, score, weight, free, gain)
+
+
+def _bounded(
+    matrix: Array, pull: Vector, low: Vector, high: Vector
+) -> tuple[Vector, NDArray[np.bool_]]:
+    """(x (q,), whether no bound holds each): the minimum of x · matrix · x / 2 − pull · x within
+    bounds."""
+    x = np.linalg.solve(matrix, pull)
+    if ((x > low) & (x < high)).all():
+        return x, np.ones(len(x), bool)
+    root = np.linalg.cholesky(matrix)
+    target = np.linalg.solve(root, pull)
+    found = lsq_linear(root.T, target, (low, high), method="bvls")
+    return found.x, found.active_mask == 0

@@ -1,4 +1,4 @@
-"""One effect that was fitted together with a model, and its gain on held-out regions."""
+"""The evidence for one effect: its parameters, its gain on held-out regions, and its size."""
 
 from __future__ import annotations
 
@@ -7,47 +7,51 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.base.capabilities import JudgedByPixel
 from ..effects.base.effect import Effect
 from ..solver.model_fit import ModelFit
-from .cross_validation import (
-    HeldOutPrediction,
-    parameter_variances_by_photo,
-    standard_error_of_sum,
-)
+from .cross_validation import parameter_variances_by_photo, standard_error_of_sum
 
 Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
 
-MAX_P_VALUE = 0.02  # probability of a false alarm, over all effects that are tried
-MIN_RELATIVE_CHANGE = 0.005  # RMS change of the photos below which an effect is not reported,
-LARGE_GAIN = 0.05  # nats a pixel and channel, unless it gains this much
 MIN_STANDARD_ERRORS = 3.0  # of the gain over regions
+MAX_GROWTH = 1.01  # of the RMS error of held-out regions: outliers may not be predicted worse
+MIN_RELATIVE_CHANGE = 0.005  # RMS change of the photos below which an effect is not reported
 
 
 @dataclass(frozen=True)
 class Trial:
-    """fitted: the model with the effect. held_out: its prediction of held-out regions.
+    """effect: with its parameters x (p,) and their variances (p,).
 
-    by_region: (b,) nats by which each held-out region is predicted better. change: RMS change of
-    the prediction, relative. p_value: probability that chance explains the score, over all effects
-    tried at once. ties: effects that explain the photos as well. contradicted_by: materials that a
-    camera effect predicts worse, though a camera does the same to all of them.
+    by_region: (b,) nats by which each held-out region is predicted better; values: number of
+    values (pixels times channels) in all regions. change: RMS change of the prediction, relative.
+    p_value: probability of such a gain by chance, over all effects tried at once. fitted: the joint
+    fit with the effect; None where a single step was taken. ties: effects that explain the photos
+    as well. contradicted_by: materials that a camera effect predicts worse, though a camera does
+    the same to all of them.
     """
 
     effect: Effect
-    fitted: ModelFit
-    held_out: HeldOutPrediction
+    x: Vector
+    variance: Vector
     by_region: Vector
+    values: int
     change: float
     p_value: float
+    fitted: ModelFit | None = None
     ties: tuple[Effect, ...] = ()
     contradicted_by: tuple[int, ...] = ()
+    growth: float = 1.0
 
     @property
     def gain(self) -> float:
         """Nats, over all held-out regions."""
         return float(self.by_region.sum())
+
+    @property
+    def density(self) -> float:
+        """Nats a pixel and channel."""
+        return self.gain / max(self.values, 1)
 
     @property
     def error(self) -> float:
@@ -56,18 +60,15 @@ class Trial:
 
     @property
     def is_accepted(self) -> bool:
-        """Whether the effect may be named."""
-        relevant = self.effect.is_relevant(self.identified)
-        return self.is_significant and relevant and not self.contradicted_by
-
-    @property
-    def is_significant(self) -> bool:
-        """Whether it is more than chance, and large enough to be reported."""
-        significant = self.gain > MIN_STANDARD_ERRORS * self.error and self.p_value < MAX_P_VALUE
-        by_pixel = isinstance(self.effect, JudgedByPixel)
-        relevant = by_pixel or self.effect.is_relevant(self.identified)
-        large = self.gain > LARGE_GAIN * self.held_out.residual.size
-        return significant and (self.change > MIN_RELATIVE_CHANGE or large) and relevant
+        """Whether a joint fit confirms the effect: it is more than chance, large enough to be
+        reported, and contradicted by no material."""
+        return (
+            self.gain > MIN_STANDARD_ERRORS * self.error
+            and self.change > MIN_RELATIVE_CHANGE
+            and self.effect.is_relevant(self.identified)
+            and not self.contradicted_by
+            and self.growth < MAX_GROWTH
+        )
 
     def sentence(self) -> str:
         """The effect in words, and the photos that would decide between it and its ties."""
@@ -82,31 +83,40 @@ class Trial:
         )
 
     def changed(self) -> Array:
-        """(n, 3) radiance that the effect adds to the photos, the BRDFs unchanged."""
+        """(n, 3) radiance that the effect adds to the photos, the BRDFs unchanged. Of a trial with
+        a joint fit; 0 where the effect is part of the baseline."""
+        assert self.fitted is not None
+        if self.effect.cause not in self.fitted.model.causes:
+            return np.zeros_like(self.fitted.predicted)
         without = self.fitted.model.predicted_without(self.effect.cause)
         return np.asarray(self.fitted.predicted - without)
 
     @property
-    def x(self) -> Vector:
-        """(p,) the effect's parameters."""
-        return self.fitted.model.parameters_of(self.effect.cause)
-
-    @property
     def identified(self) -> Vector:
-        """(p,) the part of them that the photos determine."""
+        """(p,) the part of the parameters that the photos determine."""
         return self.effect.identified(self.x)
 
     @property
     def standard_errors(self) -> Vector:
         """(p,) of that part."""
-        place = self.fitted.model.place_of(self.effect.cause)
-        return np.sqrt(np.maximum(self.held_out.variance[place], 0.0))
+        return np.sqrt(np.maximum(self.variance, 0.0))
+
+    def in_fit(self, fitted: ModelFit, variances: tuple[Array, ...]) -> Trial:
+        """The trial with its parameters in another joint fit. variances: of the parameters of each
+        effect there."""
+        place = fitted.model.place_of(self.effect.cause)
+        x, variance = fitted.model.x[place], np.asarray(variances[place], np.float64)
+        effect = fitted.model.effects[place]
+        return replace(self, fitted=fitted, effect=effect, x=x, variance=variance)
 
     def with_photo_errors(self) -> Trial:
         """The trial with standard errors that include errors common to a whole photo, and those of
-        the effect's own approximations."""
-        variance = list(parameter_variances_by_photo(self.fitted, self.held_out.variance))
+        the effect's own approximations. Of a trial with a joint fit."""
+        assert self.fitted is not None
         place = self.fitted.model.place_of(self.effect.cause)
+        if place in self.fitted.model.frozen or not len(self.x):
+            return self
+        by_photo = parameter_variances_by_photo(self.fitted)
+        variance = self.variance if by_photo is None else np.maximum(by_photo[place], self.variance)
         systematic = self.effect.systematic_errors(self.identified)
-        variance[place] = variance[place] + np.square(systematic)
-        return replace(self, held_out=replace(self.held_out, variance=tuple(variance)))
+        return replace(self, variance=variance + np.square(systematic))

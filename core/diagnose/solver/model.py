@@ -66,6 +66,13 @@ class Model:
             x=(*before.x, effect.parameters.initial if x is None else x),
         )
 
+    def without_effect(self, cause: str) -> Model:
+        """The model without one of its effects; none is frozen."""
+        place = self.place_of(cause)
+        kept = [k for k in range(len(self.effects)) if k != place]
+        effects, x = tuple(self.effects[k] for k in kept), tuple(self.x[k] for k in kept)
+        return replace(self, effects=effects, x=x)
+
     def with_patches_frozen(self) -> Model:
         """The parameters of patches are no longer fitted."""
         place = self.patch_place

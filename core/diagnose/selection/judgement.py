@@ -1,0 +1,114 @@
+"""Which effect the photos support, if any.
+
+The bars are the gains that captures without any hidden effect reach: simulated stereo meshes with
+materials of no basis, and real photographs (docs/notebook/field-hunt.md). A name that is wrong
+costs more than a missing one: weak evidence is only accepted where no unrelated effect has evidence
+of its own that is nearly as strong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from .cross_validation import standard_error_of_sum
+from .evidence import Evidence
+from .one_step import joint_step
+from .trial import Trial
+
+NAT = 1e-3  # the bars are thousandths of a nat a pixel and channel
+MIN_GAINS: Mapping[str, float] = {
+    "camera_response": 33.0, "near_light": 22.0, "light_direction": 22.0, "light_intensity": 22.0,
+    "flash_offset": 3.0, "vignetting": 15.0, "cast_shadow": 0.5,
+}  # fmt: skip
+DEFAULT_MIN_GAIN = 10.0
+"""Of an effect that is accepted: above the largest gain in captures without it. A flaked paint
+looks like a tone curve; only lamps on the camera are insensitive to errors of the normals."""
+MIN_RATIO = 3.5  # standard errors of the gain over regions
+STRONG = 100.0  # a gain above this is accepted even if unrelated effects gain as well
+RIVAL_FRACTION = 0.5  # of the best gain, at which an unrelated effect makes weak evidence doubtful
+SAME_EVIDENCE = 0.5  # overlap of gains above which two effects explain the same residual
+NEARLY_BEST = 0.93  # fraction of the best gain at which the simpler effect is preferred
+CLOSE, MAX_CONTENDERS = 0.75, 3  # fraction of the best gain at which an effect is fitted too
+TIE_STANDARD_ERRORS = 2.0  # difference of gains below which two effects are tied
+FAMILIES = (
+    ("ambient_light", "environment_reflection", "veiling_glare", "black_level", "subsurface",
+     "interreflection"),
+    ("light_direction", "near_light", "flash_offset"),
+    ("near_light", "light_intensity"),
+    ("camera_response", "clipping"),
+)  # fmt: skip
+"""Effects that imitate each other: light that is added everywhere, lamps that are elsewhere, and a
+gain of each photo, which is part of a near lamp."""
+
+
+def min_gain(cause: str) -> float:
+    """Nats a pixel and channel that an effect has to gain."""
+    return NAT * MIN_GAINS.get(cause, DEFAULT_MIN_GAIN)
+
+
+def related(one: str, other: str) -> bool:
+    """Whether two causes imitate each other."""
+    return one == other or any(one in family and other in family for family in FAMILIES)
+
+
+def overlap(one: Evidence, other: Evidence) -> float:
+    """Fraction of the smaller gain that both effects explain: 1 the same residual, 0 each its
+    own."""
+    both = joint_step([one.step, other.step])
+    smaller = max(min(one.step.gain, other.step.gain), 1e-9)
+    return (one.step.gain + other.step.gain - both) / smaller
+
+
+def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
+    """The effects that are to be fitted jointly, best first; empty: none is convincing. evidence:
+    best first."""
+    strong = [one for one in evidence if _is_convincing(one.trial)]
+    if not strong or (strong[0].trial.density < NAT * STRONG and _has_rival(strong[0], strong)):
+        return []
+    close = [one for one in strong if one.trial.gain > CLOSE * strong[0].trial.gain]
+    kept = [one for one in close if not any(_replaces(other, one) for other in close)]
+    return kept[:MAX_CONTENDERS]
+
+
+def best_of(trials: Sequence[Trial]) -> Trial | None:
+    """The simplest of the joint fits that gain nearly as much as the best, with its ties: many
+    light sources can imitate uniform ambient light, which is one. None: no trial is accepted."""
+    accepted = [trial for trial in trials if trial.is_accepted]
+    if not accepted:
+        return None
+    most = max(trial.gain for trial in accepted)
+    nearly = [trial for trial in accepted if trial.gain > NEARLY_BEST * most]
+    best = min(nearly, key=lambda trial: (trial.effect.degrees_of_freedom, -trial.gain))
+    ties = tuple(t.effect for t in accepted if t is not best and _is_tie(t, best))
+    return replace(best, ties=ties)
+
+
+def _replaces(simple: Evidence, other: Evidence) -> bool:
+    """Whether a simpler effect of the same family gains nearly as much."""
+    simpler = simple.step.effect.degrees_of_freedom < other.step.effect.degrees_of_freedom
+    enough = simple.trial.gain > NEARLY_BEST * other.trial.gain
+    return simpler and enough and related(simple.cause, other.cause)
+
+
+def _is_convincing(trial: Trial) -> bool:
+    enough = trial.density > min_gain(trial.effect.cause)
+    return enough and trial.gain > MIN_RATIO * trial.error
+
+
+def _has_rival(best: Evidence, strong: Sequence[Evidence]) -> bool:
+    """Whether an unrelated effect has convincing evidence of its own that is nearly as strong."""
+    return any(
+        one.trial.gain > RIVAL_FRACTION * best.trial.gain
+        and not related(one.cause, best.cause)
+        and overlap(one, best) < SAME_EVIDENCE
+        for one in strong
+    )
+
+
+def _is_tie(trial: Trial, best: Trial) -> bool:
+    """Whether an effect that is as simple explains the photos as well."""
+    if trial.effect.degrees_of_freedom > best.effect.degrees_of_freedom:
+        return False
+    error = standard_error_of_sum(trial.by_region - best.by_region)
+    return abs(trial.gain - best.gain) < TIE_STANDARD_ERRORS * error
