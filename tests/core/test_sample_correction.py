@@ -16,6 +16,7 @@ from patina.core.diagnose.correction.sample_pixels import nearest
 from patina.core.diagnose.effects import EFFECTS
 from patina.core.diagnose.effects.anisotropy import Anisotropy
 from patina.core.diagnose.effects.area_light import AreaLight
+from patina.core.diagnose.effects.black_level import BlackLevel
 from patina.core.diagnose.effects.camera_response import CameraResponse
 from patina.core.diagnose.effects.cast_shadow import CastShadow
 from patina.core.diagnose.effects.clipping import Clipping
@@ -66,6 +67,7 @@ EXAMPLE_PARAMETERS = {
     NearLight: np.array([0.2, 0.01, 0.0, 0.1, 0.2, 0.0, 0.0, -0.1, 0.2, 0.0, 0.01, 0.0]),
     CameraResponse: np.array([0.2, 0.01]),
     Vignetting: np.array([-0.3, 0.1]),
+    BlackLevel: np.array([0.01, 0.02, -0.005]),
     AreaLight: np.array([0.1]),
 }
 
@@ -237,7 +239,7 @@ def test_fitted_parameters_apply_to_other_pixels():
         full_effect, half_effect = kind.of(context), kind.of(half_context)
         fitted = Model(half_context.pixels, half_context.brdfs).with_effect(half_effect, parameters)
         transferred = model_at_pixels(fitted, context, nearest_pixels).predicted()
-        if kind is CameraResponse:  # the reference grey level is that of the fitted pixels
+        if kind in (CameraResponse, BlackLevel):  # grey and white are those of the fitted pixels
             full_effect = half_effect
         x = full_effect.identified(parameters)
         expected = Model(context.pixels, context.brdfs).with_effect(full_effect, x).predicted()

@@ -21,9 +21,6 @@ from tools.field_hunt.judged import FieldRow  # noqa: E402
 from tools.field_hunt.renderer import half_angles  # noqa: E402
 from tools.hunt.shape import lumpy  # noqa: E402
 
-NOT_YET_A_CAUSE = {"flash_offset", "black_level"}
-"""Causes of the vocabulary that the diagnosis does not know yet."""
-
 
 def test_angles_are_those_of_the_definition():
     rng = np.random.default_rng(0)
@@ -50,10 +47,9 @@ def test_a_simulated_scan_has_the_errors_of_stereo():
 
 
 def test_every_effect_is_a_cause():
-    known = {kind.cause for kind in EFFECTS} | NOT_YET_A_CAUSE
+    known = {kind.cause for kind in EFFECTS}
     hidden = {cause for makers in make.MAKERS.values() for cause in makers}
     assert hidden | set(real_sets.EFFECTS) <= known
-    assert not NOT_YET_A_CAUSE & {kind.cause for kind in EFFECTS}
 
 
 @pytest.mark.parametrize(("cause", "seed"), [("camera_response", 12), ("flash_offset", 3)])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..solver.model_fit import ModelFit
 from .cross_validation import HeldOutPrediction
 from .held_out_error import HeldOutErrors
-from .residual_structure import ResidualStructure
+from .residual_structure import MIN_CHANGE, ResidualStructure
 from .scan_quality import ScanQuality
 from .trial import Trial
 
@@ -20,6 +20,8 @@ Array = NDArray[np.floating]
 MIN_GAIN_FRACTION = 0.05
 """Fraction of the gain of the accepted effects. A smaller gain is more likely to compensate a flaw
 in their models than to show a further cause."""
+CHANGE_PER_DEGREE = 0.05  # RMS change of the photos by errors of the normals finer than a patch
+FINE_SCAN = 0.4  # degrees, of the normals: below, small structure with a large gain is unknown too
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,16 @@ class Diagnosis:
 
     @property
     def unexplained(self) -> bool:
-        """Whether significant residual structure remains that no cause explains, and that is too
-        large to be a flaw in the model of an accepted effect."""
+        """Whether significant residual structure remains that no cause explains, and that is larger
+        than what errors of the scan within a patch leave, and than a flaw in the model of an
+        accepted effect would be."""
         gained = sum(trial.gain for trial in self.named)
-        return self.residual.is_significant and self.residual.gain > MIN_GAIN_FRACTION * gained
+        normals = 0.0 if self.quality.normals is None else self.quality.normals
+        usual = self.residual.change < CHANGE_PER_DEGREE * normals
+        if normals > FINE_SCAN:
+            usual = usual or self.residual.change < MIN_CHANGE
+        return (
+            self.residual.is_significant
+            and not usual
+            and self.residual.gain > MIN_GAIN_FRACTION * gained
+        )

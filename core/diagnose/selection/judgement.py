@@ -24,13 +24,18 @@ MIN_GAINS: Mapping[str, float] = {
 DEFAULT_MIN_GAIN = 10.0
 """Of an effect that is accepted: above the largest gain in captures without it. A flaked paint
 looks like a tone curve; only lamps on the camera are insensitive to errors of the normals."""
-MIN_RATIO = 3.5  # standard errors of the gain over regions
 STRONG = 100.0  # a gain above this is accepted even if unrelated effects gain as well
+MIN_RATIOS = (3.5, 2.5)
+"""Standard errors of the gain over regions: of a weak, and of a strong gain, most of which may be
+in few regions."""
 RIVAL_FRACTION = 0.5  # of the best gain, at which an unrelated effect makes weak evidence doubtful
 SAME_EVIDENCE = 0.5  # overlap of gains above which two effects explain the same residual
 NEARLY_BEST = 0.93  # fraction of the best gain at which the simpler effect is preferred
 CLOSE, MAX_CONTENDERS = 0.75, 3  # fraction of the best gain at which an effect is fitted too
 TIE_STANDARD_ERRORS = 2.0  # difference of gains below which two effects are tied
+COMMONER: Mapping[str, str] = {"black_level": "ambient_light"}
+"""Of two causes that are tied, the one that is met more often: a raw converter subtracts the black
+level, but few rooms are black."""
 FAMILIES = (
     ("ambient_light", "environment_reflection", "veiling_glare", "black_level", "subsurface",
      "interreflection"),
@@ -80,8 +85,11 @@ def best_of(trials: Sequence[Trial]) -> Trial | None:
     most = max(trial.gain for trial in accepted)
     nearly = [trial for trial in accepted if trial.gain > NEARLY_BEST * most]
     best = min(nearly, key=lambda trial: (trial.effect.degrees_of_freedom, -trial.gain))
-    ties = tuple(t.effect for t in accepted if t is not best and _is_tie(t, best))
-    return replace(best, ties=ties)
+    tied = [trial for trial in accepted if trial is not best and _is_tie(trial, best)]
+    commoner = [trial for trial in tied if COMMONER.get(best.effect.cause) == trial.effect.cause]
+    if commoner:
+        tied, best = [*(t for t in tied if t is not commoner[0]), best], commoner[0]
+    return replace(best, ties=tuple(trial.effect for trial in tied))
 
 
 def _replaces(simple: Evidence, other: Evidence) -> bool:
@@ -93,7 +101,8 @@ def _replaces(simple: Evidence, other: Evidence) -> bool:
 
 def _is_convincing(trial: Trial) -> bool:
     enough = trial.density > min_gain(trial.effect.cause)
-    return enough and trial.gain > MIN_RATIO * trial.error
+    ratio = MIN_RATIOS[trial.density > NAT * STRONG]
+    return enough and trial.gain > ratio * trial.error
 
 
 def _has_rival(best: Evidence, strong: Sequence[Evidence]) -> bool:
