@@ -1,8 +1,8 @@
 """`run.py hunt --evidence CAPTURE ...`: what one step of every effect gains on the baseline.
 
-Not the diagnosis that Patina ships: the evidence with which the next one is to be calibrated. Gains
-are in thousandths of a nat a pixel and channel; those of held-out regions, photos and parts of the
-surface with their mean over the standard error.
+The evidence by which the diagnosis judges an effect (core/diagnose/selection/evidence.py), and the
+same for held-out photos and parts of the surface. Gains are in thousandths of a nat a pixel and
+channel, in brackets their ratio to the standard error.
 """
 
 from __future__ import annotations

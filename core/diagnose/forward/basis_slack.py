@@ -2,7 +2,7 @@
 
 Every material is slightly outside the basis. Without slack, any effect that changes the shape of a
 BRDF (a tone curve, a narrow lamp) could compensate for that and would be reported as a cause. A
-little slack is always present; ``outside_basis`` is reported where much more is needed. The overall
+little slack is always present; ``outside_basis`` is named where it becomes large. The overall
 brightness is free: the brightest of the measured materials reflects a third of the light, and a
 white wall, which is brighter at all angles alike, is not outside the basis for that reason.
 """
@@ -20,8 +20,7 @@ THETA_H = np.radians([0.0, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0, 13.0, 17.0, 22.0, 30.0
 THETA_D = np.radians([0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0])
 COUNT = len(THETA_H) * len(THETA_D)
 LEVEL_SCALE = 1.0  # prior standard deviation of ln(ρ·cosMap + ε), common to all nodes
-# the same at each node: nearly no slack; the default; for outside_basis
-TIGHT_SCALE, DEFAULT_SCALE, WIDE_SCALE = 0.003, 0.05, 0.5
+DEFAULT_SCALE = 0.05  # the same at each node
 
 
 def with_slack(basis: Basis) -> Basis:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -44,14 +44,6 @@ class MaterialBRDFs:
         fitted."""
         variance = np.zeros(brdf.coefficients.shape[1])
         return cls(brdf.basis, brdf.coefficients[None], variance)
-
-    def tight(self) -> MaterialBRDFs:
-        """The same BRDFs with almost no slack; the coefficients of the slack are set to 0."""
-        variance = self.variance.copy()
-        variance[-basis_slack.COUNT :] = basis_slack.TIGHT_SCALE**2
-        coefficients = self.coefficients.copy()
-        coefficients[..., -basis_slack.COUNT :] = 0
-        return replace(self, coefficients=coefficients, variance=variance)
 
     @cached_property
     def tables(self) -> tuple[LogTable, ...]:

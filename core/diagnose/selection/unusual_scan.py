@@ -84,7 +84,7 @@ def unusual_causes(plain: ModelFit, now: ModelFit) -> list[Trial]:
     second = _second_material(now)
     found += [] if second is None else [SecondMaterial(second)]
     if quality.outside > UNUSUAL_MATERIAL:
-        found.append(OutsideBasis())
+        found.append(OutsideBasis((quality.outside,)))
     return [_named(effect, plain, now) for effect in found]
 
 

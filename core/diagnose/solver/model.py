@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.base.capabilities import RelaxesBRDFs
 from ..effects.base.effect import Effect
 from ..effects.base.image_formation import (
     AddsRadiance,
@@ -58,10 +57,8 @@ class Model:
         """One more effect, after the others. x: its parameters; None: where the search starts. Only
         one patch effect is fitted at a time: an earlier one is frozen as it was found."""
         before = self.with_patches_frozen() if isinstance(effect, PatchEffect) else self
-        brdfs = effect.relaxed(self.brdfs) if isinstance(effect, RelaxesBRDFs) else self.brdfs
         return replace(
             before,
-            brdfs=brdfs,
             effects=(*before.effects, effect),
             x=(*before.x, effect.parameters.initial if x is None else x),
         )

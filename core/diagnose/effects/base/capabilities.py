@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 from ...forward.diagnosis_context import DiagnosisContext
-from ...forward.material_brdfs import MaterialBRDFs
 from .effect import Array, Effect, Vector
 
 
@@ -37,14 +36,6 @@ class BuiltFromBRDFs(Effect, ABC):
         effect = type(self).of(context)
         assert effect is not None
         return effect
-
-
-class RelaxesBRDFs(Effect, ABC):
-    """Has no part in the image formation, but lets the BRDFs vary more."""
-
-    @abstractmethod
-    def relaxed(self, brdfs: MaterialBRDFs) -> MaterialBRDFs:
-        """The BRDFs with wider priors."""
 
 
 class NeedsPhoto(Effect, ABC):
