@@ -28,6 +28,7 @@ STRONG = 100.0  # a gain above this is accepted even if unrelated effects gain a
 MIN_RATIOS = (3.5, 2.5)
 """Standard errors of the gain over regions: of a weak, and of a strong gain, most of which may be
 in few regions."""
+UNRIVALLED = ("flash_offset",)  # nothing that a scan gets wrong looks like it
 RIVAL_FRACTION = 0.5  # of the best gain, at which an unrelated effect makes weak evidence doubtful
 SAME_EVIDENCE = 0.5  # overlap of gains above which two effects explain the same residual
 NEARLY_BEST = 0.93  # fraction of the best gain at which the simpler effect is preferred
@@ -69,7 +70,10 @@ def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
     """The effects that are to be fitted jointly, best first; empty: none is convincing. evidence:
     best first."""
     strong = [one for one in evidence if _is_convincing(one.trial)]
-    if not strong or (strong[0].trial.density < NAT * STRONG and _has_rival(strong[0], strong)):
+    if not strong:
+        return []
+    weak = strong[0].trial.density < NAT * STRONG and strong[0].cause not in UNRIVALLED
+    if weak and _has_rival(strong[0], strong):
         return []
     close = [one for one in strong if one.trial.gain > CLOSE * strong[0].trial.gain]
     kept = [one for one in close if not any(_replaces(other, one) for other in close)]
