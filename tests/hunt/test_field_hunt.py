@@ -17,7 +17,7 @@ from patina.core.scan import Mesh  # noqa: E402
 from tools.demo_shape import Surface, vertex_normals  # noqa: E402
 from tools.experiments import mesh_error  # noqa: E402
 from tools.field_hunt import make, real_sets, scans, table  # noqa: E402
-from tools.field_hunt.judged import FieldRow  # noqa: E402
+from tools.field_hunt.judged import FieldRow, judged  # noqa: E402
 from tools.field_hunt.renderer import half_angles  # noqa: E402
 from tools.hunt.shape import lumpy  # noqa: E402
 
@@ -68,6 +68,20 @@ def test_an_effect_is_hidden_in_real_photographs(shared, tmp_path):
     assert truth.strength == pytest.approx(0.1, rel=0.2)
     capture = read_capture(tmp_path / make.CAPTURE)
     capture_data.check_photos(capture, capture_data.open_scan(capture))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("cause", "seed"),
+    [
+        ("none", 3), ("none", 14), ("flash_offset", 3), ("light_direction", 2),
+        ("veiling_glare", 2), ("cast_shadow", 2),
+    ],
+)  # fmt: skip
+def test_hidden_effects_are_named_on_scans_as_they_are(cause, seed, shared):
+    """A seeded part of the field hunt: the hidden effect and nothing else, at 10 % of the light."""
+    row = judged("simulated", cause, 0.0 if cause == "none" else 0.1, seed)
+    assert row.right_first and row.right_set, row.named
 
 
 def test_counts_of_the_table():
