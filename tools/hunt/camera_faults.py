@@ -28,7 +28,7 @@ def vignetted(photos: list[Array], corner: float) -> list[Array]:
     height, width = photos[0].shape[:2]
     y, x = np.mgrid[:height, :width] + 0.5
     r2 = ((x - width / 2) ** 2 + (y - height / 2) ** 2) / (0.25 * (width**2 + height**2))
-    tangent2 = (1 - corner) ** -0.5 - 1
+    tangent2 = max(1 - corner, 1e-3) ** -0.5 - 1  # the search for a strength may go beyond black
     return [p * (1 / (1 + tangent2 * r2) ** 2)[..., None] for p in photos]
 
 

@@ -21,7 +21,8 @@ MIN_GAIN_FRACTION = 0.05
 """Fraction of the gain of the accepted effects. A smaller gain is more likely to compensate a flaw
 in their models than to show a further cause."""
 CHANGE_PER_DEGREE = 0.05  # RMS change of the photos by errors of the normals finer than a patch
-FINE_SCAN = 0.4  # degrees, of the normals: below, small structure with a large gain is unknown too
+FINE_SCAN = 0.95  # degrees, of the normals: stereo meshes are worse; below, small structure with a
+# large gain is unknown too
 
 
 @dataclass(frozen=True)
