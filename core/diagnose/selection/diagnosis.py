@@ -94,11 +94,9 @@ class Diagnosis:
         accepted effect would be."""
         gained = sum(trial.gain for trial in self.named)
         normals = 0.0 if self.quality.normals is None else self.quality.normals
-        usual = self.residual.change < CHANGE_PER_DEGREE * normals
-        if normals > FINE_SCAN:
-            usual = usual or self.residual.change < MIN_CHANGE
+        usual = max(MIN_CHANGE, CHANGE_PER_DEGREE * normals) if normals > FINE_SCAN else 0.0
         return (
             self.residual.is_significant
-            and not usual
+            and self.residual.change > usual
             and self.residual.gain > MIN_GAIN_FRACTION * gained
         )
