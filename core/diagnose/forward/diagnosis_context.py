@@ -26,11 +26,10 @@ class DiagnosisContext:
     pixels: the pixels of all photos that the diagnosis uses. brdfs: of the fit without effects.
     rays: the scanned mesh. light: (photos,) index of the light of each photo. lights: their names;
     distant: (lights,) whether each is distant. rig: cameras and lamps of the photos. centre: (3,)
-    of the visible surface; size: its
-    extent, both in scan units. level: median irradiance. scale: (materials,) factor by which each
-    material's reflectance was multiplied and the irradiance on it divided, where the irradiance is
-    unknown. materials: their names. ray_count: rays per pixel and sampling strategy
-    (surroundings.py). Few rays make a noisy regressor, which biases the estimated light towards
+    of the visible surface; size: its extent, both in scan units. level: median irradiance. scale:
+    (materials,) factor by which each material's reflectance was multiplied and the irradiance on it
+    divided, where the irradiance is unknown. materials: their names. ray_count: rays per pixel and
+    sampling strategy (surroundings.py). Few rays make a noisy regressor, which biases the estimated light towards
     zero (errors in variables): by one half at 20 rays, by one twentieth at 100.
     """
 
