@@ -73,7 +73,7 @@ def test_deep_bumps_are_named_as_unusual_normals_and_not_as_albedo():
     context, _ = bumpy(2, 0.5)
     baseline = fit_baseline(context, np.radians(0.2), 12)
     found = with_unusual_normals(baseline.fitted)
-    (trial,) = unusual_causes(baseline.plain, found)
+    (trial,) = unusual_causes(baseline.plain, found, ScanQuality.of(found))
     assert trial.effect.cause == "normal_error"
     assert ScanQuality.of(found).albedo < 0.08
 
@@ -84,7 +84,7 @@ def test_paint_on_a_part_of_the_surface_is_a_second_material():
     part = context.pixels.point[:, 0] > 0.33
     painted = changed(context, np.where(part[:, None], 0.5, 1.0) * context.pixels.observed)
     baseline = fit_baseline(painted, np.radians(0.2), 12)
-    (trial,) = unusual_causes(baseline.plain, baseline.fitted)
+    (trial,) = unusual_causes(baseline.plain, baseline.fitted, ScanQuality.of(baseline.fitted))
     assert trial.effect.cause == "second_material"
     share, factor = trial.effect.measured
     assert share == pytest.approx(part.mean(), rel=0.3) and -0.6 < factor < -0.4
@@ -92,7 +92,7 @@ def test_paint_on_a_part_of_the_surface_is_a_second_material():
     baseline = fit_baseline(
         changed(context, stains * context.pixels.observed), np.radians(0.2), 12
     )  # fmt: skip
-    assert unusual_causes(baseline.plain, baseline.fitted) == []
+    assert unusual_causes(baseline.plain, baseline.fitted, ScanQuality.of(baseline.fitted)) == []
 
 
 def test_white_lambertian_wall_needs_little_slack():

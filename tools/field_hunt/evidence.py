@@ -31,13 +31,13 @@ def main(words: Sequence[str]) -> int:
 def _print(path: Path) -> None:
     from patina.core.capture import read_capture
     from patina.core.concurrency.steps import drained
-    from patina.core.diagnose.effects import EFFECTS
-    from patina.core.diagnose.effects.base.capabilities import JudgedByPixel
-    from patina.core.diagnose.effects.base.patch_effect import PatchEffect
+    from patina.core.diagnose.effects import effects_for
     from patina.core.diagnose.effects.base.surface_patches import surface_patches
     from patina.core.diagnose.nuisances.surface_variation import WAYS
     from patina.core.diagnose.selection.baseline import fit_baseline
-    from patina.core.diagnose.selection.one_step import ProjectedBaseline, one_step
+    from patina.core.diagnose.selection.cross_validation import standard_error_of_sum
+    from patina.core.diagnose.selection.evidence import evidence_for, has_one_step
+    from patina.core.diagnose.selection.one_step import ProjectedBaseline
     from patina.core.jobs import FitJob
     from patina.core.jobs.diagnose_job import context_of, normal_deviation
 
@@ -56,20 +56,15 @@ def _print(path: Path) -> None:
     print("| effect | gain | held-out regions | photos | parts of the surface | RMS change |")
     print("|---|---|---|---|---|---|")
     groups = context.pixels.block, context.pixels.photo, surface_patches(context, PARTS)
-    for kind in EFFECTS:
-        effect = kind.of(context)
-        if effect is None or isinstance(effect, PatchEffect | JudgedByPixel):
-            continue
-        if not len(effect.parameters):
-            continue
-        step = one_step(projected, effect)
+    effects = [effect for effect in effects_for(context) if has_one_step(effect)]
+    for step in (found.step for found in evidence_for(projected, effects)):
         cells = []
         for group in groups:
             gains = step.held_out(group)
-            spread = float(np.sqrt(np.sum((gains - gains.mean()) ** 2)))
-            cells.append(f"{1e3 * gains.sum() / count:.2f} ({gains.sum() / max(spread, 1e-9):.1f})")
+            error = max(standard_error_of_sum(gains), 1e-9)
+            cells.append(f"{1e3 * gains.sum() / count:.2f} ({gains.sum() / error:.1f})")
         print(
-            f"| {effect.cause} | {1e3 * step.gain / count:.2f} | {' | '.join(cells)} | "
+            f"| {step.effect.cause} | {1e3 * step.gain / count:.2f} | {' | '.join(cells)} | "
             f"{100 * step.change:.2f} % |",
             flush=True,
         )

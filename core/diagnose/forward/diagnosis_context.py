@@ -29,8 +29,8 @@ class DiagnosisContext:
     of the visible surface; size: its extent, both in scan units. level: median irradiance. scale:
     (materials,) factor by which each material's reflectance was multiplied and the irradiance on it
     divided, where the irradiance is unknown. materials: their names. ray_count: rays per pixel and
-    sampling strategy (surroundings.py). Few rays make a noisy regressor, which biases the estimated light towards
-    zero (errors in variables): by one half at 20 rays, by one twentieth at 100.
+    sampling strategy (surroundings.py). Few rays make a noisy regressor, which biases the estimated
+    light towards zero (errors in variables): by one half at 20 rays, by one twentieth at 100.
     """
 
     pixels: Pixels

@@ -35,7 +35,7 @@ from .judgement import best_of, contenders, min_gain
 from .one_step import ProjectedBaseline
 from .residual_structure import residual_structure
 from .scan_quality import ScanQuality
-from .trial import MIN_STANDARD_ERRORS, Trial
+from .trial import MIN_STANDARD_ERRORS, Array, Trial
 from .unusual_scan import unusual_causes, with_unusual_normals, with_unusual_poses
 
 MAX_ROUNDS = 3  # of effects that are accepted one after the other
@@ -85,16 +85,17 @@ def search(
         now = best.fitted
         remaining = [e for e in remaining if e.cause != best.effect.cause]
     now, posed = with_unusual_poses(with_unusual_normals(now), context)
-    kept = sorted(_in_final_fit(accepted, now), key=lambda trial: -trial.gain)
-    kept += posed
-    kept += unusual_causes(baseline.plain, now)
     first = predict_held_out_regions(before)
     held_out = first, first if now is before else predict_held_out_regions(now)
+    kept = sorted(_in_final_fit(accepted, now, held_out[1].variance), key=lambda trial: -trial.gain)
+    quality = ScanQuality.of(now)
+    kept += posed
+    kept += unusual_causes(baseline.plain, now, quality)
     expected = before.deviation
     return Diagnosis(
         tuple(kept), tuple(rounds), before, now, *held_out, residual_structure(now),
         held_out_errors(before, held_out[0], expected), held_out_errors(now, held_out[1], expected),
-        expected, ScanQuality.of(now), _contradicted(rounds, kept, context.materials),
+        expected, quality, _contradicted(rounds, kept, context.materials),
     )  # fmt: skip
 
 
@@ -151,11 +152,11 @@ def _contradicted(
     }
 
 
-def _in_final_fit(accepted: Sequence[Trial], now: ModelFit) -> list[Trial]:
-    """The accepted effects with their parameters in the final joint fit."""
-    if not accepted:
-        return []
-    variances = predict_held_out_regions(now).variance
+def _in_final_fit(
+    accepted: Sequence[Trial], now: ModelFit, variances: tuple[Array, ...]
+) -> list[Trial]:
+    """The accepted effects with their parameters in the final joint fit. variances: of the
+    parameters of each effect there."""
     found = []
     for trial in accepted:
         place = now.model.place_of(trial.effect.cause)

@@ -74,11 +74,11 @@ def with_unusual_poses(now: ModelFit, context: DiagnosisContext) -> tuple[ModelF
     return trial.fitted, [trial.with_photo_errors()]
 
 
-def unusual_causes(plain: ModelFit, now: ModelFit) -> list[Trial]:
+def unusual_causes(plain: ModelFit, now: ModelFit, quality: ScanQuality) -> list[Trial]:
     """Errors of the normals, a second material and a material outside the basis. now: the last
-    joint fit. The gain of such a cause is that of the baseline's nuisances over plain, a fit with
-    an exact, uniform surface."""
-    quality, found = ScanQuality.of(now), list[Effect]()
+    joint fit; quality: of the scan, as that fit shows it. The gain of such a cause is that of the
+    baseline's nuisances over plain, a fit with an exact, uniform surface."""
+    found = list[Effect]()
     if quality.normals is not None and quality.normals > UNUSUAL_NORMALS:
         found.append(NormalError((quality.normals,)))
     second = _second_material(now)
