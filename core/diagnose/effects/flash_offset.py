@@ -1,4 +1,4 @@
-"""A lamp on the camera that is elsewhere beside the lens than the capture states."""
+"""A lamp on the camera that stands elsewhere from the lens than the capture states."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ def certain_shadows(
     pixels, out = context.pixels, np.full(len(spot), -1, np.intp)
     rough = np.linalg.norm(pixels.turn, axis=2).max(axis=1) > MAX_TURN
     rows = np.flatnonzero((spot >= 0) & ~rough)
-    rows = rows[~_beside_own_shadow(context, rows)]
+    rows = rows[~_near_own_shadow(context, rows)]
     cos_i = dot(pixels.normal[rows], pixels.light[rows])
     dark = np.median(residual[rows], axis=1)
     count = 0
@@ -44,7 +44,7 @@ def certain_shadows(
     return out
 
 
-def _beside_own_shadow(context: DiagnosisContext, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+def _near_own_shadow(context: DiagnosisContext, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
     """(r,) whether the mesh blocks light from a cone about the lamp."""
     pixels = context.pixels.select(rows)
     first, second = tangents(pixels.light.astype(np.float64))

@@ -69,7 +69,7 @@ def overlap(one: Evidence, other: Evidence) -> float:
 def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
     """The effects that are to be fitted jointly, best first; empty: none is convincing. evidence:
     best first."""
-    strong = [one for one in evidence if _is_convincing(one.trial)]
+    strong = [one for one in evidence if _has_sufficient_evidence(one.trial)]
     if not strong:
         return []
     weak = strong[0].trial.density < NAT * STRONG and strong[0].cause not in UNRIVALLED
@@ -103,7 +103,7 @@ def _replaces(simple: Evidence, other: Evidence) -> bool:
     return simpler and enough and related(simple.cause, other.cause)
 
 
-def _is_convincing(trial: Trial) -> bool:
+def _has_sufficient_evidence(trial: Trial) -> bool:
     enough = trial.density > min_gain(trial.effect.cause)
     ratio = MIN_RATIOS[trial.density > NAT * STRONG]
     return enough and trial.gain > ratio * trial.error
