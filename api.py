@@ -238,7 +238,8 @@ def diagnose(
     _drain(job, progress)
     checked = job.checked
     found, before, after = finished(checked.found), finished(checked.result), finished(job.result)
-    details = diagnosis_json.describe(found, before, after)
+    assessment = finished(checked.assessment)
+    details = diagnosis_json.describe(found, assessment, before, after)
     stages = tuple(job.stages)
     return DiagnosisResult(
         named=tuple(details["named"]),

@@ -53,8 +53,10 @@ def diagnose_to_folder(
     found, before = finished(checked.found), finished(checked.result)
     with staged_folder(out) as folder:
         report = folder / "report"
-        diagnosis.write_pages(report, found, finished(checked.context), before, after)
-        diagnosis_json.write(folder / "diagnosis.json", found, before, after)
+        assessment = finished(checked.assessment)
+        context = finished(checked.context)
+        diagnosis.write_pages(report, found, assessment, context, before, after)
+        diagnosis_json.write(folder / "diagnosis.json", found, assessment, before, after)
         write_results(folder, out, after, job.stages, progress, MATERIALS)
     _print_causes(found)
     print_summary(out, after)

@@ -47,9 +47,11 @@ the causes, and fit again with these causes included in the model"""
     def _finish(self, context: bpy.types.Context) -> Iterator[None]:
         checked, after = self._job.job.checked, self._job.result
         found, diagnosis_context, before = checked.found, checked.context, checked.result
+        assessment = checked.assessment
         scene = bpy.data.scenes.get(self._scene)
         if (
             found is None
+            or assessment is None
             or diagnosis_context is None
             or before is None
             or after is None
@@ -64,7 +66,9 @@ the causes, and fit again with these causes included in the model"""
             cause = scene.patina.causes.add()
             cause.name, cause.use = trial.effect.cause, trial.effect.cause in applied
         yield from _show(self, scene, after)
-        store_result(str(before.capture.file), describe(found, before, after), DIAGNOSIS)
+        store_result(
+            str(before.capture.file), describe(found, assessment, before, after), DIAGNOSIS
+        )
         yield
         mesh, vertices = scene.patina.mesh, diagnosis_context.rays.mesh.vertices
         if mesh is not None and not paint_evidence(mesh, vertices, diagnosis_context.pixels, found):
@@ -107,11 +111,12 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
     def _finish(self, context: bpy.types.Context) -> Iterator[None]:
         checked, after = self._job.job.checked, self._job.result
         scene = bpy.data.scenes.get(self._scene)
-        if after is None or scene is None or checked.result is None or checked.found is None:
+        found, assessment, before = checked.found, checked.assessment, checked.result
+        if after is None or scene is None or before is None or found is None or assessment is None:
             self.report({"WARNING"}, "The scene no longer exists; the materials were not applied.")
             return
         yield from _show(self, scene, after)
-        description = describe(checked.found, checked.result, after)
+        description = describe(found, assessment, before, after)
         store_result(str(after.capture.file), description, DIAGNOSIS)
         for kind in (RESULT, DIAGNOSIS):
             record_inputs(scene, kind, self._inputs)

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator
 
 from ..concurrency.background import in_background
 from ..concurrency.job import Job, Step, finished
+from ..diagnose.assessment.assessment import Assessment
 from ..diagnose.selection.effect_subset import with_contradicted
 from .diagnose_job import EXAMINING, DiagnoseJob
 from .fit_job import CaptureResult, FitJob
@@ -17,6 +18,7 @@ SHARE = 0.84  # fraction of the job's time before the second fit
 class CheckJob(Job):
     """Sets ``checked``, the diagnosis with the first fit, and ``result``, the second fit with a
     correction for the named causes except ``without``. Both are complete when the job is done.
+    The diagnosis then has an assessment too.
     Causes that the second fit does not confirm are no longer named (Diagnosis.contradicted). The
     materials of ``result`` have portable forms if those of ``fit`` would have had them."""
 
@@ -39,5 +41,9 @@ class CheckJob(Job):
         found = finished(self.checked.found)
         self.checked.found = yield from in_background(
             lambda: with_contradicted(found, again.contradicted, again.fitted), step
+        )
+        last = self.checked.found
+        self.checked.assessment = yield from in_background(
+            lambda: Assessment.of(last.after, last.held_out_after), step
         )
         self.result = again.result

@@ -13,6 +13,7 @@ from ..concurrency.background import steps_in_background
 from ..concurrency.job import Job, Step, finished
 from ..concurrency.steps import relayed
 from ..concurrency.thread_pool import thread_count, thread_pool
+from ..diagnose.assessment.assessment import Assessment
 from ..diagnose.effects import effects_for
 from ..diagnose.forward.diagnosis_context import DiagnosisContext
 from ..diagnose.forward.material_brdfs import MaterialBRDFs
@@ -34,8 +35,9 @@ EXAMINING, TESTING = "examining the photos", "testing possible causes"
 
 
 class DiagnoseJob(Job):
-    """Sets ``result``, the fit; ``context``, the input of the diagnosis; and
-    ``found``, the diagnosis. All are set when the job is done."""
+    """Sets ``result``, the fit; ``context``, the input of the diagnosis; and ``found``, the
+    diagnosis. All are set when the job is done. ``assessment`` of the last joint fit: set by
+    CheckJob, after the second fit."""
 
     def __init__(self, fit: FitJob) -> None:
         super().__init__()
@@ -43,6 +45,7 @@ class DiagnoseJob(Job):
         fit.keep = True
         self.context: DiagnosisContext | None = None
         self.found: Diagnosis | None = None
+        self.assessment: Assessment | None = None
 
     @property
     def result(self) -> CaptureResult | None:
@@ -63,7 +66,7 @@ class DiagnoseJob(Job):
     def _search(self, pool: ThreadPoolExecutor | None) -> Generator[float, None, Diagnosis]:
         result, context = finished(self.result), finished(self.context)
         tilt = float(np.radians(normal_deviation(result)))
-        return (yield from search(context, tilt, effects_for(context), pool))
+        return (yield from search(context, tilt, effects_for(context, pool), pool))
 
 
 def context_of(

@@ -9,12 +9,14 @@ from urllib.parse import quote
 
 import numpy as np
 
+from ..diagnose.assessment.assessment import Assessment
 from ..diagnose.forward.diagnosis_context import DiagnosisContext
 from ..diagnose.selection.diagnosis import Diagnosis, Trial
 from ..diagnose.selection.residual_trends import Trend, coordinates, trend
 from ..jobs import CaptureResult
 from ..photo import write_png
 from ..views.sphere import write_sphere
+from .assessment_section import assessment_section
 from .page import page
 from .residual_picture import photo_most_changed, residual_picture
 from .trend_chart import trend_chart
@@ -26,16 +28,19 @@ STEPS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # possible limits of a chart's vertica
 def write_pages(
     folder: Path,
     found: Diagnosis,
+    assessment: Assessment,
     context: DiagnosisContext,
     before: CaptureResult,
     after: CaptureResult,
 ) -> Path:
-    """Write index.html and pictures into ``folder``. before, after: the fits without and with a
-    correction for the named causes. Returns the path of index.html."""
+    """Write index.html and pictures into ``folder``. assessment: of the last joint fit. before,
+    after: the fits without and with a correction for the named causes. Returns the path of
+    index.html."""
     folder.mkdir(parents=True, exist_ok=True)
     body = section(found, context) + _evidence(folder, found, context)
     body += _materials(folder, before, after)
-    html = page(before.capture.file.name, body + _pictures(folder, found, context))
+    body += _pictures(folder, found, context) + assessment_section(assessment)
+    html = page(before.capture.file.name, body)
     (folder / "index.html").write_text(html, "utf-8")
     return folder / "index.html"
 

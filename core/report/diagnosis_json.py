@@ -5,6 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ..diagnose.assessment.assessment import Assessment
+from ..diagnose.assessment.calibration import BINS, CONFIDENCE, INTERVAL
 from ..diagnose.selection.diagnosis import Diagnosis, Trial
 from ..diagnose.selection.held_out_error import HeldOutErrors
 from ..jobs import CaptureResult
@@ -14,10 +19,13 @@ from .result_json import parameters, program_version, write_json
 FORMAT = 3
 
 
-def describe(found: Diagnosis, before: CaptureResult, after: CaptureResult) -> dict[str, Any]:
-    """The content of diagnosis.json. before, after: the fits without and with a correction for the
-    named causes. Gains are in nats, angles in radians. Errors of materials are relative errors of
-    held-out photos: held_out the RMS, typical the median over pixels."""
+def describe(
+    found: Diagnosis, assessment: Assessment, before: CaptureResult, after: CaptureResult
+) -> dict[str, Any]:
+    """The content of diagnosis.json. assessment: of the last joint fit. before, after: the fits
+    without and with a correction for the named causes. Gains are in nats, angles in radians. Errors
+    of materials are relative errors of held-out photos: held_out the RMS, typical the median over
+    pixels."""
     tried = {t.effect.cause for trials in found.rounds for t in trials}
     return {
         "format": FORMAT,
@@ -34,6 +42,7 @@ def describe(found: Diagnosis, before: CaptureResult, after: CaptureResult) -> d
             "albedo_variation": found.quality.albedo,
             "sentence": found.quality.sentence(),
         },
+        "assessment": _assessment(assessment),
         "unexplained": found.unexplained,
         "left": {
             "gain": found.residual.gain,
@@ -58,9 +67,55 @@ def describe(found: Diagnosis, before: CaptureResult, after: CaptureResult) -> d
     }
 
 
-def write(path: Path, found: Diagnosis, before: CaptureResult, after: CaptureResult) -> None:
-    """Write the file atomically."""
-    write_json(path, describe(found, before, after))
+def write(
+    path: Path,
+    found: Diagnosis,
+    assessment: Assessment,
+    before: CaptureResult,
+    after: CaptureResult,
+) -> None:
+    """Write the file atomically. The arguments are those of describe."""
+    write_json(path, describe(found, assessment, before, after))
+
+
+def _assessment(assessment: Assessment) -> dict[str, Any]:
+    """How far the joint fit can be trusted. Parameters are in their own units, residuals relative
+    to the prediction; cells of the sensor without pixels are null."""
+    joint, calibration, sensor = assessment.parameters, assessment.calibration, assessment.sensor
+    each = zip(
+        joint.cause, joint.name, joint.estimate, joint.error, joint.prior, joint.pull, strict=True
+    )
+    keys = ("cause", "name", "estimate", "standard_error", "prior", "pull")
+    return {
+        "parameters": [
+            dict(zip(keys, (c, n, *map(float, values)), strict=True)) for c, n, *values in each
+        ],
+        "correlation": np.round(joint.correlation, 3).tolist(),
+        "confusable": [{"causes": [a, b], "correlation": r} for a, b, r in joint.confusable],
+        "impact": dict(joint.ranked),
+        "calibration": {
+            "bins": BINS,
+            "density": calibration.density.tolist(),
+            "low": calibration.low.tolist(),
+            "high": calibration.high.tolist(),
+            "confidence": CONFIDENCE,
+            "interval": INTERVAL,
+            "covered": calibration.covered,
+            "calibrated": calibration.is_calibrated,
+        },
+        "sensor": {
+            "mean": _cells(sensor.mean),
+            "standard_error": _cells(np.where(np.isfinite(sensor.mean), sensor.error, np.nan)),
+            "half_width": sensor.width,
+            "half_height": sensor.height,
+            "significant": sensor.significant,
+        },
+    }
+
+
+def _cells(values: NDArray[np.float64]) -> list[list[float | None]]:
+    """Rows of a grid, null where a value is not known."""
+    return [[float(v) if np.isfinite(v) else None for v in row] for row in values]
 
 
 def _errors(error: HeldOutErrors) -> dict[str, float | None]:

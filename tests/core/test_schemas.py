@@ -315,9 +315,11 @@ def test_diagnosis_is_valid(root: Path, tmp_path: Path, monkeypatch: pytest.Monk
     job = CheckJob(FitJob(read_capture(capture)))
     job.drain()
     found, before, after = job.checked.found, job.checked.result, job.result
+    assessment = job.checked.assessment
     assert found is not None and before is not None and after is not None
+    assert assessment is not None
     described = json.loads(
-        json.dumps(diagnosis_json.describe(found, before, after), allow_nan=False)
+        json.dumps(diagnosis_json.describe(found, assessment, before, after), allow_nan=False)
     )
     check = validator(root, "diagnosis")
     check.validate(described)

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+from ...concurrency.ordered_map import ordered_map
 from ..forward.diagnosis_context import DiagnosisContext
 from .ambient_light import AmbientLight
 from .anisotropy import Anisotropy
@@ -51,7 +55,9 @@ EFFECTS: tuple[type[Effect], ...] = (
 )
 
 
-def effects_for(context: DiagnosisContext) -> list[Effect]:
-    """All effects that can occur in the capture."""
-    made = [kind.of(context) for kind in EFFECTS]
+def effects_for(context: DiagnosisContext, pool: ThreadPoolExecutor | None = None) -> list[Effect]:
+    """All effects that can occur in the capture. pool: threads that build several at once."""
+    shared = ("surroundings", "visible_faces")  # computed once, before several effects read them
+    list(ordered_map(pool, partial(getattr, context), shared, ahead=len(shared)))
+    made = ordered_map(pool, lambda kind: kind.of(context), EFFECTS, ahead=len(EFFECTS))
     return [effect for effect in made if effect is not None]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -41,10 +43,11 @@ def face_radiosity(
     dark[facing] = cast_shadow(
         rays, centre[facing], normal[facing].astype(np.float32), towards[facing], None
     )
+    oblique = np.array([OBLIQUE])
     albedo = np.stack(
         [
-            np.clip(directional_albedo(table.evaluate, np.array([OBLIQUE]))[0], 0, 1)
-            for table in brdfs.tables
+            np.clip(directional_albedo(partial(brdfs.evaluate_one, k), oblique)[0], 0, 1)
+            for k in range(len(brdfs.coefficients))
         ]
     )
     if len(albedo) == 1:

@@ -21,11 +21,13 @@ Array = NDArray[np.floating]
 @dataclass(frozen=True)
 class MaterialBRDFs:
     """coefficients: (m, 3, k) of m materials in a basis with slack (basis_slack.py). variance: (k,)
-    prior variances of the coefficients."""
+    prior variances of the coefficients. scale: (m,) factor of each material's reflectance, None 1:
+    the logarithmic mapping has an offset, so the basis holds materials of its own brightness."""
 
     basis: Basis
     coefficients: NDArray[np.float64]
     variance: NDArray[np.float64]
+    scale: NDArray[np.float64] | None = None
 
     @classmethod
     def of(cls, brdfs: Sequence[PrincipalBRDF]) -> MaterialBRDFs:
@@ -50,13 +52,18 @@ class MaterialBRDFs:
         """A table of logarithms for each material."""
         return tuple(LogTable.of(self.basis, c) for c in self.coefficients)
 
+    def evaluate_one(self, index: int, angles: Angles) -> Array:
+        """ρ (n, 3), 1/sr, of the paper's equation (3), of one material at n directions."""
+        rho = self.tables[index].evaluate(angles)
+        return rho if self.scale is None else rho * np.float32(self.scale[index])
+
     def evaluate(self, angles: Angles, material: NDArray[np.integer]) -> Array:
-        """ρ (n, 3), 1/sr, of the paper's equation (3), at n directions; material: (n,) of each."""
+        """The same; material: (n,) of each direction."""
         out = np.zeros((len(material), 3), np.float32)
-        for index, table in enumerate(self.tables):
+        for index in range(len(self.coefficients)):
             rows = np.flatnonzero(material == index)
             if len(rows):
-                out[rows] = table.evaluate(Angles(*(a.take(rows) for a in angles)))
+                out[rows] = self.evaluate_one(index, Angles(*(a.take(rows) for a in angles)))
         return out
 
     def reflected(self, state: ShadingState) -> Array:
@@ -65,19 +72,21 @@ class MaterialBRDFs:
 
     def log_derivative(self, state: ShadingState) -> Array:
         """(n, 3) derivative of the reflected radiance by ln(ρ·cosMap + ε)."""
-        return self.reflected(state) + _offset(state)
+        return self.reflected(state) + self._offset(state)
 
     def reflected_with_derivative(self, state: ShadingState) -> Array:
         """(n, 6) reflected radiance and log_derivative."""
         reflected = self.reflected(state)
-        return np.concatenate([reflected, reflected + _offset(state)], axis=1)
+        return np.concatenate([reflected, reflected + self._offset(state)], axis=1)
 
     def rows(self, angles: Angles) -> Array:
         """(n, k) rows Q̂ of the basis. The derivative of ρ by the coefficients is
         (ρ + ε / cosMap) Q̂."""
         return self.basis.rows(angles, self.coefficients.shape[2])[1]
 
-
-def _offset(state: ShadingState) -> Array:
-    """(n, 3) reflected radiance of a BRDF ε / cosMap, the offset of the logarithmic mapping."""
-    return (mapping.EPSILON / mapping.cos_map(state.angles))[:, None] * state.received
+    def _offset(self, state: ShadingState) -> Array:
+        """(n, 3) reflected radiance of a BRDF ε / cosMap, the offset of the logarithmic mapping."""
+        offset = mapping.EPSILON / mapping.cos_map(state.angles)
+        if self.scale is not None:
+            offset = offset * self.scale.astype(np.float32)[state.pixels.material]
+        return offset[:, None] * state.received

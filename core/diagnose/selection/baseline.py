@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..forward.diagnosis_context import DiagnosisContext
+from ..nuisances.material_scale import MaterialScale
 from ..nuisances.pose_jitter import PoseJitter
 from ..nuisances.surface_variation import SurfaceVariation
 from ..solver.gauss_newton import fit
@@ -48,7 +49,8 @@ def fit_baseline(
     """normal_deviation: radians along each tangent, of the scan's normals. across: patches over the
     object's size."""
     expected = expected_deviation(context.pixels, context.brdfs, normal_deviation)
-    plain = fit(Model(context.pixels, context.brdfs), expected)
+    model = Model(context.pixels, context.brdfs).with_effect(MaterialScale.of(context))
+    plain = fit(model, expected)
     deviation = rescaled_deviation(expected, plain.residual, plain.predicted, context.pixels)
     plain = fit(plain.model, deviation)
     posed = plain.model.with_effect(PoseJitter.of(context))

@@ -24,6 +24,7 @@ from ..pixels.unexplained_shadows import DIM
 from ..solver.gauss_newton import fit
 from ..solver.model import Model
 from ..solver.model_fit import ModelFit
+from ..solver.scaled_brdfs import scaled_brdfs
 from .cross_validation import (
     HeldOutPrediction,
     parameter_variances,
@@ -66,16 +67,19 @@ def held_out_predictions(now: ModelFit) -> HeldOutPredictions:
 
 
 def try_effect(
-    now: ModelFit, before: HeldOutPredictions, effect: Effect, p_value: float = 0.0
+    now: ModelFit,
+    before: HeldOutPredictions,
+    effect: Effect,
+    p_value: float = 0.0,
+    start: ModelFit | None = None,
 ) -> Trial:
     """Fit one effect together with the model. before: held_out_predictions(now); p_value: of its
-    step."""
+    step; start: a joint fit with another version of the effect, from which the search starts."""
     by_pixel, in_patches = isinstance(effect, JudgedByPixel), isinstance(effect, PatchEffect)
     # another patch effect freezes the patches of the model, so they must be frozen without it too:
     # the parameters of a held-out region are then known
     frozen = in_patches and now.model.patch_place is not None
-    start = effect.initial(_residual_where_bright(now), now.predicted)
-    fitted = fit(now.model.with_effect(effect, start), now.deviation, STEPS)
+    fitted = fit(_with_effect(now, effect, start), now.deviation, STEPS)
     for _ in range(PRIOR_ROUNDS):
         if isinstance(effect, PatchEffect):
             effect = effect.with_prior(patch_prior(fitted))
@@ -99,6 +103,14 @@ def try_effect(
     )  # fmt: skip
 
 
+def _with_effect(now: ModelFit, effect: Effect, start: ModelFit | None) -> Model:
+    """The model with one more effect, where its joint fit starts."""
+    if start is None or len(start.model.x[-1]) != len(effect.parameters):
+        first = effect.initial(_residual_where_bright(now), now.predicted)
+        return now.model.with_effect(effect, first)
+    return replace(start.model, effects=(*start.model.effects[:-1], effect))
+
+
 def try_rebuilt(
     now: ModelFit, before: HeldOutPredictions, best: Trial, context: DiagnosisContext
 ) -> Trial:
@@ -107,12 +119,12 @@ def try_rebuilt(
     BRDF matters."""
     if not isinstance(best.effect, BuiltFromBRDFs) or best.fitted is None:
         return best
-    context = replace(context, brdfs=best.fitted.model.brdfs)
+    context = replace(context, brdfs=scaled_brdfs(best.fitted.model))
     effects: list[Effect] = [best.effect.rebuilt(context, best.x)]
     if len(effects[0].parameters) != len(best.effect.parameters):
         plain = best.effect.of(context)
         effects += [] if plain is None else [plain]
-    tried = [try_effect(now, before, effect, best.p_value) for effect in effects]
+    tried = [try_effect(now, before, effect, best.p_value, best.fitted) for effect in effects]
     return max(tried, key=lambda trial: trial.gain)
 
 
@@ -127,7 +139,7 @@ def try_with_rays(
         predict = partial(_predicted_with_last, best.fitted.model)
         x = best.effect.ray_parameters(context, best.x, predict)
         effect = best.effect.with_rays(context, x)
-        again = try_effect(now, before, effect, best.p_value)
+        again = try_effect(now, before, effect, best.p_value, best.fitted)
         if again.gain < best.gain:  # the mesh is too coarse to locate the edges of shadows
             break
         converged = again.gain < (1 + MIN_RAY_GAIN) * best.gain

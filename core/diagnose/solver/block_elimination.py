@@ -83,6 +83,14 @@ def times_blocks(rows: Array, blocks: Array) -> Array:
     return np.asarray(each.reshape(len(rows), -1))
 
 
+def projected_squares(rows: Array, blocks: Array) -> Array:
+    """(r, r) rows · blocks · rowsᵀ for rows (r, P · e) and symmetric positive definite blocks
+    (P, e, e). By their roots, since a product of a matrix with its own transpose takes half the
+    time."""
+    half = times_blocks(rows, np.linalg.cholesky(blocks))
+    return np.asarray(half @ half.T)
+
+
 def solve(equations: NormalEquations, fit: ModelFit, spread: bool = False) -> Step:
     """The step of the maximum a posteriori; parameters that a bound holds do not move. spread: with
     the variances of the patches' parameters, which take longest."""
@@ -122,7 +130,7 @@ def _solve_with_patches(equations: NormalEquations, fit: ModelFit, spread: bool)
     side, pull = np.where(held, 0, side), np.where(held, 0, pull)
     inverse = np.linalg.inv(patch_blocks(equations.local, parameters.deviation, held))
     projected = times_blocks(side, inverse)
-    dense -= projected @ side.T
+    dense -= projected_squares(side, inverse)
     right = right - projected @ pull
     stuck = np.concatenate([np.zeros(size, bool), _held(fit, right[size:])])
     free = np.flatnonzero(~stuck)

@@ -1,0 +1,1 @@
+"""How far the joint fit of a diagnosis can be trusted: parameters, calibration, residuals."""

@@ -1,0 +1,21 @@
+"""The BRDFs of a fitted model, each with the factor of its reflectance."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..forward.material_brdfs import MaterialBRDFs
+from ..nuisances.material_scale import MaterialScale
+from .model import Model
+
+
+def scaled_brdfs(model: Model) -> MaterialBRDFs:
+    """The BRDFs of a model with the factors of MaterialScale, for use without that."""
+    if MaterialScale.cause not in model.causes:
+        return model.brdfs
+    factor = np.ones(len(model.brdfs.coefficients))
+    found = np.exp(model.parameters_of(MaterialScale.cause))
+    factor[: len(found)] = found
+    return replace(model.brdfs, scale=factor)

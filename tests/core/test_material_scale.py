@@ -1,0 +1,63 @@
+"""The factor of a material's reflectance: part of every fit, and of the BRDFs afterwards."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from patina.core.diagnose.nuisances.material_scale import MaterialScale
+from patina.core.diagnose.solver.gauss_newton import fit
+from patina.core.diagnose.solver.model import Model
+from patina.core.diagnose.solver.residual_scale import expected_deviation
+from patina.core.diagnose.solver.scaled_brdfs import scaled_brdfs
+from tests.make_lit_ball import GLOSSY, changed, lit_ball
+
+SCALE = 1.7  # ln
+
+
+@pytest.fixture(scope="module")
+def context():
+    return lit_ball(5, GLOSSY)
+
+
+@pytest.fixture(scope="module")
+def model(context) -> Model:
+    effect = MaterialScale.of(context)
+    return Model(context.pixels, context.brdfs).with_effect(effect, np.array([SCALE]))
+
+
+def test_scaled_brdfs_predict_what_the_model_does(context, model):
+    alone = Model(context.pixels, scaled_brdfs(model))
+    assert alone.predicted() == pytest.approx(model.predicted(), rel=1e-5)
+    plain = Model(context.pixels, context.brdfs)
+    assert model.predicted() == pytest.approx(np.exp(SCALE) * plain.predicted(), rel=1e-5)
+    assert scaled_brdfs(plain) is plain.brdfs
+
+
+def test_derivative_of_scaled_brdfs_is_that_of_their_reflectance(context, model):
+    """By difference quotients of a coefficient of the first component."""
+    brdfs, step = scaled_brdfs(model), 1e-3
+    state = Model(context.pixels, brdfs).shading()
+    moved = brdfs.coefficients.copy()
+    moved[0, :, 0] += step
+    quotient = (replace(brdfs, coefficients=moved).reflected(state) - brdfs.reflected(state)) / step
+    row = brdfs.rows(state.angles)[:, :1]
+    bright = brdfs.reflected(state) > 0.05
+    stated = brdfs.log_derivative(state) * row
+    assert quotient[bright] == pytest.approx(stated[bright], rel=0.03, abs=1e-4)
+
+
+def test_a_darker_material_is_explained_by_the_factor(context):
+    """A material of the basis, but a tenth as bright: with its own factor the fit costs less than
+    without, and nothing but the factor and the BRDF is needed."""
+    darker = changed(context, 0.1 * context.pixels.observed)
+    noise = replace(darker.pixels, noise=0.01 * context.pixels.noise)
+    darker = replace(darker, pixels=noise)
+    start = Model(darker.pixels, darker.brdfs)
+    deviation = expected_deviation(darker.pixels, darker.brdfs, np.radians(0.3))
+    without = fit(start, deviation)
+    with_factor = fit(start.with_effect(MaterialScale.of(darker)), deviation)
+    assert with_factor.total_cost < without.total_cost
+    assert with_factor.model.x[0][0] < -1
