@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..core.capture import read_capture
 from ..core.diagnose.effects import EFFECTS
+from ..core.diagnose.effects.actions import ACTIONS
 from ..core.diagnose.selection.diagnosis import Diagnosis
 from ..core.jobs import FitJob, finished
 from ..core.jobs.check_job import CheckJob
@@ -66,6 +67,8 @@ def diagnose_to_folder(
 def _print_causes(found: Diagnosis) -> None:
     for trial in found.reported:
         print(f"{trial.effect.cause}: {found.sentence(trial)}")
+        if trial in found.named:
+            print(f"  {ACTIONS[trial.effect.cause]}")
     if found.unexplained:
         print(f"unknown: {found.residual.sentence()}")
     if not found.causes:

@@ -69,6 +69,8 @@ def draw_check(
             ).cause = cause["cause"]
         if cause["accepted"] or cause.get("contradicted"):
             wrapped(box, with_lengths(cause["sentence"]), "BLANK1", IN_BOX)
+        if bar.active and "action" in cause:  # not in results of earlier versions
+            wrapped(box, cause["action"], "FORWARD", IN_BOX)
     if len(causes):
         used = {cause.name for cause in causes if cause.use}
         changed = used != set(diagnosis["applied"])

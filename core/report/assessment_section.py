@@ -65,8 +65,8 @@ def _pulls(parameters: JointParameters) -> str:
     )
     return (
         "<h3>Parameters</h3><p class='sub'>Pull: the estimate in units of the standard deviation "
-        "of its prior, largest first. Errors of the scan are part of every fit.</p><table><tr><th>Effect</th>"
-        "<th>Parameter</th><th>Estimate</th><th>Prior</th><th>Pull</th></tr>"
+        "of its prior, largest first. Errors of the scan are part of every fit.</p>"
+        "<table><tr><th>Effect</th><th>Parameter</th><th>Estimate</th><th>Prior</th><th>Pull</th></tr>"
         f"{rows}</table>"
     )
 

@@ -10,6 +10,7 @@ from urllib.parse import quote
 import numpy as np
 
 from ..diagnose.assessment.assessment import Assessment
+from ..diagnose.effects.actions import ACTIONS
 from ..diagnose.forward.diagnosis_context import DiagnosisContext
 from ..diagnose.selection.diagnosis import Diagnosis, Trial
 from ..diagnose.selection.residual_trends import Trend, coordinates, trend
@@ -171,12 +172,13 @@ def _row(trial: Trial, found: Diagnosis) -> str:
     named = trial in found.named
     significance = trial.gain / max(trial.error, 1e-9)
     width = int(np.clip(12 * significance, 0, 160))
-    meaning = found.sentence(trial) if trial in found.reported else ""
+    meaning = escape(found.sentence(trial)) if trial in found.reported else ""
+    meaning += f"<br><b>{escape(ACTIONS[trial.effect.cause])}</b>" if named else ""
     style = "background:#2f6fb0" if named else "background:#bbb"
     return (
         f"<tr><th>{escape(trial.effect.cause)}</th><td>{significance:.1f}</td><td>"
         f"<div style='height:10px;width:{width}px;{style}'></div></td>"
-        f"<td>{escape(meaning)}</td></tr>"
+        f"<td>{meaning}</td></tr>"
     )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..diagnose.assessment.assessment import Assessment
 from ..diagnose.assessment.calibration import BINS, CONFIDENCE, INTERVAL
+from ..diagnose.effects.actions import ACTIONS
 from ..diagnose.selection.diagnosis import Diagnosis, Trial
 from ..diagnose.selection.held_out_error import HeldOutErrors
 from ..jobs import CaptureResult
@@ -137,6 +138,7 @@ def _cause(trial: Trial, found: Diagnosis) -> dict[str, Any]:
         "accepted": accepted,
         "contradicted": found.contradicted.get(trial.effect.cause),
         "sentence": found.sentence(trial),
+        "action": ACTIONS[trial.effect.cause],
         "ties": [effect.cause for effect in trial.ties],
         "held_out_gain": trial.gain,
         "standard_error": trial.error,

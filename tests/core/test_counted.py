@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from patina.core.counted import counted
 from patina.core.diagnose.effects import EFFECTS
+from patina.core.diagnose.effects.actions import ACTIONS
 from patina.core.diagnose.effects.labels import LABELS, cause_label
 
 
@@ -19,4 +20,9 @@ def test_only_one_is_singular() -> None:
 
 def test_every_cause_has_a_label() -> None:
     assert {effect.cause for effect in EFFECTS} <= set(LABELS)
+
+
+def test_every_cause_has_an_action() -> None:
+    assert {effect.cause for effect in EFFECTS} == set(ACTIONS)
+    assert all(action.endswith(".") and ". " not in action for action in ACTIONS.values())
     assert cause_label("camera_pose") == "Wrong Camera Poses"

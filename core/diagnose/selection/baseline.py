@@ -25,6 +25,9 @@ from .effect_trials import patch_prior
 ACROSS = 36  # patches over the object's size: finer ones hold too few pixels, coarser ones leave
 # more of the errors of a stereo mesh (held-out regions of ../shared/data are predicted worse)
 PRIOR_ROUNDS = 2
+RELAXATION = 2.0
+"""Factor by which the logarithm of a step of expectation and maximisation is lengthened, since such
+steps are slow. They never go beyond the optimum, so a factor of up to 2 keeps them stable."""
 STEPS, STEPS_OF_ROUND = 4, 3
 USUAL_SCALES = (*(np.radians(0.6),) * 2, *(np.radians(0.4),) * 3, 0.4, *(0.05,) * 3, 0.02)
 """Largest standard deviations of the priors (SurfaceVariation): normals of stereo meshes are off by
@@ -60,7 +63,7 @@ def fit_baseline(
     now = fit(posed.with_effect(variation), deviation, STEPS)
     scales = np.array(variation.prior)
     for _ in range(PRIOR_ROUNDS):
-        scales = np.minimum(patch_prior(now), USUAL_SCALES)
+        scales = np.minimum(scales * (patch_prior(now) / scales) ** RELAXATION, USUAL_SCALES)
         model = posed.with_effect(variation.with_prior(scales))
         model = replace(model, brdfs=now.model.brdfs, x=now.model.x)
         deviation = rescaled_deviation(deviation, now.residual, now.predicted, context.pixels)

@@ -37,6 +37,9 @@ TIE_STANDARD_ERRORS = 2.0  # difference of gains below which two effects are tie
 COMMONER: Mapping[str, str] = {"black_level": "ambient_light"}
 """Of two causes that are tied, the one that is met more often: a raw converter subtracts the black
 level, but few rooms are black."""
+PARTS: Mapping[str, Sequence[str]] = {"near_light": ("light_direction", "light_intensity")}
+"""Effects that are a part of another: only what else it explains is evidence for it."""
+ALL_OF_IT = 0.9  # fraction of a gain that counts as all of it
 FAMILIES = (
     ("ambient_light", "environment_reflection", "veiling_glare", "black_level", "subsurface",
      "interreflection"),
@@ -70,6 +73,7 @@ def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
     """The effects that are to be fitted jointly, best first; empty: none is convincing. evidence:
     best first."""
     strong = [one for one in evidence if _has_sufficient_evidence(one.trial)]
+    strong = [one for one in strong if not _is_composed(one, evidence)]
     if not strong:
         return []
     weak = strong[0].trial.density < NAT * STRONG and strong[0].cause not in UNRIVALLED
@@ -94,6 +98,12 @@ def best_of(trials: Sequence[Trial]) -> Trial | None:
     if commoner:
         tied, best = [*(t for t in tied if t is not commoner[0]), best], commoner[0]
     return replace(best, ties=tuple(trial.effect for trial in tied))
+
+
+def _is_composed(one: Evidence, evidence: Sequence[Evidence]) -> bool:
+    """Whether the effects that are a part of an effect explain all that it explains."""
+    parts = [other.step for other in evidence if other.cause in PARTS.get(one.cause, ())]
+    return bool(parts) and joint_step(parts) > ALL_OF_IT * one.step.gain
 
 
 def _replaces(simple: Evidence, other: Evidence) -> bool:

@@ -15,12 +15,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from ..effects.base.effect import Effect
+from ..effects.camera_pose import CameraPose
 from ..effects.cast_shadow import CastShadow
 from ..effects.clipping import Clipping
 from ..forward.diagnosis_context import DiagnosisContext
 from ..solver.model_fit import ModelFit
 from .baseline import fit_baseline
-from .cross_validation import predict_held_out_regions
+from .cross_validation import parameter_variances_by_photo, predict_held_out_regions
 from .diagnosis import MIN_GAIN_FRACTION, Diagnosis
 from .effect_trials import (
     HeldOutPredictions,
@@ -59,7 +60,8 @@ def search(
     rounds: list[tuple[Trial, ...]] = []
     remaining = list(effects)
     for turn in range(MAX_ROUNDS):
-        stepping = [e for e in remaining if has_one_step(e) and e.cause not in now.model.causes]
+        known = {*now.model.causes, CameraPose.cause}  # the baseline has errors of the poses
+        stepping = [e for e in remaining if has_one_step(e) and e.cause not in known]
         evidence = evidence_for(ProjectedBaseline.of(now), stepping, pool)
         yield 0.5 * (ROUND_STARTS[turn] + ROUND_STARTS[turn + 1])
         without = held_out_predictions(now)
@@ -158,9 +160,10 @@ def _in_final_fit(
     """The accepted effects with their parameters in the final joint fit. variances: of the
     parameters of each effect there."""
     found = []
+    by_photo = parameter_variances_by_photo(now) if accepted else None
     for trial in accepted:
         place = now.model.place_of(trial.effect.cause)
         frozen = place in now.model.frozen
         moved = trial if frozen else trial.in_fit(now, variances)
-        found.append(replace(moved, fitted=now).with_photo_errors())
+        found.append(replace(moved, fitted=now).with_photo_errors(by_photo))
     return found

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..effects.base.effect import Effect
 from ..solver.model_fit import ModelFit
-from .cross_validation import parameter_variances_by_photo, standard_error_of_sum
+from .cross_validation import standard_error_of_sum
 
 Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
@@ -109,14 +109,14 @@ class Trial:
         effect = fitted.model.effects[place]
         return replace(self, fitted=fitted, effect=effect, x=x, variance=variance)
 
-    def with_photo_errors(self) -> Trial:
+    def with_photo_errors(self, by_photo: tuple[Array, ...] | None) -> Trial:
         """The trial with standard errors that include errors common to a whole photo, and those of
-        the effect's own approximations. Of a trial with a joint fit."""
+        the effect's own approximations. Of a trial with a joint fit. by_photo: its
+        parameter_variances_by_photo."""
         assert self.fitted is not None
         place = self.fitted.model.place_of(self.effect.cause)
         if place in self.fitted.model.frozen or not len(self.x):
             return self
-        by_photo = parameter_variances_by_photo(self.fitted)
         variance = self.variance if by_photo is None else np.maximum(by_photo[place], self.variance)
         systematic = self.effect.systematic_errors(self.identified)
         return replace(self, variance=variance + np.square(systematic))

@@ -1,0 +1,129 @@
+"""Which effect the evidence supports: weak evidence needs to stand alone, and an effect that is
+composed of others needs evidence of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from patina.core.diagnose.effects.base.effect import Effect
+from patina.core.diagnose.effects.base.parameters import Parameters
+from patina.core.diagnose.selection.evidence import Evidence
+from patina.core.diagnose.selection.judgement import NAT, STRONG, best_of, contenders, min_gain
+from patina.core.diagnose.selection.one_step import OneStep, joint_step
+from patina.core.diagnose.selection.trial import Trial
+from patina.core.statistics.student_t import robust_cost, robust_weights
+
+PIXELS, REGIONS = 4000, 100
+REGION = np.arange(PIXELS) % REGIONS
+RNG = np.random.default_rng(3)
+PATTERNS = np.linalg.qr(RNG.normal(size=(PIXELS * 3, 6)))[0].T.reshape(6, PIXELS, 3)
+NOISE = 0.3 * RNG.normal(size=(PIXELS, 3))
+
+
+@dataclass(frozen=True)
+class Pattern(Effect):
+    """An effect that adds some of PATTERNS."""
+
+    cause: str
+    count: int
+    deciding_photo = "a photo"
+
+    @classmethod
+    def of(cls, context):
+        raise NotImplementedError
+
+    @property
+    def parameters(self) -> Parameters:
+        return Parameters.alike([str(k) for k in range(self.count)], "", 100.0, -1e3, 1e3)
+
+    def sentence(self, x, error) -> str:
+        return self.cause
+
+
+def evidence(cause: str, patterns, residual) -> Evidence:
+    """By least squares with robust costs; patterns: numbers of PATTERNS."""
+    left = np.moveaxis(PATTERNS[list(patterns)], 0, 2).astype(np.float32)
+    x = np.linalg.lstsq(left.reshape(-1, len(patterns)), residual.ravel(), rcond=None)[0]
+    effect = Pattern(cause, len(patterns))
+    none = np.zeros((0, 0))
+    step = OneStep(
+        effect, x, none, effect.parameters.deviation, 0.0, 0.02, left, none,
+        residual.astype(np.float32), robust_weights(residual), np.ones(len(x), bool),
+    )  # fmt: skip
+    saved = (robust_cost(residual) - robust_cost(residual - left @ x)).sum(axis=1)
+    by_region = np.bincount(REGION, saved)
+    trial = Trial(effect, x, np.ones(len(x)), by_region, residual.size, 0.02, 0.0)
+    return Evidence(replace(step, gain=joint_step([step])), trial)
+
+
+def residual_of(**gains: float):
+    """(n, 3) noise and patterns p0, p1 …, each of a gain in nats a value."""
+    parts = [
+        np.sqrt(2 * gain * PIXELS * 3 / 1.25) * PATTERNS[int(name[1:])]
+        for name, gain in gains.items()
+    ]
+    return NOISE + sum(parts)
+
+
+def ranked(*found: Evidence) -> list[Evidence]:
+    return sorted(found, key=lambda one: -one.trial.gain)
+
+
+def causes(found) -> list[str]:
+    return [one.cause for one in found]
+
+
+def test_nothing_is_found_in_noise():
+    found = ranked(*(evidence(c, [k], NOISE) for k, c in enumerate(["vignetting", "clipping"])))
+    assert contenders(found) == []
+
+
+def test_evidence_above_its_bar_is_found_alone():
+    weak = residual_of(p0=2 * min_gain("vignetting"))
+    found = ranked(evidence("vignetting", [0], weak), evidence("subsurface", [1], weak))
+    assert causes(contenders(found)) == ["vignetting"]
+
+
+def test_weak_evidence_beside_an_unrelated_rival_names_nothing():
+    both = residual_of(p0=2 * min_gain("vignetting"), p1=1.6 * min_gain("vignetting"))
+    found = ranked(evidence("vignetting", [0], both), evidence("subsurface", [1], both))
+    assert contenders(found) == []
+
+
+def test_strong_evidence_is_found_beside_a_rival():
+    both = residual_of(p0=2 * NAT * STRONG, p1=1.4 * NAT * STRONG)
+    found = ranked(evidence("vignetting", [0], both), evidence("subsurface", [1], both))
+    assert causes(contenders(found)) == ["vignetting"]
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_a_near_light_needs_more_than_its_parts_explain(own):
+    """Direction and intensity are patterns 0 and 1; the falloff of a near lamp is pattern 2."""
+    size = 2 * min_gain("near_light")
+    residual = residual_of(p0=size, p1=size, **({"p2": 2 * size} if own else {}))
+    found = ranked(
+        evidence("near_light", [0, 1, 2], residual),
+        evidence("light_direction", [0], residual),
+        evidence("light_intensity", [1], residual),
+    )
+    assert ("near_light" in causes(contenders(found))) == own
+
+
+def _tried(cause: str, count: int, gain: float) -> Trial:
+    by_region = np.full(REGIONS, gain / REGIONS) + 1e-3 * RNG.normal(size=REGIONS)
+    effect = Pattern(cause, count)
+    return Trial(effect, np.ones(count), np.ones(count), by_region, 1000, 0.02, 0.0)
+
+
+def test_the_simpler_of_two_nearly_equal_effects_is_chosen():
+    best = best_of([_tried("environment_reflection", 64, 100.0), _tried("ambient_light", 3, 96.0)])
+    assert best is not None and best.effect.cause == "ambient_light"
+
+
+def test_a_room_is_commoner_than_lifted_blacks():
+    best = best_of([_tried("black_level", 3, 100.0), _tried("ambient_light", 3, 100.0)])
+    assert best is not None and best.effect.cause == "ambient_light"
+    assert [effect.cause for effect in best.ties] == ["black_level"]
