@@ -76,13 +76,13 @@ def _correlations(parameters: JointParameters) -> str:
         f"<li>{_label(one)} and {_label(other)}: {correlation:.2f}</li>"
         for one, other, correlation in parameters.confusable
     )
-    said = (
+    sentence = (
         f"<p>The photos hardly distinguish these effects (correlation above {CONFUSABLE:g}):</p>"
         f"<ul>{pairs}</ul>"
         if pairs
         else f"<p>No two effects have a correlation above {CONFUSABLE:g}.</p>"
     )
-    return f"<h3>Correlations</h3>{said}{_matrix(parameters)}"
+    return f"<h3>Correlations</h3>{sentence}{_matrix(parameters)}"
 
 
 def _matrix(parameters: JointParameters) -> str:

@@ -10,7 +10,7 @@ ACTIONS = {
     "cast_shadow": "Remove what stands before the lamp, or complete the mesh there.",
     "light_intensity": "Lock the exposure, and place a grey card in each photo.",
     "second_material": "Paint a mask for each material.",
-    "light_direction": "Find the light from the photos, or place a mirror ball beside the object.",
+    "light_direction": "Find the light from the photos, or place a mirror ball next to the object.",
     "subsurface": "Use the material only for objects of this size: the BRDF has no depth.",
     "camera_response": "Use raw photos, or photograph a colour chart.",
     "area_light": "Use a smaller lamp, or move it farther away.",
