@@ -1,13 +1,15 @@
-"""`run.py hunt --evidence CAPTURE ...`: what one step of every effect gains on the baseline.
+"""`run.py hunt --evidence`: what one step of every effect gains on the baseline.
 
 The evidence by which the diagnosis judges an effect (core/diagnose/selection/evidence.py), and the
 same for held-out photos and parts of the surface. Gains are in thousandths of a nat a pixel and
-channel, in brackets their ratio to the standard error.
+channel, in brackets their ratio to the standard error. At the end: the largest gain of each effect
+over all captures. Captures are given, or made as by `--field`.
 """
 
 from __future__ import annotations
 
 import argparse
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,17 +20,47 @@ from ..package import load_patina
 PARTS = 6  # of the surface, across
 
 
+Gains = dict[str, tuple[float, float]]
+"""Cause → (gain, its ratio to the standard error) on held-out regions."""
+
+
 def main(words: Sequence[str]) -> int:
     """Fit each capture, and print its table."""
     load_patina()
     parser = argparse.ArgumentParser(prog="run.py hunt --evidence", description=__doc__)
-    parser.add_argument("captures", nargs="+", type=Path, metavar="CAPTURE")
-    for path in parser.parse_args(words).captures:
-        _print(path)
+    parser.add_argument("captures", nargs="*", type=Path, metavar="CAPTURE")
+    parser.add_argument("--hidden", nargs="+", default=[], metavar="CAUSE")
+    parser.add_argument("--strength", type=float, default=0.03)
+    parser.add_argument("--seeds", nargs="+", type=int, default=[0])
+    given = parser.parse_args(words)
+    found = [_print(path, str(path)) for path in given.captures]
+    found += [
+        _print_made(cause, given.strength, seed) for cause in given.hidden for seed in given.seeds
+    ]
+    _print_largest(found)
     return 0
 
 
-def _print(path: Path) -> None:
+def _print_made(cause: str, strength: float, seed: int) -> Gains:
+    """A simulated capture. cause: "none", or what is hidden in it."""
+    from .make import CAPTURE, make
+
+    with tempfile.TemporaryDirectory() as folder:
+        truth = make(Path(folder), cause, 0.0 if cause == "none" else strength, seed)
+        title = f"{cause}, seed {seed}, {truth.scan}, {truth.material}, {truth.lamp}"
+        return _print(Path(folder) / CAPTURE, title)
+
+
+def _print_largest(found: Sequence[Gains]) -> None:
+    causes = sorted({cause for gains in found for cause in gains})
+    print("\n| effect | largest gain | captures |\n|---|---|---|")
+    for cause in causes:
+        every = [gains[cause] for gains in found if cause in gains]
+        gain, ratio = max(every)
+        print(f"| {cause} | {gain:.1f} ({ratio:.1f}) | {len(every)} |")
+
+
+def _print(path: Path, title: str) -> Gains:
     from patina.core.capture import read_capture
     from patina.core.concurrency.steps import drained
     from patina.core.diagnose.effects import effects_for
@@ -49,7 +81,7 @@ def _print(path: Path) -> None:
     baseline = fit_baseline(context, np.radians(normal_deviation(job.result)))
     projected = ProjectedBaseline.of(baseline.fitted)
     count = baseline.fitted.residual.size
-    print(f"\n{path}\n")
+    print(f"\n{title}\n")
     if baseline.scales is not None:
         scales = (f"{w} {s:.4f}" for w, s in zip(WAYS, baseline.scales, strict=True))
         print(f"scales of the surface: {', '.join(scales)}\n")
@@ -57,8 +89,10 @@ def _print(path: Path) -> None:
     print("|---|---|---|---|---|---|")
     groups = context.pixels.block, context.pixels.photo, surface_patches(context, PARTS)
     effects = [effect for effect in effects_for(context) if has_one_step(effect)]
-    for step in (found.step for found in evidence_for(projected, effects)):
-        cells = []
+    gained: Gains = {}
+    for one in evidence_for(projected, effects):
+        step, cells = one.step, []
+        gained[one.cause] = 1e3 * one.trial.density, one.trial.gain / max(one.trial.error, 1e-9)
         for group in groups:
             gains = step.held_out(group)
             error = max(standard_error_of_sum(gains), 1e-9)
@@ -68,3 +102,4 @@ def _print(path: Path) -> None:
             f"{100 * step.change:.2f} % |",
             flush=True,
         )
+    return gained

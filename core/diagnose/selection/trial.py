@@ -14,7 +14,7 @@ from .cross_validation import standard_error_of_sum
 Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
 
-MIN_STANDARD_ERRORS = 3.0  # of the gain over regions
+MIN_STANDARD_ERRORS = 2.5  # of the gain over regions, in a joint fit
 MAX_GROWTH = 1.01  # of the RMS error of held-out regions: outliers may not be predicted worse
 MIN_RELATIVE_CHANGE = 0.005  # RMS change of the photos below which an effect is not reported
 
