@@ -88,7 +88,7 @@ def test_evidence_above_its_bar_is_found_alone():
 
 
 def test_weak_evidence_beside_an_unrelated_rival_names_nothing():
-    both = residual_of(p0=2 * min_gain("vignetting"), p1=1.6 * min_gain("vignetting"))
+    both = residual_of(p0=2 * min_gain("subsurface"), p1=1.6 * min_gain("subsurface"))
     found = ranked(evidence("vignetting", [0], both), evidence("subsurface", [1], both))
     assert contenders(found) == []
 
@@ -110,6 +110,13 @@ def test_a_near_light_needs_more_than_its_parts_explain(own):
         evidence("light_intensity", [1], residual),
     )
     assert ("near_light" in causes(contenders(found))) == own
+
+
+def test_a_flash_elsewhere_is_always_fitted():
+    """No error of a scan looks like it, so it is compared with what gains more in one step."""
+    both = residual_of(p0=2 * NAT * STRONG, p1=10 * min_gain("flash_offset"))
+    found = ranked(evidence("light_intensity", [0], both), evidence("flash_offset", [1], both))
+    assert causes(contenders(found)) == ["light_intensity", "flash_offset"]
 
 
 def _tried(cause: str, count: int, gain: float) -> Trial:

@@ -78,7 +78,7 @@ def test_the_baseline_cannot_imitate_what_is_left(drifted):
     projected = ProjectedBaseline.of(baseline.fitted)
     left = one_step(projected, LightIntensity.of(context)).left
     again = projected.project(left)
-    assert np.linalg.norm(again - left) < 0.1 * np.linalg.norm(left)
+    assert np.linalg.norm(again - left) < 0.15 * np.linalg.norm(left)
 
 
 def test_scales_of_the_surface_stay_usual():

@@ -27,8 +27,8 @@ DEFAULT_MIN_GAIN = 10.0
 looks like a tone curve; only lamps on the camera are insensitive to errors of the normals."""
 STRONG = 100.0  # a gain above this is accepted even if unrelated effects gain as well
 MIN_RATIOS = (3.5, 2.5)
-"""Standard errors of the gain over regions: of a weak, and of a strong gain, most of which may be
-in few regions."""
+"""Standard errors of the gain over regions: of a weak gain, and of a strong or an unrivalled one,
+most of which may be in few regions."""
 UNRIVALLED = ("flash_offset",)  # nothing that a scan gets wrong looks like it
 RIVAL_FRACTION = 0.5  # of the best gain, at which an unrelated effect makes weak evidence doubtful
 SAME_EVIDENCE = 0.5  # overlap of gains above which two effects explain the same residual
@@ -82,7 +82,8 @@ def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
         return []
     close = [one for one in strong if one.trial.gain > CLOSE * strong[0].trial.gain]
     kept = [one for one in close if not any(_replaces(other, one) for other in close)]
-    return kept[:MAX_CONTENDERS]
+    more = [one for one in strong if one.cause in UNRIVALLED and one not in close]
+    return [*kept[:MAX_CONTENDERS], *more]
 
 
 def best_of(trials: Sequence[Trial]) -> Trial | None:
@@ -116,7 +117,8 @@ def _replaces(simple: Evidence, other: Evidence) -> bool:
 
 def _has_sufficient_evidence(trial: Trial) -> bool:
     enough = trial.density > min_gain(trial.effect.cause)
-    ratio = MIN_RATIOS[trial.density > NAT * STRONG]
+    sure = trial.density > NAT * STRONG or trial.effect.cause in UNRIVALLED
+    ratio = MIN_RATIOS[sure]
     return enough and trial.gain > ratio * trial.error
 
 
