@@ -19,7 +19,7 @@ from .trial import Trial
 NAT = 1e-3  # the bars are thousandths of a nat a pixel and channel
 MIN_GAINS: Mapping[str, float] = {
     "camera_response": 25.0, "near_light": 15.0, "light_direction": 4.0, "light_intensity": 8.0,
-    "flash_offset": 3.0, "vignetting": 4.5, "cast_shadow": 0.5, "ambient_light": 4.5,
+    "flash_offset": 1.5, "vignetting": 4.5, "cast_shadow": 0.5, "ambient_light": 4.5,
     "black_level": 4.5, "veiling_glare": 4.5, "environment_reflection": 4.5,
 }  # fmt: skip
 DEFAULT_MIN_GAIN = 10.0
