@@ -11,6 +11,7 @@ from ..diagnose.assessment.calibration import CONFIDENCE, INTERVAL, Calibration
 from ..diagnose.assessment.joint_parameters import CONFUSABLE, JointParameters
 from ..diagnose.assessment.sensor_residuals import SensorResiduals
 from ..diagnose.effects.labels import cause_label
+from .svg_element import svg_element
 
 WIDTH, HEIGHT = 280, 130
 LEFT, BOTTOM, TOP = 34, 18, 8
@@ -95,7 +96,7 @@ def _matrix(parameters: JointParameters) -> str:
         for column in range(count)
         if row != column
     )
-    return _svg(count * CELL, count * CELL, "Correlation of all parameters", cells)
+    return svg_element(count * CELL, count * CELL, "Correlation of all parameters", cells)
 
 
 def _pair(parameters: JointParameters, row: int, column: int) -> str:
@@ -133,7 +134,7 @@ def _calibration(calibration: Calibration) -> str:
         "<h3>Calibration</h3><p class='sub'>Probability that the prediction of a held-out region "
         "gave to a smaller value. Even, if the stated errors are right; high at both ends, if they "
         f"are too small. Grey: the band of all bins at once ({100 * CONFIDENCE:.0f} %).</p>"
-        f"{_svg(WIDTH, HEIGHT, 'Histogram of the probability integral transform', drawn)}"
+        f"{svg_element(WIDTH, HEIGHT, 'Histogram of the probability integral transform', drawn)}"
         f"<p>The histogram is {inside} the band. {100 * calibration.covered:.0f} % of the held-out "
         f"values are inside the {100 * INTERVAL:.0f} % interval.</p>"
     )
@@ -157,7 +158,7 @@ def _sensor(sensor: SensorResiduals) -> str:
         f"photos at each place of the sensor. Red: the photos are brighter, blue: darker; full "
         f"colour: {100 * FULL_RESIDUAL:.0f} %. Beyond two standard errors: "
         f"{100 * sensor.significant:.0f} % of the cells.</p>"
-        f"{_svg(across * CELL, down * CELL, 'Mean residual on the sensor', frame + cells)}"
+        f"{svg_element(across * CELL, down * CELL, 'Mean residual on the sensor', frame + cells)}"
     )
 
 
@@ -167,12 +168,4 @@ def _cell(column: int, row: int, value: float, full: float, title: str) -> str:
         f"<rect x='{column * CELL}' y='{row * CELL}' width='{CELL}' height='{CELL}' "
         f"fill='{RED if value > 0 else BLUE}' fill-opacity='{strength:.2f}'>"
         f"<title>{title}</title></rect>"
-    )
-
-
-def _svg(width: int, height: int, label: str, content: str) -> str:
-    return (
-        f"<svg viewBox='0 0 {width} {height}' width='{width}' height='{height}' role='img' "
-        f"aria-label='{label}' font-size='10' font-family='sans-serif' fill='currentColor'>"
-        f"{content}</svg>"
     )

@@ -170,13 +170,12 @@ def _materials(folder: Path, before: CaptureResult, after: CaptureResult) -> str
 
 def _row(trial: Trial, found: Diagnosis) -> str:
     named = trial in found.named
-    significance = trial.gain / max(trial.error, 1e-9)
-    width = int(np.clip(12 * significance, 0, 160))
+    width = int(np.clip(12 * trial.ratio, 0, 160))
     meaning = escape(found.sentence(trial)) if trial in found.reported else ""
     meaning += f"<br><b>{escape(ACTIONS[trial.effect.cause])}</b>" if named else ""
     style = "background:#2f6fb0" if named else "background:#bbb"
     return (
-        f"<tr><th>{escape(trial.effect.cause)}</th><td>{significance:.1f}</td><td>"
+        f"<tr><th>{escape(trial.effect.cause)}</th><td>{trial.ratio:.1f}</td><td>"
         f"<div style='height:10px;width:{width}px;{style}'></div></td>"
         f"<td>{meaning}</td></tr>"
     )

@@ -106,7 +106,7 @@ def _assessment(assessment: Assessment) -> dict[str, Any]:
         },
         "sensor": {
             "mean": _cells(sensor.mean),
-            "standard_error": _cells(np.where(np.isfinite(sensor.mean), sensor.error, np.nan)),
+            "standard_error": _cells(sensor.error),
             "half_width": sensor.width,
             "half_height": sensor.height,
             "significant": sensor.significant,

@@ -7,6 +7,7 @@ from html import escape
 import numpy as np
 
 from ..diagnose.selection.residual_trends import Trend
+from .svg_element import svg_element
 
 WIDTH, HEIGHT = 280, 150
 LEFT, RIGHT, TOP, BOTTOM = 40, 8, 20, 24
@@ -47,14 +48,13 @@ def trend_chart(name: str, unit: str, before: Trend, after: Trend | None, most: 
                 f"y2='{y(m + 2 * e):.1f}' stroke='{colour}' stroke-opacity='.45'/>"
             )
     label = escape(name + (f" ({unit})" if unit else ""))
-    return (
-        f"<svg viewBox='0 0 {WIDTH} {HEIGHT}' width='{WIDTH}' height='{HEIGHT}' role='img' "
-        f"aria-label='{label}' font-size='10' font-family='sans-serif' fill='currentColor'>"
+    return svg_element(
+        WIDTH, HEIGHT, label,
         f"<text x='{LEFT}' y='12' font-weight='bold'>{label}</text>"
         f"<text x='{LEFT - 4}' y='{y(most) + 4:.0f}' text-anchor='end'>{100 * most:+.0f} %</text>"
         f"<text x='{LEFT - 4}' y='{y(-most) + 4:.0f}' text-anchor='end'>{-100 * most:+.0f} %</text>"
         f"<text x='{LEFT - 4}' y='{y(0) + 4:.0f}' text-anchor='end'>0</text>"
         f"<text x='{LEFT}' y='{HEIGHT - 6}'>{low:.3g}</text>"
         f"<text x='{WIDTH - RIGHT}' y='{HEIGHT - 6}' text-anchor='end'>{high:.3g}</text>"
-        f"{''.join(lines)}</svg>"
-    )
+        f"{''.join(lines)}",
+    )  # fmt: skip

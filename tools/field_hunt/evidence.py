@@ -92,7 +92,7 @@ def _print(path: Path, title: str) -> Gains:
     gained: Gains = {}
     for one in evidence_for(projected, effects):
         step, cells = one.step, []
-        gained[one.cause] = 1e3 * one.trial.density, one.trial.gain / max(one.trial.error, 1e-9)
+        gained[one.cause] = 1e3 * one.trial.density, one.trial.ratio
         for group in groups:
             gains = step.held_out(group)
             error = max(standard_error_of_sum(gains), 1e-9)

@@ -11,21 +11,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..selection.weighted_means import weighted_means
 from ..solver.model_fit import ModelFit
 
 Grid = NDArray[np.float64]
 
 ACROSS, DOWN = 24, 16  # cells of the sensor
 MIN_PIXELS = 20  # in a cell
-MAX_WEIGHT = 100.0  # of a pixel, relative to the median
 
 
 @dataclass(frozen=True)
 class SensorResiduals:
     """mean: (DOWN, ACROSS) photo minus prediction relative to the prediction, weighted by the
-    inverse variance of pixels; NaN in cells without pixels. error: (DOWN, ACROSS) standard errors,
-    with held-out regions as independent units. width, height: half sizes of the grid, 1 half the
-    photo's diagonal."""
+    inverse variance of pixels. error: (DOWN, ACROSS) standard errors, with held-out regions as
+    independent units. Both NaN in cells with few pixels. width, height: half sizes of the grid, 1
+    half the photo's diagonal."""
 
     mean: Grid
     error: Grid
@@ -46,22 +46,11 @@ class SensorResiduals:
         good = np.isfinite(fit.deviation).all(axis=1) & (shown.mean(axis=1) > 0)
         width, height = (max(float(np.abs(v).max(initial=0.0)), 1e-9) for v in (pixels.x, pixels.y))
         cell = _cells(pixels.x / width, ACROSS) + ACROSS * _cells(pixels.y / height, DOWN)
-        ratio = shown[good] / fit.deviation[good]
-        weight = np.sum(ratio**2, axis=1)
-        pull = np.sum(ratio * fit.residual[good], axis=1)
-        limit = MAX_WEIGHT * np.median(weight) if len(weight) else 1.0
-        pull, weight = pull * np.minimum(1, limit / weight), np.minimum(weight, limit)
-        where, block, count = cell[good], pixels.block[good], ACROSS * DOWN
-        total, sums = (np.bincount(where, v, count) for v in (weight, pull))
-        enough = np.bincount(where, minlength=count) >= MIN_PIXELS
-        mean = np.where(enough, sums / np.maximum(total, 1e-30), np.nan)
-        _, part = np.unique(np.stack([where, block]), axis=1, return_inverse=True)
-        away = np.bincount(part.ravel(), pull - np.nan_to_num(mean)[where] * weight)
-        owner = np.zeros(len(away), np.intp)
-        owner[part.ravel()] = where
-        error = np.sqrt(np.bincount(owner, away**2, count)) / np.maximum(total, 1e-30)
+        residual = fit.residual * fit.deviation  # of the model fit: in units of the deviation
+        each = residual[good], shown[good], fit.deviation[good], pixels.block[good]
+        found = weighted_means(cell[good], ACROSS * DOWN, MIN_PIXELS, *each)
         shape = DOWN, ACROSS
-        return cls(mean.reshape(shape), error.reshape(shape), width, height)
+        return cls(found.mean.reshape(shape), found.error.reshape(shape), width, height)
 
 
 def _cells(at: NDArray[np.floating], count: int) -> NDArray[np.intp]:

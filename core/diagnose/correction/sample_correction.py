@@ -22,7 +22,7 @@ from ..forward.diagnosis_context import DiagnosisContext, NearestPixels
 from ..forward.pixels import Pixels
 from ..forward.shading_state import ShadingState
 from ..solver.model import Model
-from ..solver.scaled_brdfs import scaled_brdfs
+from ..solver.scaled_brdfs import with_scaled_brdfs
 from .clipping_imputation import impute_clipped, plateau_of
 from .highlight_deconvolution import BlurredPhoto, HighlightBlur, blurred_photo, widens_highlights
 from .sample_pixels import nearest
@@ -56,14 +56,15 @@ def correct_samples(
 
     pixels: of the samples (sample_pixels.py). model: with the effects, at its optimum. context: of
     the diagnosis. tilt: radians along each tangent, standard deviation of the scan's normals."""
-    parts, wide, brdfs = [], list[BlurredPhoto](), scaled_brdfs(model)
+    parts, wide = [], list[BlurredPhoto]()
+    model = with_scaled_brdfs(model)  # once: the BRDFs keep tables of their values
     blur = widens_highlights(model)
     near = nearest(pixels, context.pixels, context.size)
     done = 0
     for rows in _chunks(pixels, near, context):
         yield done / len(pixels)
         done += len(rows)
-        here = replace(context, pixels=pixels.select(rows), brdfs=brdfs, ray_count=RAY_COUNT)
+        here = replace(context, pixels=pixels.select(rows), brdfs=model.brdfs, ray_count=RAY_COUNT)
         local = model_at_pixels(model, here, near.select(rows))
         *part, good = _correct_chunk(table.select(rows), local, tilt)
         parts.append(part)
@@ -99,7 +100,7 @@ def model_at_pixels(model: Model, context: DiagnosisContext, near: NearestPixels
         if local is not None:
             effects.append(local)
             x.append(effect.identified(values))
-    return Model(context.pixels, scaled_brdfs(model), tuple(effects), tuple(x))
+    return Model(context.pixels, model.brdfs, tuple(effects), tuple(x))
 
 
 def _correct_chunk(

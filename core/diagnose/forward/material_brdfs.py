@@ -81,7 +81,7 @@ class MaterialBRDFs:
 
     def rows(self, angles: Angles) -> Array:
         """(n, k) rows Q̂ of the basis. The derivative of ρ by the coefficients is
-        (ρ + ε / cosMap) Q̂."""
+        (ρ + scale · ε / cosMap) Q̂."""
         return self.basis.rows(angles, self.coefficients.shape[2])[1]
 
     def _offset(self, state: ShadingState) -> Array:

@@ -13,6 +13,7 @@ from ...concurrency.ordered_map import ordered_map
 from ..effects.base.capabilities import JudgedByPixel
 from ..effects.base.effect import Effect
 from ..effects.base.patch_effect import PatchEffect
+from ..effects.camera_pose import CameraPose
 from .one_step import OneStep, ProjectedBaseline, one_step
 from .trial import Trial
 
@@ -31,8 +32,10 @@ class Evidence:
 
 
 def has_one_step(effect: Effect) -> bool:
-    """Whether a step about its absence describes an effect: not for spots, plateaus and patches."""
-    return len(effect.parameters) > 0 and not isinstance(effect, PatchEffect | JudgedByPixel)
+    """Whether a step about its absence is evidence for an effect: not for spots, plateaus and
+    patches, nor for poses, whose errors the baseline has."""
+    without = PatchEffect | JudgedByPixel | CameraPose
+    return len(effect.parameters) > 0 and not isinstance(effect, without)
 
 
 def evidence_for(
@@ -46,8 +49,7 @@ def evidence_for(
         gains = step.held_out(region)
         variance = np.diag(step.covariance).copy()
         trial = Trial(step.effect, step.x, variance, gains, values, step.change, 1.0)
-        ratio = trial.gain / max(trial.error, 1e-9)
-        return Evidence(step, replace(trial, p_value=_p_value(ratio, len(effects))))
+        return Evidence(step, replace(trial, p_value=_p_value(trial.ratio, len(effects))))
 
     found = ordered_map(pool, of, effects, ahead=2)
     return sorted(found, key=lambda one: -one.trial.gain)

@@ -118,8 +118,7 @@ def _replaces(simple: Evidence, other: Evidence) -> bool:
 def _has_sufficient_evidence(trial: Trial) -> bool:
     enough = trial.density > min_gain(trial.effect.cause)
     sure = trial.density > NAT * STRONG or trial.effect.cause in UNRIVALLED
-    ratio = MIN_RATIOS[sure]
-    return enough and trial.gain > ratio * trial.error
+    return enough and trial.ratio > MIN_RATIOS[sure]
 
 
 def _has_rival(best: Evidence, strong: Sequence[Evidence]) -> bool:

@@ -12,6 +12,7 @@ from ..forward.diagnosis_context import DiagnosisContext
 from ..forward.pixels import Pixels
 from ..forward.shading_state import ShadingState
 from ..forward.tangent_directions import tangential_axes, tangential_half_vector
+from .weighted_means import weighted_means
 
 Array = NDArray[np.floating]
 
@@ -105,20 +106,9 @@ def trend(
         return Trend(np.zeros(0), np.zeros(0), np.zeros(0))
     edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
     which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
-    weight = np.sum(shown[known] ** 2 / deviation[known] ** 2, axis=1)
-    pull = np.sum(shown[known] * residual[known] / deviation[known] ** 2, axis=1)
-    # the weight of a pixel is limited to 100 times the median, so that no outlier makes the trend
-    limit = 100 * np.median(weight)
-    pull, weight = pull * np.minimum(1, limit / weight), np.minimum(weight, limit)
-    at, mean, error = [], [], []
-    for k in range(max(len(edges) - 1, 1)):
-        rows = np.flatnonzero(which == k)
-        if len(rows) < MIN_PIXELS:
-            continue
-        total = weight[rows].sum()
-        middle = pull[rows].sum() / total
-        by_block = np.bincount(block[known][rows], pull[rows] - middle * weight[rows])
-        at.append(float(np.median(values[rows])))
-        mean.append(float(middle))
-        error.append(float(np.sqrt(np.sum(by_block**2)) / total))
-    return Trend(np.array(at), np.array(mean), np.array(error))
+    bins = max(len(edges) - 1, 1)
+    each = residual[known], shown[known], deviation[known], block[known]
+    means = weighted_means(which, bins, MIN_PIXELS, *each)
+    used = np.flatnonzero(np.isfinite(means.mean))
+    at = np.array([np.median(values[which == k]) for k in used])
+    return Trend(at, means.mean[used], means.error[used])

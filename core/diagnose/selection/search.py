@@ -15,7 +15,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from ..effects.base.effect import Effect
-from ..effects.camera_pose import CameraPose
 from ..effects.cast_shadow import CastShadow
 from ..effects.clipping import Clipping
 from ..forward.diagnosis_context import DiagnosisContext
@@ -60,7 +59,7 @@ def search(
     rounds: list[tuple[Trial, ...]] = []
     remaining = list(effects)
     for turn in range(MAX_ROUNDS):
-        known = {*now.model.causes, CameraPose.cause}  # the baseline has errors of the poses
+        known = now.model.causes
         stepping = [e for e in remaining if has_one_step(e) and e.cause not in known]
         evidence = evidence_for(ProjectedBaseline.of(now), stepping, pool)
         yield 0.5 * (ROUND_STARTS[turn] + ROUND_STARTS[turn + 1])
@@ -149,7 +148,7 @@ def _contradicted(
         f"regions of {' and '.join(materials[k] for k in t.contradicted_by)} are predicted worse."
         for trials in rounds
         for t in trials
-        if t.contradicted_by and t.gain > MIN_STANDARD_ERRORS * t.error
+        if t.contradicted_by and t.ratio > MIN_STANDARD_ERRORS
         if t.effect.cause not in accepted
     }
 

@@ -59,11 +59,16 @@ class Trial:
         return standard_error_of_sum(self.by_region)
 
     @property
+    def ratio(self) -> float:
+        """The gain in standard errors."""
+        return self.gain / max(self.error, 1e-9)
+
+    @property
     def is_accepted(self) -> bool:
         """Whether a joint fit confirms the effect: it is more than chance, large enough to be
         reported, and contradicted by no material."""
         return (
-            self.gain > MIN_STANDARD_ERRORS * self.error
+            self.ratio > MIN_STANDARD_ERRORS
             and self.change > MIN_RELATIVE_CHANGE
             and self.effect.is_relevant(self.identified)
             and not self.contradicted_by

@@ -64,11 +64,12 @@ class Model:
         )
 
     def without_effect(self, cause: str) -> Model:
-        """The model without one of its effects; none is frozen."""
+        """The model without one of its effects."""
         place = self.place_of(cause)
         kept = [k for k in range(len(self.effects)) if k != place]
         effects, x = tuple(self.effects[k] for k in kept), tuple(self.x[k] for k in kept)
-        return replace(self, effects=effects, x=x)
+        frozen = frozenset(kept.index(k) for k in self.frozen if k != place)
+        return replace(self, effects=effects, x=x, frozen=frozen)
 
     def with_patches_frozen(self) -> Model:
         """The parameters of patches are no longer fitted."""

@@ -19,3 +19,10 @@ def scaled_brdfs(model: Model) -> MaterialBRDFs:
     found = np.exp(model.parameters_of(MaterialScale.cause))
     factor[: len(found)] = found
     return replace(model.brdfs, scale=factor)
+
+
+def with_scaled_brdfs(model: Model) -> Model:
+    """The same model, with the factors of MaterialScale in its BRDFs instead of in an effect."""
+    if MaterialScale.cause not in model.causes:
+        return model
+    return replace(model.without_effect(MaterialScale.cause), brdfs=scaled_brdfs(model))
