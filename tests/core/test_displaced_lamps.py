@@ -61,6 +61,15 @@ def one_light(context: DiagnosisContext) -> DiagnosisContext:
     return replace(context, light=np.zeros(PHOTOS, int), lights=("flash",))
 
 
+@pytest.mark.parametrize(("nearness", "named"), [(0.0, False), (0.02, False), (0.06, True)])
+def test_a_lamp_that_lights_the_object_evenly_is_not_near(nearness: float, named: bool) -> None:
+    effect = NearLight.of(lit_ball(1))
+    assert effect is not None
+    x = np.zeros(len(effect.parameters))
+    x[::4], x[1::4] = nearness, 0.05
+    assert effect.is_relevant(x) == named
+
+
 def test_a_flash_beside_the_lens_is_found_with_its_place():
     """Six cameras around the ball; the flash is stated at the lens."""
     context = one_light(lit_ball(3))

@@ -20,6 +20,7 @@ NEARNESS_SCALE = 0.3  # size of the object / distance, standard deviation of the
 MIN_DISTANCE = 1.2  # of the lamp from the centre, in sizes: it is not inside the object
 # radians and ln gain, of the prior: the light may have been measured away from the centre
 ANGLE_SCALE, GAIN_SCALE = np.radians(1.0), 0.05
+MIN_NEARNESS = 0.03  # below it, the light varies by less than 6 % over the object
 EACH = 4  # parameters of a light
 START = 0.15  # of the nearness: away from its bound 0, where steps would be cut short
 
@@ -78,6 +79,9 @@ class NearLight(ChangesShading, TracesRays):
     def nearness(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(lights,) size of the object divided by the distance of the lamp."""
         return x[::EACH]
+
+    def is_relevant(self, x: np.ndarray) -> bool:
+        return float(self.nearness(x).max()) > MIN_NEARNESS
 
     def with_rays(self, context: DiagnosisContext, x: np.ndarray) -> NearLight:
         return replace(self, shadows=DisplacedShadows.of(context, replace(self, shadows=None), x))

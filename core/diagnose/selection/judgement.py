@@ -71,8 +71,8 @@ def overlap(one: Evidence, other: Evidence) -> float:
 
 
 def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
-    """The effects that are to be fitted jointly, best first; empty: none is convincing. evidence:
-    best first."""
+    """The effects that are to be fitted jointly, best first; empty: none is convincing. An effect
+    that has others as a part is fitted beside them. evidence: best first."""
     strong = [one for one in evidence if _has_sufficient_evidence(one.trial)]
     strong = [one for one in strong if not _is_composed(one, evidence)]
     if not strong:
@@ -82,8 +82,10 @@ def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
         return []
     close = [one for one in strong if one.trial.gain > CLOSE * strong[0].trial.gain]
     kept = [one for one in close if not any(_replaces(other, one) for other in close)]
-    more = [one for one in strong if one.cause in UNRIVALLED and one not in close]
-    return [*kept[:MAX_CONTENDERS], *more]
+    kept = kept[:MAX_CONTENDERS]
+    also = {*UNRIVALLED, *(part for one in kept for part in PARTS.get(one.cause, ()))}
+    also -= {one.cause for one in kept}
+    return [*kept, *(one for one in strong if one.cause in also)]
 
 
 def best_of(trials: Sequence[Trial]) -> Trial | None:
