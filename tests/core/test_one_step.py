@@ -17,6 +17,9 @@ from patina.core.diagnose.nuisances.surface_variation import SurfaceVariation
 from patina.core.diagnose.selection.baseline import USUAL_SCALES, fit_baseline
 from patina.core.diagnose.selection.one_step import ProjectedBaseline, one_step
 from patina.core.diagnose.solver.gauss_newton import fit
+from patina.core.diagnose.solver.jacobian import jacobian_of
+from patina.core.diagnose.solver.model import Model
+from patina.core.diagnose.solver.model_fit import ModelFit
 from tests.make_lit_ball import GLOSSY, changed, lit_ball
 
 pytestmark = pytest.mark.slow
@@ -79,6 +82,17 @@ def test_the_baseline_cannot_imitate_what_is_left(drifted):
     left = one_step(projected, LightIntensity.of(context)).left
     again = projected.project(left)
     assert np.linalg.norm(again - left) < 0.15 * np.linalg.norm(left)
+
+
+def test_derivatives_of_a_pixel_in_the_dark_are_finite():
+    """Its radiance is so small that a thousandth of it is rounded to 0."""
+    context = lit_ball(2)
+    irradiance = context.pixels.irradiance.copy()
+    irradiance[0] = 1e-43
+    context = replace(context, pixels=replace(context.pixels, irradiance=irradiance))
+    fitted = ModelFit.of(Model(context.pixels, context.brdfs), np.full((len(irradiance), 3), 0.01))
+    assert 0 < fitted.predicted[0].max() < 1e-40
+    assert np.isfinite(jacobian_of(fitted).rho).all()
 
 
 def test_scales_of_the_surface_stay_usual():

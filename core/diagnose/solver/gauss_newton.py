@@ -27,7 +27,7 @@ def fit(model: Model, deviation: Array, steps: int = MAX_STEPS) -> ModelFit:
         found = _stepped(now)
         gained = now.total_cost - found.total_cost
         now = found if gained > 0 else now
-        if gained < CONVERGED * max(now.cost, 1.0):
+        if not gained >= CONVERGED * max(now.cost, 1.0):  # ends where the cost is not a number
             break
     return now
 

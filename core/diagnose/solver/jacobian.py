@@ -21,6 +21,7 @@ Array = NDArray[np.floating]
 
 LAMP_PARTS_FOR_ROWS = 3  # parts of a lamp whose basis rows stand for all: rows vary slowly
 RELATIVE_STEP = 1e-3  # of the radiance, for the derivative of the camera response
+DARKEST = 1e-20  # radiance, of any unit; the step of a darker pixel could be rounded to 0
 
 
 @dataclass(frozen=True)
@@ -67,9 +68,10 @@ def jacobian_of(fit: ModelFit) -> Jacobian:
     entering = model.entering(light.reflected, state)
     recorded = model.recorded(entering, state)
     raised = (1 + RELATIVE_STEP) * entering
-    rise = np.where(entering > 0, RELATIVE_STEP * entering, 1)
+    bright = entering > DARKEST
+    rise = np.where(bright, RELATIVE_STEP * entering, 1)
     camera = (model.recorded(raised, state) - recorded) / rise
-    camera = np.where(entering > 0, camera, 1.0)
+    camera = np.where(bright, camera, 1.0)
     per_log = (light.log_derivative * camera / deviation).astype(np.float32)
 
     def by_slot(place: int) -> list[Array]:
