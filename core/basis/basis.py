@@ -18,6 +18,7 @@ from . import mapping
 from .grid import AngleGrid
 
 CHUNK = 1 << 17  # directions evaluated at a time
+MAX_CACHED_COPIES = 4  # of the nodes' first columns, up to 50 MB each
 Progress = Callable[[str, float], None]
 
 
@@ -70,13 +71,30 @@ class Basis:
         flat = self.components.reshape(self.count, -1)
         return np.ascontiguousarray(np.concatenate([centre, flat]).T.astype(np.float32))
 
+    @cached_property
+    def _leading(self) -> dict[int, NDArray[np.float32]]:
+        """Cache: number of columns → the first columns of nodes, contiguous."""
+        return {}
+
+    def leading_nodes(self, columns: int) -> NDArray[np.float32]:
+        """(grid.size, columns) the first columns of nodes, contiguous: the centre, then the first
+        components."""
+        if columns == self.nodes.shape[1]:
+            return self.nodes
+        found = self._leading.get(columns)
+        if found is None:
+            if len(self._leading) >= MAX_CACHED_COPIES:
+                self._leading.clear()
+            found = self._leading[columns] = np.ascontiguousarray(self.nodes[:, :columns])
+        return found
+
     def rows(
         self, angles: Angles, count: int | None = None
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Observed rows of the basis, equation (4): (centre (n,), Q̂ (n, count)) at n directions,
         with ln(ρ·cosMap + ε) = centre + Q̂ c."""
         k = self.count if count is None else min(count, self.count)
-        values = self.grid.interpolate(self.nodes[:, : 1 + k], angles)
+        values = self.grid.interpolate(self.leading_nodes(1 + k), angles)
         return values[:, 0], values[:, 1:]
 
     def mapped(self, rho: NDArray[np.floating], angles: Angles) -> NDArray[np.floating]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from ..angles import Angles
 
@@ -69,7 +70,8 @@ class AngleGrid:
     def interpolate(self, node_values: NDArray[np.float32], angles: Angles) -> NDArray[np.float32]:
         """Values (n, c) at n directions from node_values (size, c)."""
         index, weight = self.corners(angles)
-        out = np.zeros((index.shape[1], node_values.shape[1]), np.float32)
-        for corner in range(8):
-            out += weight[corner][:, None] * node_values[index[corner]]
-        return out
+        count = index.shape[1]
+        starts = np.arange(count + 1, dtype=np.int32) * len(index)
+        # a sparse product reads each node once and needs no array beside the result
+        matrix = csr_array((weight.T.ravel(), index.T.ravel(), starts), shape=(count, self.size))
+        return np.asarray(matrix @ node_values, np.float32)

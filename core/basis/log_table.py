@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import Angles
+from ..linear_algebra import product
 from . import mapping
 from .basis import Basis
 from .grid import AngleGrid
@@ -31,8 +32,8 @@ class LogTable:
         """The table of c channels with coefficients (c, k): x = Q c + µ, equation (3) of Ono et al.
         2019, at the nodes."""
         c = np.asarray(coefficients, np.float32)
-        nodes = basis.nodes
-        return LogTable(basis.grid, nodes[:, :1] + nodes[:, 1 : 1 + c.shape[1]] @ c.T)
+        weights = np.concatenate([np.ones((len(c), 1), np.float32), c], axis=1)
+        return LogTable(basis.grid, product(basis.leading_nodes(weights.shape[1]), weights.T))
 
     def grey(self) -> LogTable:
         """A table of one channel: the mean of ρ·cosMap + ε over the channels."""

@@ -72,7 +72,7 @@ def test_patch_normals_recover_bumps_a_few_patches_wide():
 def test_deep_bumps_are_named_as_unusual_normals_and_not_as_albedo():
     context, _ = bumpy(2, 0.5)
     baseline = fit_baseline(context, np.radians(0.2), 12)
-    found = with_unusual_normals(baseline.fitted)
+    found = with_unusual_normals(baseline.fitted, ScanQuality.of(baseline.fitted))
     (trial,) = unusual_causes(baseline.plain, found, ScanQuality.of(found))
     assert trial.effect.cause == "normal_error"
     assert ScanQuality.of(found).albedo < 0.08

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..effects.base.capabilities import RelatesDerivatives
+from ..effects.base.effect import Array
 from ..effects.base.parameters import Parameters
 from ..effects.camera_pose import CameraPose
 
@@ -13,7 +16,7 @@ USUAL_POSE_ERROR = 0.3  # pixels, RMS, of structure from motion
 
 
 @dataclass(frozen=True)
-class PoseJitter(CameraPose):
+class PoseJitter(CameraPose, RelatesDerivatives):
     """The same parameters as CameraPose, with the prior of a good reconstruction."""
 
     cause = "pose_jitter"
@@ -22,3 +25,8 @@ class PoseJitter(CameraPose):
     def parameters(self) -> Parameters:
         found = super().parameters
         return replace(found, deviation=np.full(len(found), USUAL_POSE_ERROR))
+
+    @property
+    def combined_slots(self) -> Mapping[int, Mapping[int, Array]]:
+        """A rotation shifts each pixel at a right angle to its place in the photo."""
+        return {2: {0: -self.y, 1: self.x}}

@@ -7,10 +7,12 @@ prior whose scales the photos determine (empirical Bayes). A cause is what impro
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..effects.base.capabilities import RelatesDerivatives
 from ..effects.base.effect import Array
 from ..effects.base.image_formation import AddsRadiance, ChangesShading
 from ..effects.base.parameters import Parameters
@@ -33,7 +35,7 @@ STEPS = (*(1e-3,) * 9, 5e-3)  # for difference quotients
 
 
 @dataclass(frozen=True)
-class SurfaceVariation(PatchEffect, ChangesShading, AddsRadiance):
+class SurfaceVariation(PatchEffect, ChangesShading, AddsRadiance, RelatesDerivatives):
     """Parameters of a patch: WAYS. received: (n, 3) irradiance on the surface."""
 
     frames: PatchFrames
@@ -69,6 +71,16 @@ class SurfaceVariation(PatchEffect, ChangesShading, AddsRadiance):
         return replace(
             alike, low=-bound, high=bound, step=np.tile(STEPS, count), deviation=self.deviation
         )
+
+    @property
+    def combined_slots(self) -> Mapping[int, Mapping[int, Array]]:
+        """A bend is a tilt that grows with the distance from the patch's centre."""
+        u, v = self.frames.place.T
+        return {2: {0: u}, 3: {0: v, 1: u}, 4: {1: v}}
+
+    @property
+    def slots_beside_lamp(self) -> frozenset[int]:
+        return frozenset(WAYS.index(colour) for colour in ALBEDO[1:])
 
     def shading(self, state: ShadingState, x: np.ndarray) -> ShadingState:
         first, second, *bends, more, _, _, _, gloss = self.at_patch(x).T

@@ -28,7 +28,7 @@ PRIOR_ROUNDS = 2
 RELAXATION = 2.0
 """Factor by which the logarithm of a step of expectation and maximisation is lengthened, since such
 steps are slow. They never go beyond the optimum, so a factor of up to 2 keeps them stable."""
-STEPS, STEPS_OF_ROUND = 4, 3
+STEPS, STEPS_OF_ROUND, LAST_STEPS = 4, 3, 8
 USUAL_SCALES = (*(np.radians(0.6),) * 2, *(np.radians(0.4),) * 3, 0.4, *(0.05,) * 3, 0.02)
 """Largest standard deviations of the priors (SurfaceVariation): normals of stereo meshes are off by
 0.8° in the median and by 3 to 4° at the 95th percentile, less in the mean over a patch; paint and
@@ -68,4 +68,5 @@ def fit_baseline(
         model = replace(model, brdfs=now.model.brdfs, x=now.model.x)
         deviation = rescaled_deviation(deviation, now.residual, now.predicted, context.pixels)
         now = fit(model, deviation, STEPS_OF_ROUND)
-    return Baseline(plain, now, scales)
+    # to the optimum: otherwise the steps of a joint fit would count as the gain of its effect
+    return Baseline(plain, fit(now.model, deviation, LAST_STEPS), scales)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ...statistics.student_t import robust_cost
 from ..effects.base.effect import Effect
+from ..nuisances.surface_variation import SurfaceVariation
 from ..solver.block_elimination import Step, solve
 from ..solver.jacobian import Jacobian, jacobian_of
 from ..solver.model_fit import ModelFit
@@ -32,7 +33,8 @@ MAX_VARIANCE_RATIO = 25.0  # of a parameter without a fold; beyond, the fold alo
 @dataclass(frozen=True)
 class HeldOutPrediction:
     """residual: (n, 3) of every pixel, predicted without its region's fold, in units of its
-    standard deviation. cost: (n,) nats. variance: of the parameters of each effect."""
+    standard deviation. cost: (n,) nats. variance: of the parameters of each effect, empty for the
+    baseline's patches."""
 
     residual: Array
     cost: Array
@@ -133,7 +135,9 @@ def _steps_without_folds(
     ]
     whole = reduce(NormalEquations.plus, parts)
     others = [solve(whole.plus(part, -1.0), fitted) for part in parts]
-    return solve(whole, fitted, spread=True), others, parts
+    # errors of the baseline's patches take longest, and only parameter_variances has a use for them
+    judged = not isinstance(fitted.model.patch_effect, SurfaceVariation)
+    return solve(whole, fitted, spread=judged), others, parts
 
 
 def parameter_variances(fitted: ModelFit) -> tuple[Array, ...]:

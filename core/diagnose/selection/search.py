@@ -14,6 +14,7 @@ from collections.abc import Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+from ...concurrency.ordered_map import ordered_map
 from ..effects.base.effect import Effect
 from ..effects.cast_shadow import CastShadow
 from ..effects.clipping import Clipping
@@ -64,8 +65,7 @@ def search(
         evidence = evidence_for(ProjectedBaseline.of(now), stepping, pool)
         yield 0.5 * (ROUND_STARTS[turn] + ROUND_STARTS[turn + 1])
         without = held_out_predictions(now)
-        found = [*_spots_and_plateaus(now, without, remaining, context)]
-        found += _confirmed(now, without, evidence, context)
+        found = _tried(now, without, evidence, remaining, context, pool)
         fitted = {trial.effect.cause for trial in found}
         steps = (one.trial for one in evidence if one.cause not in fitted)
         rounds.append((*found, *steps))
@@ -85,11 +85,10 @@ def search(
         accepted.append(best)
         now = best.fitted
         remaining = [e for e in remaining if e.cause != best.effect.cause]
-    now, posed = with_unusual_poses(with_unusual_normals(now), context)
+    now, quality, posed = _with_unusual_scan(now, context)
     first = predict_held_out_regions(before)
     held_out = first, first if now is before else predict_held_out_regions(now)
     kept = sorted(_in_final_fit(accepted, now, held_out[1].variance), key=lambda trial: -trial.gain)
-    quality = ScanQuality.of(now)
     kept += posed
     kept += unusual_causes(baseline.plain, now, quality)
     expected = before.deviation
@@ -100,41 +99,57 @@ def search(
     )  # fmt: skip
 
 
-def _confirmed(
+def _with_unusual_scan(
+    now: ModelFit, context: DiagnosisContext
+) -> tuple[ModelFit, ScanQuality, list[Trial]]:
+    """The joint fit with errors of the scan that are larger than usual, the scan's quality in that
+    fit, and the trial of the camera poses where these are to be named."""
+    quality = ScanQuality.of(now)
+    normals = with_unusual_normals(now, quality)
+    quality = quality if normals is now else ScanQuality.of(normals)
+    found, posed = with_unusual_poses(normals, quality, context)
+    return found, quality if found is normals else ScanQuality.of(found), posed
+
+
+def _tried(
     now: ModelFit,
     without: HeldOutPredictions,
     evidence: Sequence[Evidence],
+    remaining: Sequence[Effect],
     context: DiagnosisContext,
+    pool: ThreadPoolExecutor | None,
 ) -> list[Trial]:
-    """The joint fit of the effect that the evidence supports; empty if there is none."""
-    tried, trials = contenders(evidence), []
-    for one in tried:
+    """Joint fits of spots and plateaus, and of the effect that the evidence supports best."""
+    spots = _spots_and_plateaus(now, remaining, context)
+    supported = contenders(evidence)
+
+    def trial_of(one: Effect | Evidence) -> Trial:
+        if isinstance(one, Effect):
+            return try_effect(now, without, one)
         trial = try_effect(now, without, one.step.effect, one.trial.p_value)
-        if len(tried) > 1:
-            trial = try_rebuilt(now, without, trial, context)
-        trials.append(trial)
+        return try_rebuilt(now, without, trial, context) if len(supported) > 1 else trial
+
+    trials = list(ordered_map(pool, trial_of, [*spots, *supported], ahead=2))
+    found, trials = trials[: len(spots)], trials[len(spots) :]
     best = best_of(trials)
-    if best is None or best.gain < MIN_CONFIRMED * tried[0].trial.gain:
-        return trials
+    if best is None or best.gain < MIN_CONFIRMED * supported[0].trial.gain:
+        return [*found, *trials]
     ties = best.ties
-    best = try_rebuilt(now, without, best, context) if len(tried) == 1 else best
-    return [replace(try_with_rays(now, without, best, context), ties=ties)]
+    best = try_rebuilt(now, without, best, context) if len(supported) == 1 else best
+    return [*found, replace(try_with_rays(now, without, best, context), ties=ties)]
 
 
 def _spots_and_plateaus(
-    now: ModelFit,
-    without: HeldOutPredictions,
-    remaining: Sequence[Effect],
-    context: DiagnosisContext,
-) -> list[Trial]:
-    """Joint fits of shadows and clipped highlights, where the photos show signs of them."""
+    now: ModelFit, remaining: Sequence[Effect], context: DiagnosisContext
+) -> list[Effect]:
+    """Shadows and clipped highlights, where the photos show signs of them."""
     wanted = {effect.cause for effect in remaining}
     shadows = CastShadow.in_residual(context, now.predicted, now.residual)
     found: list[Effect] = [] if shadows is None else [shadows]
     for effect in remaining:
         if isinstance(effect, Clipping) and effect.shows_plateau(now.predicted, now.deviation):
             found.append(effect)
-    return [try_effect(now, without, effect) for effect in found if effect.cause in wanted]
+    return [effect for effect in found if effect.cause in wanted]
 
 
 def _contradicted(

@@ -43,14 +43,13 @@ LIT, DARKEST = 0.2, 0.05  # of the 90th percentile of irradiance; smallest facto
 SEEDS, ROUNDS = 5, 30  # patches from which groups are grown, and steps of that
 
 
-def with_unusual_normals(now: ModelFit) -> ModelFit:
+def with_unusual_normals(now: ModelFit, quality: ScanQuality) -> ModelFit:
     """The joint fit with normals that may be far off; unchanged where they are as usual. It is done
     with the accepted effects in the model: patches that are all tilted would explain a wrong
-    light direction."""
+    light direction. quality: of the scan in this fit."""
     model = now.model
     place, effect = model.patch_place, model.patch_effect
-    normals = ScanQuality.of(now).normals
-    if normals is None or normals < UNUSUAL_NORMALS or place is None:
+    if quality.normals is None or quality.normals < UNUSUAL_NORMALS or place is None:
         return now
     for _ in range(PRIOR_ROUNDS):
         assert isinstance(effect, SurfaceVariation)
@@ -60,10 +59,12 @@ def with_unusual_normals(now: ModelFit) -> ModelFit:
     return now
 
 
-def with_unusual_poses(now: ModelFit, context: DiagnosisContext) -> tuple[ModelFit, list[Trial]]:
+def with_unusual_poses(
+    now: ModelFit, quality: ScanQuality, context: DiagnosisContext
+) -> tuple[ModelFit, list[Trial]]:
     """The joint fit with camera poses that may be far off, and the trial of these; unchanged where
-    the poses are as usual."""
-    if ScanQuality.of(now).poses < UNUSUAL_POSES:
+    the poses are as usual. quality: of the scan in this fit."""
+    if quality.poses < UNUSUAL_POSES:
         return now, []
     exact = fit(now.model.without_effect(PoseJitter.cause), now.deviation, STEPS)
     without = held_out_predictions(exact)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...linear_algebra import row_gram, solve_positive
 from ..effects.base.parameters import Parameters
 from .model_fit import ModelFit
 from .normal_equations import NormalEquations
@@ -46,7 +47,7 @@ class EliminatedBlocks:
         found = []
         for index, block in enumerate(blocks.reshape(-1, k, k)):
             rows = slice(k * index, k * index + k)
-            found.append(np.linalg.solve(block + np.diag(1 / variance), columns[rows]))
+            found.append(solve_positive(block + np.diag(1 / variance), columns[rows]))
         return cls(tuple(found))
 
     def schur_complement(self, matrix: Array, coupling: Array, columns: slice | int) -> Array:
@@ -79,16 +80,15 @@ def dense_matrix(equations: NormalEquations, fit: ModelFit) -> Array:
 def times_blocks(rows: Array, blocks: Array) -> Array:
     """(r, P · e) rows (r, P · e) times blocks (P, e, e)."""
     count, e, _ = blocks.shape
-    each = np.einsum("spe,pef->spf", rows.reshape(-1, count, e), blocks)
-    return np.asarray(each.reshape(len(rows), -1))
+    each = rows.reshape(-1, count, e).transpose(1, 0, 2) @ blocks
+    return np.asarray(each.transpose(1, 0, 2).reshape(len(rows), -1))
 
 
 def projected_squares(rows: Array, blocks: Array) -> Array:
     """(r, r) rows · blocks · rowsᵀ for rows (r, P · e) and symmetric positive definite blocks
     (P, e, e). By their roots, since a product of a matrix with its own transpose takes half the
     time."""
-    half = times_blocks(rows, np.linalg.cholesky(blocks))
-    return np.asarray(half @ half.T)
+    return row_gram(times_blocks(rows, np.linalg.cholesky(blocks)))
 
 
 def solve(equations: NormalEquations, fit: ModelFit, spread: bool = False) -> Step:
@@ -129,20 +129,20 @@ def _solve_with_patches(equations: NormalEquations, fit: ModelFit, spread: bool)
     held = _at_bound(y, pull, parameters)
     side, pull = np.where(held, 0, side), np.where(held, 0, pull)
     inverse = np.linalg.inv(patch_blocks(equations.local, parameters.deviation, held))
-    projected = times_blocks(side, inverse)
     dense -= projected_squares(side, inverse)
-    right = right - projected @ pull
+    right = right - side @ _blockwise(inverse, pull)
     stuck = np.concatenate([np.zeros(size, bool), _held(fit, right[size:])])
     free = np.flatnonzero(~stuck)
     known = np.concatenate([right[:, None], np.eye(size + p)[:, size:]], axis=1)
     solved = np.zeros((size + p, 1 + p))
-    solved[free] = np.linalg.solve(dense[np.ix_(free, free)], known[free])
+    solved[free] = solve_positive(dense[np.ix_(free, free)], known[free])
     z, covariance = solved[:, 0], solved[size:, 1:]
-    local = _blockwise(inverse, pull) - projected.T @ z
+    local = _blockwise(inverse, pull - side.T @ z)
     variance = np.zeros(0)
     if spread:
+        projected = times_blocks(side, inverse)
         alone = np.einsum("pee->pe", inverse).ravel()
-        through = np.linalg.solve(dense[np.ix_(free, free)], projected[free])
+        through = solve_positive(dense[np.ix_(free, free)], projected[free])
         variance = np.where(held, 0, alone + np.einsum("sy,sy->y", projected[free], through))
     return Step(z[:size].reshape(m, 3, k), z[size:], np.where(held, 0, local), covariance, variance)
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from ..effects.base.capabilities import RelatesDerivatives
 from ..effects.base.image_formation import changes_lamp_light
 from .model import LampLight, Model
 from .model_fit import ModelFit
@@ -106,10 +107,19 @@ def effect_derivatives(model: Model, deviation: Array, place: int) -> Array:
 def _slot_derivatives(model: Model, deviation: Array, place: int, recorded: Array) -> list[Array]:
     """For each slot of an effect: (n, 3) derivatives with respect to the pixel's parameter, 0 where
     it has none. recorded: (n, 3) the prediction."""
-    parameters, found = model.effects[place].parameters, []
-    for slot in model.parameter_index(place).T:
-        step = parameters.step[slot[slot >= 0][0]] if (slot >= 0).any() else 1.0
-        stepped = _stepped(model, place, np.unique(slot[slot >= 0]), step)
+    effect, found = model.effects[place], list[Array]()
+    related = effect if isinstance(effect, RelatesDerivatives) else None
+    combined = {} if related is None else related.combined_slots
+    beside = frozenset[int]() if related is None else related.slots_beside_lamp
+    for number, slot in enumerate(model.parameter_index(place).T):
+        if number in combined:
+            parts = (factor[:, None] * found[k] for k, factor in combined[number].items())
+            found.append(np.sum(list(parts), axis=0, dtype=np.float32))
+            continue
+        mine = np.unique(slot[slot >= 0])
+        step = effect.parameters.step[mine[0]] if len(mine) else 1.0
+        of_lamp = changes_lamp_light(effect) and number not in beside
+        stepped = _stepped(model, place, mine, step, of_lamp)
         derivative = (stepped - recorded) / (step * deviation)
         found.append(np.where(slot[:, None] >= 0, derivative, 0).astype(np.float32))
     return found
@@ -128,11 +138,14 @@ def _basis_rows(model: Model, light: LampLight) -> Array:
     return np.asarray(q / total)
 
 
-def _stepped(model: Model, place: int, parameters: NDArray[np.intp], step: float) -> Array:
-    """(n, 3) the prediction with some parameters of one effect increased by a step."""
+def _stepped(
+    model: Model, place: int, parameters: NDArray[np.intp], step: float, of_lamp: bool
+) -> Array:
+    """(n, 3) the prediction with some parameters of one effect increased by a step. of_lamp:
+    whether they change the reflected light of the lamp."""
     x = list(model.x)
     x[place] = x[place].copy()
     x[place][parameters] += step
-    if changes_lamp_light(model.effects[place]):
+    if of_lamp:
         return model.predicted(x)
     return model.photographed(model.lamp_light.state, model.lamp_light.reflected, x)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, sparray
 
+from ...linear_algebra import gram, transposed_product
 from ...statistics.student_t import robust_weights
 from .jacobian import Jacobian
 from .model_fit import ModelFit
@@ -21,7 +22,7 @@ from .model_fit import ModelFit
 Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
 
-ROWS_PER_CHUNK = 4096  # as many as stay in a processor's cache
+ROWS_PER_CHUNK = 16384  # of pixels: 25 MB
 MAX_DENSE_COLUMNS = 48  # parameters; up to here a dense matrix is faster (measured)
 DENSE_FILL = 0.2  # filled fraction above which a dense matrix is always faster (measured)
 
@@ -63,14 +64,15 @@ class NormalEquations:
                 for c in range(3):
                     r = fit.residual[mine, c].astype(np.float32)
                     root = np.sqrt(robust_weights(r))
-                    a = q * (jacobian.rho[mine, c] * root)[:, None]
+                    # sums in double precision: eigenvalues of a block differ by a factor of 10¹⁰
+                    a = (q * (jacobian.rho[mine, c] * root)[:, None]).astype(np.float64)
                     r = r * root
-                    blocks[index, c] += a.T @ a
+                    blocks[index, c] += gram(a)
                     pull[index, c] += a.T @ r
                     x = _dense_if_faster(scaled(jacobian.matrix(mine, c), root)) if p else None
                     if x is not None:
                         own += _square(x)
-                        coupling[index, c] += (x.T @ a).T
+                        coupling[index, c] += _coupling(x, a)
                         own_pull += x.T @ r
                     if many:
                         y = scaled(jacobian.local_matrix(mine, c), root)
@@ -122,7 +124,12 @@ def _dense_if_faster(x: csr_array) -> Array | csr_array:
 
 def _square(x: Array | csr_array) -> Array:
     """(p, p) xᵀ x."""
-    return _dense(x.T @ x)
+    return _dense(x.T @ x) if isinstance(x, csr_array) else gram(x)
+
+
+def _coupling(x: Array | csr_array, a: Array) -> Array:
+    """(k, p) aᵀ x."""
+    return (x.T @ a).T if isinstance(x, csr_array) else transposed_product(a, x)
 
 
 def _dense(x: Array | sparray) -> Array:
