@@ -11,6 +11,7 @@ from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.concurrency.steps import drained
 from patina.core.concurrency.thread_pool import thread_pool
 from patina.core.diagnose.effects import EFFECTS
+from patina.core.diagnose.effects.base.capabilities import RelatesDerivatives
 from patina.core.diagnose.effects.base.image_formation import AddsRadiance, ChangesShading
 from patina.core.diagnose.effects.camera_response import CameraResponse
 from patina.core.diagnose.effects.cast_shadow import CastShadow
@@ -324,7 +325,7 @@ def test_held_out_regions_cost_more_than_fitted_ones():
 
 
 @dataclass(frozen=True)
-class DenseVariation(ChangesShading, AddsRadiance):
+class DenseVariation(ChangesShading, AddsRadiance, RelatesDerivatives):
     """The same effect without patches: solved as if every parameter could affect every pixel."""
 
     inner: SurfaceVariation
@@ -342,6 +343,14 @@ class DenseVariation(ChangesShading, AddsRadiance):
     @property
     def parameter_index(self):
         return self.inner.parameter_index
+
+    @property
+    def combined_slots(self):
+        return self.inner.combined_slots
+
+    @property
+    def slots_beside_lamp(self):
+        return self.inner.slots_beside_lamp
 
     def shading(self, state, x):
         return self.inner.shading(state, x)

@@ -116,7 +116,8 @@ def try_rebuilt(
 ) -> Trial:
     """The trial with the BRDFs of the fit that includes the effect, since the BRDFs of the fit
     without it have absorbed a part of it. In finer detail where that gains more. Unchanged where no
-    BRDF matters."""
+    BRDF matters, or where these BRDFs gain less: in directions that no photo shows they are less
+    reliable than those of the first fit."""
     if not isinstance(best.effect, BuiltFromBRDFs) or best.fitted is None:
         return best
     context = replace(context, brdfs=scaled_brdfs(best.fitted.model))
@@ -125,7 +126,7 @@ def try_rebuilt(
         plain = best.effect.of(context)
         effects += [] if plain is None else [plain]
     tried = [try_effect(now, before, effect, best.p_value, best.fitted) for effect in effects]
-    return max(tried, key=lambda trial: trial.gain)
+    return max((best, *tried), key=lambda trial: trial.gain)
 
 
 def try_with_rays(

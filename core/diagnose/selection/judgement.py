@@ -20,12 +20,11 @@ NAT = 1e-3  # the bars are thousandths of a nat a pixel and channel
 MIN_GAINS: Mapping[str, float] = {
     "camera_response": 25.0, "near_light": 15.0, "light_direction": 4.0, "light_intensity": 8.0,
     "flash_offset": 1.5, "vignetting": 4.5, "cast_shadow": 0.5, "ambient_light": 4.5,
-    "black_level": 4.5, "veiling_glare": 4.5, "environment_reflection": 4.5, "clipping": 20.0,
+    "black_level": 4.5, "veiling_glare": 4.5, "environment_reflection": 4.5,
 }  # fmt: skip
 DEFAULT_MIN_GAIN = 10.0
 """Of an effect that is accepted: above the largest gain in captures without it. A flaked paint
-looks like a tone curve; only lamps on the camera are insensitive to errors of the normals. Of
-clipping only joint fits are compared; where two runs of one end differs by 8."""
+looks like a tone curve; only lamps on the camera are insensitive to errors of the normals."""
 STRONG = 100.0  # a gain above this is accepted even if unrelated effects gain as well
 MIN_RATIOS = (3.5, 2.5)
 """Standard errors of the gain over regions: of a weak gain, and of a strong or an unrivalled one,
