@@ -74,7 +74,7 @@ def test_an_effect_is_hidden_in_real_photographs(shared, tmp_path):
 @pytest.mark.parametrize(
     ("cause", "seed"),
     [
-        ("none", 3), ("none", 14), ("flash_offset", 3), ("light_direction", 2),
+        ("none", 3), ("ambient_light", 1), ("flash_offset", 3), ("light_direction", 2),
         ("veiling_glare", 2), ("cast_shadow", 2),
     ],
 )  # fmt: skip

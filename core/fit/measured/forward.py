@@ -102,12 +102,13 @@ class CellModel:
     def predict(self, coefficients: NDArray[np.floating], jacobian: bool = True) -> Prediction:
         """Expected levels, and with ``jacobian`` their derivatives, for coefficients (3, k)."""
         k = coefficients.shape[1]
-        table = LogTable.of(self.basis, coefficients).values
+        table = np.ascontiguousarray(LogTable.of(self.basis, coefficients).values.T)
+        nodes = self.basis.leading_nodes(1 + k)  # contiguous: a sparse product would copy others
         m = len(self.cells)
         level, spread = np.empty((m, 3)), np.empty((m, 3))
         found: list[NDArray[np.float32]] = []
         for channel in range(3):
-            logs = np.einsum("mjc,mjc->mj", table[:, channel][self.index], self.weight)
+            logs = np.einsum("mjc,mjc->mj", table[channel][self.index], self.weight)
             exponential = np.exp(np.clip(logs, -12.0, 12.0))
             parts = self.factor * np.maximum(exponential - np.float32(mapping.EPSILON), 0)
             total = parts.sum(axis=1, dtype=np.float64)
@@ -122,7 +123,7 @@ class CellModel:
                     (data.astype(np.float32), self.node, self.indptr),
                     shape=(m, self.basis.grid.size),
                 )
-                derivative = matrix @ self.basis.nodes[:, 1 : 1 + k]
+                derivative = (matrix @ nodes)[:, 1:]
                 found.append(
                     derivative * (self.scale / level[:, channel]).astype(np.float32)[:, None]
                 )
