@@ -349,8 +349,8 @@ class DenseVariation(ChangesShading, AddsRadiance, RelatesDerivatives):
         return self.inner.combined_slots
 
     @property
-    def slots_beside_lamp(self):
-        return self.inner.slots_beside_lamp
+    def slots_without_lamp_light(self):
+        return self.inner.slots_without_lamp_light
 
     def shading(self, state, x):
         return self.inner.shading(state, x)

@@ -79,7 +79,7 @@ class SurfaceVariation(PatchEffect, ChangesShading, AddsRadiance, RelatesDerivat
         return {2: {0: u}, 3: {0: v, 1: u}, 4: {1: v}}
 
     @property
-    def slots_beside_lamp(self) -> frozenset[int]:
+    def slots_without_lamp_light(self) -> frozenset[int]:
         return frozenset(WAYS.index(colour) for colour in ALBEDO[1:])
 
     def shading(self, state: ShadingState, x: np.ndarray) -> ShadingState:

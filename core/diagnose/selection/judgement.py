@@ -71,8 +71,8 @@ def overlap(one: Evidence, other: Evidence) -> float:
 
 
 def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
-    """The effects that are to be fitted jointly, best first; empty: none is convincing. An effect
-    that has others as a part is fitted beside them. evidence: best first."""
+    """The effects that are to be fitted jointly, best first; empty: none is convincing. The parts
+    of an effect are fitted too, each alone. evidence: best first."""
     strong = [one for one in evidence if _has_sufficient_evidence(one.trial)]
     strong = [one for one in strong if not _is_composed(one, evidence)]
     if not strong:

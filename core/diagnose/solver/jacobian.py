@@ -110,7 +110,7 @@ def _slot_derivatives(model: Model, deviation: Array, place: int, recorded: Arra
     effect, found = model.effects[place], list[Array]()
     related = effect if isinstance(effect, RelatesDerivatives) else None
     combined = {} if related is None else related.combined_slots
-    beside = frozenset[int]() if related is None else related.slots_beside_lamp
+    without_lamp = frozenset[int]() if related is None else related.slots_without_lamp_light
     for number, slot in enumerate(model.parameter_index(place).T):
         if number in combined:
             parts = (factor[:, None] * found[k] for k, factor in combined[number].items())
@@ -118,7 +118,7 @@ def _slot_derivatives(model: Model, deviation: Array, place: int, recorded: Arra
             continue
         mine = np.unique(slot[slot >= 0])
         step = effect.parameters.step[mine[0]] if len(mine) else 1.0
-        of_lamp = changes_lamp_light(effect) and number not in beside
+        of_lamp = changes_lamp_light(effect) and number not in without_lamp
         stepped = _stepped(model, place, mine, step, of_lamp)
         derivative = (stepped - recorded) / (step * deviation)
         found.append(np.where(slot[:, None] >= 0, derivative, 0).astype(np.float32))

@@ -38,7 +38,7 @@ class RelatesDerivatives(Effect, ABC):
         return {}
 
     @property
-    def slots_beside_lamp(self) -> frozenset[int]:
+    def slots_without_lamp_light(self) -> frozenset[int]:
         """Slots whose parameters do not change the reflected light of the lamp."""
         return frozenset()
 
