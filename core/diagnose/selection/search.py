@@ -129,7 +129,8 @@ def _tried(
         trial = try_effect(now, without, one.step.effect, one.trial.p_value)
         return try_rebuilt(now, without, trial, context) if len(supported) > 1 else trial
 
-    trials = list(ordered_map(pool, trial_of, [*spots, *supported], ahead=2))
+    wanted: list[Effect | Evidence] = [*spots, *supported]
+    trials = list(ordered_map(pool, trial_of, wanted, ahead=2))
     found, trials = trials[: len(spots)], trials[len(spots) :]
     best = best_of(trials)
     if best is None or best.gain < MIN_CONFIRMED * supported[0].trial.gain:
