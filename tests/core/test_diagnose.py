@@ -11,7 +11,6 @@ from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.concurrency.steps import drained
 from patina.core.concurrency.thread_pool import thread_pool
 from patina.core.diagnose.effects import EFFECTS
-from patina.core.diagnose.effects.base.capabilities import RelatesDerivatives
 from patina.core.diagnose.effects.base.image_formation import AddsRadiance, ChangesShading
 from patina.core.diagnose.effects.camera_response import CameraResponse
 from patina.core.diagnose.effects.cast_shadow import CastShadow
@@ -325,7 +324,7 @@ def test_held_out_regions_cost_more_than_fitted_ones():
 
 
 @dataclass(frozen=True)
-class DenseVariation(ChangesShading, AddsRadiance, RelatesDerivatives):
+class DenseVariation(ChangesShading, AddsRadiance):
     """The same effect without patches: solved as if every parameter could affect every pixel."""
 
     inner: SurfaceVariation

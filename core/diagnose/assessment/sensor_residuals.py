@@ -46,8 +46,7 @@ class SensorResiduals:
         good = np.isfinite(fit.deviation).all(axis=1) & (shown.mean(axis=1) > 0)
         width, height = (max(float(np.abs(v).max(initial=0.0)), 1e-9) for v in (pixels.x, pixels.y))
         cell = _cells(pixels.x / width, ACROSS) + ACROSS * _cells(pixels.y / height, DOWN)
-        residual = fit.residual * fit.deviation  # of the model fit: in units of the deviation
-        each = residual[good], shown[good], fit.deviation[good], pixels.block[good]
+        each = fit.residual[good], shown[good], fit.deviation[good], pixels.block[good]
         found = weighted_means(cell[good], ACROSS * DOWN, MIN_PIXELS, *each)
         shape = DOWN, ACROSS
         return cls(found.mean.reshape(shape), found.error.reshape(shape), width, height)

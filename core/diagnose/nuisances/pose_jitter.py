@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..effects.base.capabilities import RelatesDerivatives
 from ..effects.base.effect import Array
 from ..effects.base.parameters import Parameters
 from ..effects.camera_pose import CameraPose
@@ -16,7 +15,7 @@ USUAL_POSE_ERROR = 0.3  # pixels, RMS, of structure from motion
 
 
 @dataclass(frozen=True)
-class PoseJitter(CameraPose, RelatesDerivatives):
+class PoseJitter(CameraPose):
     """The same parameters as CameraPose, with the prior of a good reconstruction."""
 
     cause = "pose_jitter"

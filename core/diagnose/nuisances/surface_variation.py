@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..effects.base.capabilities import RelatesDerivatives
 from ..effects.base.effect import Array
 from ..effects.base.image_formation import AddsRadiance, ChangesShading
 from ..effects.base.parameters import Parameters
@@ -35,7 +34,7 @@ STEPS = (*(1e-3,) * 9, 5e-3)  # for difference quotients
 
 
 @dataclass(frozen=True)
-class SurfaceVariation(PatchEffect, ChangesShading, AddsRadiance, RelatesDerivatives):
+class SurfaceVariation(PatchEffect, ChangesShading, AddsRadiance):
     """Parameters of a patch: WAYS. received: (n, 3) irradiance on the surface."""
 
     frames: PatchFrames

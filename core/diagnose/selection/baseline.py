@@ -68,5 +68,5 @@ def fit_baseline(
         model = replace(model, brdfs=now.model.brdfs, x=now.model.x)
         deviation = rescaled_deviation(deviation, now.residual, now.predicted, context.pixels)
         now = fit(model, deviation, STEPS_OF_ROUND)
-    # to the optimum: otherwise the steps of a joint fit would count as the gain of its effect
+    # nearer to the optimum: otherwise steps of a joint fit would count as the gain of its effect
     return Baseline(plain, fit(now.model, deviation, LAST_STEPS), scales)

@@ -107,7 +107,7 @@ def trend(
     edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
     which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
     bins = max(len(edges) - 1, 1)
-    each = residual[known], shown[known], deviation[known], block[known]
+    each = residual[known] / deviation[known], shown[known], deviation[known], block[known]
     means = weighted_means(which, bins, MIN_PIXELS, *each)
     used = np.flatnonzero(np.isfinite(means.mean))
     at = np.array([np.median(values[which == k]) for k in used])

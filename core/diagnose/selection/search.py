@@ -21,7 +21,7 @@ from ..effects.clipping import Clipping
 from ..forward.diagnosis_context import DiagnosisContext
 from ..solver.model_fit import ModelFit
 from .baseline import fit_baseline
-from .cross_validation import parameter_variances_by_photo, predict_held_out_regions
+from .cross_validation import parameter_variances_by_photo
 from .diagnosis import MIN_GAIN_FRACTION, Diagnosis
 from .effect_trials import (
     HeldOutPredictions,
@@ -56,6 +56,7 @@ def search(
     baseline = fit_baseline(context, normal_deviation)
     yield BASELINE_DONE
     now = before = baseline.fitted
+    first = without = held_out_predictions(now)
     accepted: list[Trial] = []
     rounds: list[tuple[Trial, ...]] = []
     remaining = list(effects)
@@ -64,7 +65,6 @@ def search(
         stepping = [e for e in remaining if has_one_step(e) and e.cause not in known]
         evidence = evidence_for(ProjectedBaseline.of(now), stepping, pool)
         yield 0.5 * (ROUND_STARTS[turn] + ROUND_STARTS[turn + 1])
-        without = held_out_predictions(now)
         found = _tried(now, without, evidence, remaining, context, pool)
         fitted = {trial.effect.cause for trial in found}
         steps = (one.trial for one in evidence if one.cause not in fitted)
@@ -84,10 +84,12 @@ def search(
         assert best.fitted is not None
         accepted.append(best)
         now = best.fitted
+        without = held_out_predictions(now)
         remaining = [e for e in remaining if e.cause != best.effect.cause]
+    usual = now
     now, quality, posed = _with_unusual_scan(now, context)
-    first = predict_held_out_regions(before)
-    held_out = first, first if now is before else predict_held_out_regions(now)
+    without = without if now is usual else held_out_predictions(now)
+    held_out = first(False, False), without(False, False)  # of regions, patches not frozen
     kept = sorted(_in_final_fit(accepted, now, held_out[1].variance), key=lambda trial: -trial.gain)
     kept += posed
     kept += unusual_causes(baseline.plain, now, quality)

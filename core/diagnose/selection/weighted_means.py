@@ -31,11 +31,12 @@ def weighted_means(
     block: NDArray[np.integer],
 ) -> WeightedMeans:
     """where: (n,) bin of each pixel. min_pixels: that a bin needs. residual: (n, 3) photo minus
-    prediction; shown: (n, 3) prediction, with a positive mean; deviation: (n, 3) finite standard
-    deviations of the residual; block: (n,) region of each pixel."""
+    prediction, in units of the deviation; shown: (n, 3) prediction, with a positive mean;
+    deviation: (n, 3) finite standard deviations of the residual; block: (n,) region of each
+    pixel."""
     ratio = np.asarray(shown, np.float64) / deviation
     weight = np.sum(ratio**2, axis=1)
-    pull = np.sum(ratio * (residual / deviation), axis=1)
+    pull = np.sum(ratio * residual, axis=1)
     limit = MAX_WEIGHT * np.median(weight) if len(weight) else 1.0
     pull, weight = pull * np.minimum(1, limit / weight), np.minimum(weight, limit)
     total, sums = (np.bincount(where, values, bins) for values in (weight, pull))

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from ..effects.base.capabilities import RelatesDerivatives
 from ..effects.base.image_formation import changes_lamp_light
 from .model import LampLight, Model
 from .model_fit import ModelFit
@@ -108,9 +107,7 @@ def _slot_derivatives(model: Model, deviation: Array, place: int, recorded: Arra
     """For each slot of an effect: (n, 3) derivatives with respect to the pixel's parameter, 0 where
     it has none. recorded: (n, 3) the prediction."""
     effect, found = model.effects[place], list[Array]()
-    related = effect if isinstance(effect, RelatesDerivatives) else None
-    combined = {} if related is None else related.combined_slots
-    without_lamp = frozenset[int]() if related is None else related.slots_without_lamp_light
+    combined, without_lamp = effect.combined_slots, effect.slots_without_lamp_light
     for number, slot in enumerate(model.parameter_index(place).T):
         if number in combined:
             parts = (factor[:, None] * found[k] for k, factor in combined[number].items())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from ...forward.diagnosis_context import DiagnosisContext
 from .effect import Array, Effect, Vector
@@ -26,21 +26,6 @@ class TracesRays(Effect, ABC):
         to, which may be a local one. predict: (n, 3) the prediction of the model with another
         version of this effect and its parameters, the BRDFs unchanged."""
         return x
-
-
-class RelatesDerivatives(Effect, ABC):
-    """Some derivatives of the prediction follow from others, which saves predictions. A slot is a
-    column of parameter_index."""
-
-    @property
-    def combined_slots(self) -> Mapping[int, Mapping[int, Array]]:
-        """Slot → other slots with (n,) factors: its derivative is the sum of theirs times these."""
-        return {}
-
-    @property
-    def slots_without_lamp_light(self) -> frozenset[int]:
-        """Slots whose parameters do not change the reflected light of the lamp."""
-        return frozenset()
 
 
 class BuiltFromBRDFs(Effect, ABC):

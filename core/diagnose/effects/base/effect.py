@@ -8,7 +8,7 @@ that derives from none of these changes nothing.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,3 +91,15 @@ class Effect(ABC):
         """(n, s) indices of the parameters that each pixel depends on, −1 none, one a slot; no
         pixel depends on two parameters of one slot. None: every pixel depends on all of them."""
         return None
+
+    @property
+    def combined_slots(self) -> Mapping[int, Mapping[int, Array]]:
+        """Slot (column of parameter_index) → other slots with (n,) factors: its derivative is the
+        sum of theirs times these, which saves a prediction."""
+        return {}
+
+    @property
+    def slots_without_lamp_light(self) -> frozenset[int]:
+        """Slots whose parameters do not change the reflected light of the lamp, though others
+        do."""
+        return frozenset()
