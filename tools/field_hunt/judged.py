@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 from patina.core.capture import read_capture
+from patina.core.concurrency.job import finished
 from patina.core.jobs import FitJob
+from patina.core.jobs.check_job import CheckJob
 from patina.core.jobs.diagnose_job import DiagnoseJob
 
+from ..hunt.judged import HALF_WIDTH_95
 from .make import CAPTURE, Truth, make
+from .parameter_errors import brdf_error, parameter_errors
 from .real_sets import make_real
 
 NOT_PHYSICAL = ("outside_basis", "unknown")
@@ -23,7 +28,11 @@ class FieldRow:
     """One row of the table. source: name of a real set, or "simulated"; lamp, scan, material,
     encoding, varies: of the capture (make.Truth). strength: RMS change achieved. named: causes
     found, best first. ties: causes that explain the photos as well as the first. error: of held-out
-    regions without and with the named causes. seconds: of the diagnosis.
+    regions without and with the named causes. seconds: of the diagnosis. gain: of the first cause
+    in nats a pixel and channel, and ratio, the same in standard errors. off: errors of the
+    parameters with a known true value, in standard errors. brdf, brdf_before: BRDF error of the fit
+    with and without the named causes, divided by that of a fit to photos without the effect; None
+    for real photographs and a second material. Rows older than these fields have their defaults.
 
     The names of the fields are the keys of the stored rows."""
 
@@ -41,6 +50,16 @@ class FieldRow:
     ties: tuple[str, ...]
     error: tuple[float, float]
     seconds: float
+    gain: float = 0.0
+    ratio: float = 0.0
+    off: tuple[float, ...] = ()
+    brdf: float | None = None
+    brdf_before: float | None = None
+
+    @property
+    def inside(self) -> int:
+        """Number of parameters in ``off`` whose 95 % interval contains the true value."""
+        return sum(abs(each) < HALF_WIDTH_95 for each in self.off)
 
     @property
     def hidden(self) -> set[str]:
@@ -68,8 +87,8 @@ class FieldRow:
 def judged(
     source: str, cause: str, strength: float, seed: int, threads: int | None = None
 ) -> FieldRow:
-    """Make a capture in a temporary folder, diagnose it and return its row. source: "simulated" or
-    the name of a real set."""
+    """Make a capture in a temporary folder, diagnose it, fit again with the named causes, and
+    return its row. source: "simulated" or the name of a real set."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         if source == "simulated":
@@ -77,20 +96,48 @@ def judged(
         else:
             truth = make_real(folder, source, cause, strength, seed)
         fit = FitJob(read_capture(folder / CAPTURE), threads=threads, portable=False)
-        job = DiagnoseJob(fit)
-        start = time.perf_counter()
+        job = CheckJob(fit)
+        start, seconds = time.perf_counter(), None
+        while job.step():
+            if seconds is None and job.checked.found is not None:
+                seconds = time.perf_counter() - start
+        assert seconds is not None
+        row = _row(truth, job.checked, source, seconds)
+        if source != "simulated" or cause in ("none", "second_material"):
+            return row
+        before, after = (
+            brdf_error(finished(result), truth) / _plain_error(seed, threads)
+            for result in (job.checked.result, job.result)
+        )
+        return replace(row, brdf=after, brdf_before=before)
+
+
+@lru_cache(maxsize=1)
+def _plain_error(seed: int, threads: int | None) -> float:
+    """Return the BRDF error of a fit to photos without an effect."""
+    with tempfile.TemporaryDirectory() as folder:
+        truth = make(Path(folder), "none", 0.0, seed)
+        job = FitJob(read_capture(Path(folder) / CAPTURE), threads=threads, portable=False)
         job.drain()
-        return _row(source, truth, job, time.perf_counter() - start)
+        return brdf_error(finished(job.result), truth)
 
 
-def _row(source: str, truth: Truth, job: DiagnoseJob, seconds: float) -> FieldRow:
-    found = job.found
-    assert found is not None
+def _row(truth: Truth, job: DiagnoseJob, source: str, seconds: float) -> FieldRow:
+    found, context = finished(job.found), finished(job.context)
     first = found.named[0] if found.named else None
+    hidden = () if truth.cause == "none" or source != "simulated" else truth.cause.split("+")
+    off = [
+        each
+        for trial in found.named
+        if trial.effect.cause in hidden
+        for each in parameter_errors(trial, truth, context)
+    ]
     return FieldRow(
         cause=truth.cause, wanted=truth.wanted, seed=truth.seed, source=source, lamp=truth.lamp,
         scan=truth.scan, material=truth.material, encoding=truth.encoding, varies=truth.varies,
         strength=truth.strength, named=found.causes,
         ties=() if first is None else tuple(effect.cause for effect in first.ties),
         error=(found.error_before.parts, found.error_after.parts), seconds=seconds,
+        gain=0.0 if first is None else first.density, ratio=0.0 if first is None else first.ratio,
+        off=tuple(off),
     )  # fmt: skip

@@ -48,7 +48,8 @@ MAKERS: dict[str, dict[str, Callable[..., Hidden]]] = {
 class Truth:
     """What is hidden in a capture. lamp: kind; scan, material: names; encoding: of the photos;
     varies: whether the albedo does. strength: relative RMS change of the photos; parameters: true
-    values of the effect, in the frame of the capture."""
+    values of the effect, in the frame of the capture. white: radiance of the parameters that is 1
+    in the photos."""
 
     cause: str
     wanted: float
@@ -60,6 +61,7 @@ class Truth:
     varies: bool
     strength: float
     parameters: dict[str, float]
+    white: float = 1.0
 
 
 def setting(seed: int) -> tuple[str, str, str, str, bool]:
@@ -90,10 +92,11 @@ def make(folder: Path, cause: str, strength: float, seed: int) -> Truth:
     scene = replace(scene, plain=scene.photographed())
     hidden = hidden_by(MAKERS[lamp], scene, [] if cause == "none" else cause.split("+"))
     photos = camera_faults.with_noise(hidden.photos, rng)
-    _write(folder, scan, scene, hidden, photos, encoding)
+    white = _white(photos) if encoding == "jpeg" else 1.0
+    _write(folder, scan, scene, hidden, [photo / white for photo in photos], encoding, white)
     return Truth(
         cause, strength, seed, lamp, name, material, encoding, varies, hidden.strength,
-        {k: float(v) for k, v in hidden.parameters.items()},
+        {k: float(v) for k, v in hidden.parameters.items()}, white,
     )  # fmt: skip
 
 
@@ -115,18 +118,18 @@ def _albedo(rng: np.random.Generator) -> Callable[[Array], Array]:
 
 def _write(
     folder: Path, scan: FieldScan, scene: FieldScene, hidden: Hidden, photos: list[Array],
-    encoding: str,
+    encoding: str, white: float,
 ) -> None:  # fmt: skip
+    """Write the capture. photos: as they are stored, with 1 at ``white``."""
     (folder / "lit").mkdir(parents=True, exist_ok=True)
     trimesh.Trimesh(scan.mesh.vertices, scan.mesh.faces, process=False).export(folder / "mesh.ply")
     frames = [_frame(k, camera) for k, camera in enumerate(scan.stated)]
     (folder / "transforms.json").write_text(json.dumps({"frames": frames}), "utf-8")
-    white = _white(photos) if encoding == "jpeg" else 1.0
     lines = ["[scan]", 'cameras = "transforms.json"', 'mesh = "mesh.ply"', ""]
     lines += _lights(scene, hidden, white)
     for k, image in enumerate(photos):
         name = f"lit/photo_{k}.{'jpg' if encoding == 'jpeg' else 'exr'}"
-        write_photo(folder / name, image / white)
+        write_photo(folder / name, image)
         lines += ["[[photo]]", f'file = "{name}"', f'camera = "view_{k}.png"']
         lines += [f'light = "{_light_of(scene, k)}"', "exposure = 1", ""]
     (folder / CAPTURE).write_text("\n".join(lines), "utf-8")

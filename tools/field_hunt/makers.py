@@ -72,7 +72,9 @@ def near_elsewhere(scene: FieldScene) -> Hidden:
         return replace(scene, positions=scene.positions * factor).photographed()
 
     size, found, changed = scene.at_strength(photos, 0.1, most=0.6)  # type: ignore[arg-type]
-    return Hidden(found, {"ln distance": size}, changed)
+    towards = 1 - np.exp(size * way)
+    known = {f"displacement {k + 1}": float(one) for k, one in enumerate(towards)}
+    return Hidden(found, {"ln distance": size, **known}, changed)
 
 
 def flash_offset(scene: FieldScene) -> Hidden:

@@ -90,8 +90,8 @@ def read_rows(path: Path | None) -> list[FieldRow]:
     found = []
     for line in path.read_text("utf-8").splitlines():
         values = json.loads(line)
-        for key in ("named", "ties", "error"):
-            values[key] = tuple(values[key])
+        for key in ("named", "ties", "error", "off"):
+            values[key] = tuple(values.get(key, ()))
         found.append(FieldRow(**values))
     return found
 

@@ -104,7 +104,7 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
             each
             for name in cause.split("+")
             if name in trials
-            for each in _parameter_errors(trials[name], truth.parameters, job.checked.context)
+            for each in parameter_errors(trials[name], truth.parameters, job.checked.context)
         ]
     error = error_before = None
     if not set(cause.split("+")) & set(OWN_BRDF):
@@ -159,7 +159,7 @@ def _nearness(inverse: float, light: int, context: DiagnosisContext) -> float:
     return float(context.size / np.linalg.norm(towards / inverse - context.centre))
 
 
-def _parameter_errors(
+def parameter_errors(
     trial: Trial, truth: Mapping[str, float], context: DiagnosisContext
 ) -> list[float]:
     """Return the errors of the parameters with a known true value, in standard errors."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...angles.vectors import tangents
 from ..forward.diagnosis_context import DiagnosisContext, NearestPixels
 from ..forward.shading_state import ShadingState
-from .base.capabilities import TracesRays
+from .base.capabilities import DisplacesLamp
 from .base.displaced_shadows import DisplacedShadows
 from .base.effect import Array
 from .base.image_formation import ChangesShading
@@ -21,7 +21,7 @@ MAX_TILT = np.radians(25.0)  # bound of either angle
 
 
 @dataclass(frozen=True)
-class LightDirection(ChangesShading, TracesRays):
+class LightDirection(ChangesShading, DisplacesLamp):
     """Parameters: for each distant light the tangents of two angles, towards ``aside`` and
     ``other``, (lights, 3) unit vectors perpendicular to its direction. light: (n,) number of each
     pixel's light, −1 where it is not distant. shadows: traced for the directions that were

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..forward.diagnosis_context import DiagnosisContext, NearestPixels
 from ..forward.shading_state import ShadingState
-from .base.capabilities import TracesRays
+from .base.capabilities import DisplacesLamp
 from .base.displaced_shadows import DisplacedShadows
 from .base.effect import Array
 from .base.image_formation import ChangesShading
@@ -26,7 +26,7 @@ START = 0.15  # of the nearness: away from its bound 0, where steps would be cut
 
 
 @dataclass(frozen=True)
-class NearLight(ChangesShading, TracesRays):
+class NearLight(ChangesShading, DisplacesLamp):
     """Parameters: for each distant light the size of the object divided by the distance of the
     lamp, two angles, and ln of a gain. The angles and the gain are there because direction and
     irradiance of a near lamp may have been measured at another place than the object's centre.

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..effects.base.capabilities import (
     AffectsHighlightsOnly,
     BuiltFromBRDFs,
+    DisplacesLamp,
     JudgedByPixel,
     TracesRays,
 )
@@ -34,6 +35,7 @@ from .cross_validation import (
     sum_by_region,
 )
 from .held_out_error import held_out_rms
+from .lamp_search import fit_displaced_lamp
 from .relative_change import relative_rms_change
 from .trial import Trial
 
@@ -134,6 +136,10 @@ def try_with_rays(
 ) -> Trial:
     """The trial with visibility traced again for the displaced lamp or photos; unchanged if the
     effect displaces neither."""
+    if isinstance(best.effect, DisplacesLamp) and best.fitted is not None:
+        start = fit_displaced_lamp(now, best.effect, context)
+        again = try_effect(now, before, start.model.effects[-1], best.p_value, start)
+        best = max((best, again), key=lambda trial: trial.gain)
     for _ in range(MAX_RAY_ROUNDS):
         if not isinstance(best.effect, TracesRays) or best.fitted is None:
             break

@@ -19,12 +19,13 @@ MAX_STEPS, MAX_HALVINGS = 25, 5
 CONVERGED = 1e-4  # relative decrease of the cost
 
 
-def fit(model: Model, deviation: Array, steps: int = MAX_STEPS) -> ModelFit:
+def fit(model: Model, deviation: Array, steps: int = MAX_STEPS, longest: float = 1.0) -> ModelFit:
     """The optimum near the model as it is. deviation: (n, 3) standard deviation in units of
-    radiance, inf where a pixel does not count."""
+    radiance, inf where a pixel does not count. longest: a step may be doubled up to this length
+    while the cost decreases."""
     now = ModelFit.of(model, deviation)
     for _ in range(steps):
-        found = _stepped(now)
+        found = _stepped(now, longest)
         gained = now.total_cost - found.total_cost
         now = found if gained > 0 else now
         if not gained >= CONVERGED * max(now.cost, 1.0):  # ends where the cost is not a number
@@ -32,8 +33,9 @@ def fit(model: Model, deviation: Array, steps: int = MAX_STEPS) -> ModelFit:
     return now
 
 
-def _stepped(now: ModelFit) -> ModelFit:
-    """One Gauss–Newton step, halved until the cost decreases; parameters stay within bounds."""
+def _stepped(now: ModelFit, longest: float) -> ModelFit:
+    """One Gauss–Newton step, halved until the cost decreases, or doubled while it does; parameters
+    stay within bounds."""
     everything = np.arange(len(now.residual))
     step = solve(NormalEquations.of(now, jacobian_of(now), everything), now)
     length = 1.0
@@ -43,6 +45,12 @@ def _stepped(now: ModelFit) -> ModelFit:
         if best.total_cost < now.total_cost:
             break
         length /= 2
+    while 1.0 <= length < longest:
+        length *= 2
+        farther = ModelFit.of(_moved(now.model, step, length), now.deviation)
+        if not farther.total_cost < best.total_cost:
+            break
+        best = farther
     return best
 
 

@@ -28,6 +28,10 @@ class TracesRays(Effect, ABC):
         return x
 
 
+class DisplacesLamp(TracesRays, ABC):
+    """Moves the lamp, and its shadows with it."""
+
+
 class BuiltFromBRDFs(Effect, ABC):
     """Sums over the fitted BRDFs, and is built again when they are known better."""
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ....angles.vectors import dot
 from ...forward.diagnosis_context import DiagnosisContext, NearestPixels
 from ...forward.shading_state import ShadingState
-from .capabilities import TracesRays
+from .capabilities import DisplacesLamp
 from .displaced_shadows import DisplacedShadows
 from .effect import Array, Vector
 from .image_formation import ChangesShading
@@ -22,7 +22,7 @@ NEAREST = 0.05  # of the distance: a displaced lamp does not come closer to a po
 
 
 @dataclass(frozen=True)
-class DisplacedLamp(ChangesShading, TracesRays):
+class DisplacedLamp(ChangesShading, DisplacesLamp):
     """The first three parameters of each lamp displace it along three axes.
 
     names: of the lamps. lamp: (n,) number of each pixel's lamp, −1 another light. towards: (n, 3)
