@@ -17,6 +17,7 @@ from ..diagnose.selection.diagnosis import Diagnosis, Trial
 from ..diagnose.selection.effect_subset import correctable_effects, with_causes
 from ..diagnose.solver.model import Model
 from ..diagnose.solver.model_fit import ModelFit
+from ..diagnose.solver.scaled_brdfs import with_brdf
 from ..errors import PatinaError
 from ..fit.held_out import Judge
 from ..samples import SampleTable
@@ -159,6 +160,16 @@ class RefitJob(Job):
                 f"samples that can be corrected: {count}; expected at least {MIN_SAMPLES}"
             )
         start, share = start + CORRECTION_SHARE * share, (1 - CORRECTION_SHARE) * share
+        if not found.table.read.all():
+            # the joint fit has no prior for directions in which all samples are clipped, and may
+            # invent a highlight there; the estimator has one
+            share /= 2
+            fit, unclipped = self.checked.fit, found.table.select(found.table.read)
+            known = yield from fit.fit_again(index, unclipped, material, start, share, None)
+            model = with_brdf(model, index, known.fit.brdf)
+            start += share
+            step = Step(STAGE, start)
+            found = yield from self._corrected_samples(index, material.name, model, step)
 
         def fit_again(
             table: SampleTable, judge: Judge | None, start: float, share: float

@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.diagnose.nuisances.material_scale import MaterialScale
 from patina.core.diagnose.solver.gauss_newton import fit
 from patina.core.diagnose.solver.model import Model
 from patina.core.diagnose.solver.residual_scale import expected_deviation
-from patina.core.diagnose.solver.scaled_brdfs import scaled_brdfs
+from patina.core.diagnose.solver.scaled_brdfs import scaled_brdfs, with_brdf
 from tests.make_lit_ball import GLOSSY, changed, lit_ball
 
 SCALE = 1.7  # ln
@@ -34,6 +35,15 @@ def test_scaled_brdfs_predict_what_the_model_does(context, model):
     plain = Model(context.pixels, context.brdfs)
     assert model.predicted() == pytest.approx(np.exp(SCALE) * plain.predicted(), rel=1e-5)
     assert scaled_brdfs(plain) is plain.brdfs
+
+
+def test_another_brdf_is_not_scaled(context, model):
+    basis = default_basis()
+    brdf = PrincipalBRDF(basis, basis.training[30:33])
+    found = with_brdf(model, 0, brdf)
+    angles = found.shading().angles
+    material = np.zeros(len(context.pixels), np.intp)
+    assert found.brdfs.evaluate(angles, material) == pytest.approx(brdf.evaluate(angles), rel=1e-4)
 
 
 def test_derivative_of_scaled_brdfs_is_that_of_their_reflectance(context, model):

@@ -21,6 +21,8 @@ from tools.field_hunt.judged import FieldRow, judged  # noqa: E402
 from tools.field_hunt.renderer import half_angles  # noqa: E402
 from tools.hunt.shape import lumpy  # noqa: E402
 
+MAX_BRDF_RATIO = 2.0  # of the error of the second fit to that of a fit without the effect
+
 
 def test_angles_are_those_of_the_definition():
     rng = np.random.default_rng(0)
@@ -75,20 +77,22 @@ def test_an_effect_is_hidden_in_real_photographs(shared, tmp_path):
     ("cause", "seed"),
     [
         ("none", 3), ("ambient_light", 1), ("flash_offset", 3), ("light_direction", 2),
-        ("veiling_glare", 2), ("cast_shadow", 2),
+        ("clipping", 2), ("cast_shadow", 2),
     ],
 )  # fmt: skip
 def test_hidden_effects_are_named_on_scans_as_they_are(cause, seed, shared):
     """A seeded part of the field hunt: the hidden effect and nothing else, at 10 % of the light."""
     row = judged("simulated", cause, 0.0 if cause == "none" else 0.1, seed)
     assert row.right_first and row.right_set, row.named
+    assert row.inside >= 0.75 * len(row.off), row.off
+    assert row.brdf is None or row.brdf < MAX_BRDF_RATIO
 
 
 def test_counts_of_the_table():
     def row(cause: str, named: tuple[str, ...]) -> FieldRow:
         return FieldRow(
             cause, 0.1 if cause != "none" else 0.0, 1, "simulated", "near", "jar", "paper", "exr",
-            False, 0.1, named, (), (0.2, 0.1), 60.0,
+            False, 0.1, named, (), (0.2, 0.1), 60.0, off=(0.5, 3.0), brdf=1.2,
         )  # fmt: skip
 
     right = row("near_light", ("near_light", "unknown"))
@@ -101,3 +105,5 @@ def test_counts_of_the_table():
     text = table.table([right, beside, wrong, honest])
     assert "| simulated, effect of 10 % | 2 of 2 | 1 of 2 |" in text
     assert "| simulated, nothing hidden | 1 of 2 | 1 of 2 |" in text
+    assert "4 of 8 parameters are in their 95 % interval" in text
+    assert "median 1.20, worst decile 1.20" in text

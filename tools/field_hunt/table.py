@@ -14,6 +14,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..common import say
 from ..package import load_patina
 
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 
 STRENGTHS = (0.03, 0.1)  # relative RMS change of the photos
 SEEDS = 6  # of simulated captures with an effect
+WORST_DECILE = 90  # percentile
 NONES = 48  # seeds of simulated captures without
 
 
@@ -114,7 +117,7 @@ def table(rows: Sequence[FieldRow]) -> str:
             f"{named if row.right_first else f'**{named}**'} | {100 * before:.1f} → "
             f"{100 * after:.1f} % | {row.seconds:.0f} s |"
         )
-    return "\n".join([*lines, "", *_counts(rows)])
+    return "\n".join([*lines, "", *_counts(rows), "", *_accuracy(rows)])
 
 
 def _counts(rows: Sequence[FieldRow]) -> list[str]:
@@ -131,3 +134,18 @@ def _counts(rows: Sequence[FieldRow]) -> list[str]:
             kind = "simulated" if simulated else "real photographs"
             lines.append(f"| {kind}, {what} | {first} of {len(mine)} | {exact} of {len(mine)} |")
     return lines
+
+
+def _accuracy(rows: Sequence[FieldRow]) -> list[str]:
+    """Sentences about the parameters and the BRDFs."""
+    off = sum(len(row.off) for row in rows)
+    inside = sum(row.inside for row in rows)
+    ratios = [row.brdf for row in rows if row.brdf is not None]
+    if not ratios:
+        return []
+    middle, worst = np.percentile(ratios, (50, WORST_DECILE))
+    return [
+        f"{inside} of {off} parameters are in their 95 % interval.",
+        "BRDF error of the second fit, divided by that of a fit to photos without the effect: "
+        f"median {middle:.2f}, worst decile {worst:.2f} ({len(ratios)} captures).",
+    ]

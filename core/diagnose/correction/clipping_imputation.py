@@ -1,4 +1,4 @@
-"""Imputation of the radiance of clipped channels from the joint fit.
+"""Imputation of the radiance of clipped channels from the BRDF of the other samples.
 
 A highlight that is predicted at the scan's normals is sharper and higher at its centre than in the
 photo, because the true normals differ from the scan's. The estimator of the second fit expects such

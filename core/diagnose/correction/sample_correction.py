@@ -4,7 +4,7 @@ The camera's effects are inverted by one Newton step about the prediction, which
 far off. Added light is subtracted. Directions, irradiance and visibility are as the effects make
 them. Highlights that a large lamp or a brushed surface widens stay wide in the samples
 (highlight_deconvolution.py narrows them). A clipped channel cannot be corrected: it is imputed from
-the joint fit (clipping_imputation.py) and is no evidence when held-out photos are judged.
+the model's BRDFs (clipping_imputation.py) and is no evidence when held-out photos are judged.
 """
 
 from __future__ import annotations
@@ -136,7 +136,8 @@ def _correct_chunk(
     # radiance is the recorded value divided by the response; an imputed value keeps its variance
     divisor = np.where(clipped | (response <= 0), 1.0, response)
     response = np.where(clipped, 0, response)
-    lamp = response * radiance
+    with np.errstate(invalid="ignore"):  # nor here
+        lamp = response * radiance
     cos_i = dot(now.normal, now.light)
     cos_o = dot(now.normal, table.view)
     good &= (cos_i > MIN_COS) & (cos_o > MIN_COS) & (now.visible > MIN_LIGHT)

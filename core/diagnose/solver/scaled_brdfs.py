@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...basis import PrincipalBRDF
 from ..forward.material_brdfs import MaterialBRDFs
 from ..nuisances.material_scale import MaterialScale
 from .model import Model
@@ -26,3 +27,17 @@ def with_scaled_brdfs(model: Model) -> Model:
     if MaterialScale.cause not in model.causes:
         return model
     return replace(model.without_effect(MaterialScale.cause), brdfs=scaled_brdfs(model))
+
+
+def with_brdf(model: Model, material: int, brdf: PrincipalBRDF) -> Model:
+    """The same model with another BRDF of one material, in the basis of the model's BRDFs. brdf: in
+    1/sr in the unit of the model's irradiance."""
+    found = with_scaled_brdfs(model)
+    coefficients = found.brdfs.coefficients.copy()
+    coefficients[material] = 0.0
+    coefficients[material, :, : brdf.coefficients.shape[1]] = brdf.coefficients
+    scale = found.brdfs.scale
+    if scale is not None:
+        scale = scale.copy()
+        scale[material] = 1.0
+    return replace(found, brdfs=replace(found.brdfs, coefficients=coefficients, scale=scale))
