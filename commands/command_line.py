@@ -25,6 +25,7 @@ COMMANDS = {
     "demo": "demo",
     "basis": "basis",
     "build-basis": "build_basis",
+    "predict": "predict",
     "compare": "compare",
     "material": "material",
     "render": "render",

@@ -21,6 +21,7 @@ TEST_TOOLS = [
     "pytest==8.4.2",
     "hypothesis==6.140.3",
     "rawpy==0.28.0",  # camera RAW is optional and not part of the zips
+    "flip-evaluator==1.7",  # likewise: perceptual error of predicted photos
     "trimesh==5.2.0",  # writes meshes independently of Patina
     "usd-core==26.11",  # these three validate exported files
     "MaterialX==1.39.5",

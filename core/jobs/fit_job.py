@@ -26,14 +26,13 @@ from ..fit.spread import Spread
 from ..geometry import RayScene
 from ..inputs import capture_data
 from ..inputs.lights import Lights, find_lights, refined
-from ..inputs.material_pixels import face_attribute
 from ..inputs.photos import LitPhotos
 from ..samples import MeasuredPoints, SampleSink, SampleTable
-from ..samples.face_votes import FaceVotes
 from ..samples.level import at_typical_level
 from ..scan import Scan
 from .applied_effects import AppliedEffect
 from .estimators import Estimate, estimate
+from .face_assignment import face_materials
 from .fit_times import ASSIGNING, FitTimes
 from .fit_warnings import black_photo_warnings, material_warnings, quality_warnings
 from .portable_materials import Portable, fit_portable
@@ -213,7 +212,7 @@ class FitJob(Job):
             rays=rays,
             basis=basis,
             materials=tuple(results),
-            face_material=self._face_material(scan, taken.votes),
+            face_material=face_materials(capture, scan, taken.votes),
         )
 
     def _take_samples(
@@ -338,15 +337,6 @@ class FitJob(Job):
             except FitError as error:
                 raise self.capture.error(str(error), *self._entry(index)) from error
             yield Step(stage, start + share * done)
-
-    def _face_material(self, scan: Scan, votes: FaceVotes) -> NDArray[np.int32]:
-        """(f,) material of each face: by votes of the masked pixels; face attributes override."""
-        found = votes.winners(scan.mesh)
-        for index, material in enumerate(self.capture.materials):
-            attribute = face_attribute(material)
-            if attribute is not None:
-                found[scan.mesh.face_attributes[attribute] == index] = index
-        return found
 
     def _check_light(self, taken: PhotoSamples) -> None:
         seen_by, lit_by = (Counter[str](), Counter[str]())

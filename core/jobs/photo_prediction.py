@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..capture import Capture
 from ..capture.model import IGNORE_MASK
-from ..geometry import PixelRays, RayScene, SurfaceView, bands, edges, view_window
+from ..geometry import PixelRays, SurfaceView, bands, edges, view_window
 from ..inputs import capture_data
 from ..inputs.lights import Lights, find_lights
 from ..inputs.photos import LitPhotos
@@ -20,8 +20,8 @@ from ..photo.encoding import Encoding
 from ..predict.compose import predict_photo
 from ..predict.errors import PhotoErrors
 from ..samples.take import halo, light_surface
-from ..scan import Scan
 from .fit_job import CaptureResult
+from .fitted_scene import FittedScene
 
 BAND_PIXELS = 1 << 17  # of a photo at a time: some tens of MB
 
@@ -35,7 +35,7 @@ class PhotoPrediction:
     shadow, NaN where no surface is seen. encoded: (h, w, 3) the same in the photo's own encoding;
     measured: (h, w, 3) the photo in that encoding; both with Rec.709 primaries, 0..1 for integer
     formats. compared: (h, w) pixels that ``errors`` are computed from: they see the mesh, are not
-    near an outline and not in the mask "ignore".
+    near an outline and not in the mask "ignore". bounded: True for integer formats.
     """
 
     place: int
@@ -45,6 +45,7 @@ class PhotoPrediction:
     measured: NDArray[np.float32]
     compared: NDArray[np.bool_]
     errors: PhotoErrors
+    bounded: bool
 
 
 @dataclass(frozen=True)
@@ -52,14 +53,17 @@ class PredictionInputs:
     """Everything that the prediction of a capture's photos needs; see ``prediction_inputs``."""
 
     capture: Capture
-    fitted: CaptureResult
-    scan: Scan
-    rays: RayScene
+    fitted: FittedScene
     photos: LitPhotos
     lights: Lights
 
 
 def prediction_inputs(capture: Capture, fitted: CaptureResult) -> PredictionInputs:
+    """Open a capture for prediction from a fit in memory; see ``inputs_from``."""
+    return inputs_from(capture, FittedScene.of(fitted))
+
+
+def inputs_from(capture: Capture, fitted: FittedScene) -> PredictionInputs:
     """Open a capture for prediction. Nothing is estimated from its photos.
 
     A light with the same entry as in the fitted capture is taken from the fit, with any refinement;
@@ -67,10 +71,7 @@ def prediction_inputs(capture: Capture, fitted: CaptureResult) -> PredictionInpu
     mesh, or where its lights or exposures are not in the unit of the fit.
     """
     if capture is fitted.capture:
-        return PredictionInputs(
-            capture, fitted, fitted.scan, fitted.rays, fitted.photos, fitted.lights
-        )
-    scan, rays = fitted.scan, fitted.rays
+        return PredictionInputs(capture, fitted, fitted.photos, fitted.lights)
     if not entries_equal(capture.scan, fitted.capture.scan):
         scan = capture_data.open_scan(capture)
         if not (
@@ -82,11 +83,10 @@ def prediction_inputs(capture: Capture, fitted: CaptureResult) -> PredictionInpu
                 "materials are assigned to its faces",
                 "scan", "mesh",
             )  # fmt: skip
-    capture_data.check_photos(capture, scan)
+        fitted = replace(fitted, scan=scan)
+    capture_data.check_photos(capture, fitted.scan)
     photos, unit = _photos_in_unit_of(capture, fitted)
-    return PredictionInputs(
-        capture, fitted, scan, rays, photos, _lights(capture, fitted, scan, photos, unit)
-    )
+    return PredictionInputs(capture, fitted, photos, _lights(capture, fitted, photos, unit))
 
 
 def predict_one(given: PredictionInputs, place: int) -> Generator[float, None, PhotoPrediction]:
@@ -95,22 +95,22 @@ def predict_one(given: PredictionInputs, place: int) -> Generator[float, None, P
     place: index of the photo in ``given.capture``. Raises InputError.
     """
     capture, fitted = given.capture, given.fitted
-    camera = capture_data.camera_of(capture, given.scan, place)
+    camera = capture_data.camera_of(capture, fitted.scan, place)
     light = given.lights.of(capture, place)
     shape = camera.height, camera.width
     radiance = np.full((shape[0] * shape[1], 3), np.nan, np.float32)
     inner = np.zeros(shape[0] * shape[1], bool)
     margins = fitted.capture.fit.margins
     lines = PixelRays.of(camera)
-    columns = given.rays.cover.columns(camera)
+    columns = fitted.rays.cover.columns(camera)
     windows = list(bands(camera, halo(margins), columns, BAND_PIXELS))
     for done, window in enumerate(windows):
         yield done / (1 + len(windows))
-        view = view_window(given.rays, lines, window)
-        lighting = light_surface(given.rays, view, light, camera)
+        view = view_window(fitted.rays, lines, window)
+        lighting = light_surface(fitted.rays, view, light, camera)
         material = fitted.face_material[view.face]
         parts = [
-            (material == index, found.fit.brdf, found.scale)
+            (material == index, found.brdf, found.scale)
             for index, found in enumerate(fitted.materials)
         ]
         wanted = view.pixel[view.wanted]
@@ -133,6 +133,7 @@ def predict_one(given: PredictionInputs, place: int) -> Generator[float, None, P
         measured=measured,
         compared=compared.reshape(shape),
         errors=PhotoErrors.of(encoded[compared], measured.reshape(-1, 3)[compared]),
+        bounded=encoding.bounded or not encoding.transfer.is_linear,
     )
 
 
@@ -154,7 +155,7 @@ def _near_outline(view: SurfaceView, margin: int) -> NDArray[np.bool_]:
     return view.at(edges.widen(view.silhouette, margin - 1))
 
 
-def _photos_in_unit_of(capture: Capture, fitted: CaptureResult) -> tuple[LitPhotos, float]:
+def _photos_in_unit_of(capture: Capture, fitted: FittedScene) -> tuple[LitPhotos, float]:
     """(the photos with exposures in the fit's unit, the factor from the capture's own unit of
     radiance to the fit's)."""
     own = LitPhotos.open(capture)
@@ -172,9 +173,7 @@ def _photos_in_unit_of(capture: Capture, fitted: CaptureResult) -> tuple[LitPhot
     return replace(own, exposures=exposures, first=first), 1.0 / ratio
 
 
-def _lights(
-    capture: Capture, fitted: CaptureResult, scan: Scan, photos: LitPhotos, unit: float
-) -> Lights:
+def _lights(capture: Capture, fitted: FittedScene, photos: LitPhotos, unit: float) -> Lights:
     """The lights of the capture, with strengths in the fit's unit of radiance. unit: factor from
     the capture's unit to the fit's."""
     known: Sequence[Any] = fitted.capture.lights
@@ -183,7 +182,7 @@ def _lights(
     found = {entry.name: fitted.lights.by_name[entry.name] for entry in shared}
     others = tuple(entry for entry in capture.lights if entry.name not in found)
     if others:
-        more = find_lights(replace(capture, lights=others), scan, photos)
+        more = find_lights(replace(capture, lights=others), fitted.scan, photos)
         for entry in others:
             light = more.by_name[entry.name]
             if not (light.known and fitted.lights.known and fitted.capture.fit.absolute):

@@ -36,17 +36,9 @@ def from_result(capture: Capture, fitted: FittedResult) -> tuple[MapMaterial, ..
             "maps; combine some of them",
             file=capture.file,
         )
-    there = {m.name: m for m in fitted.materials}
-    for entry in capture.materials:
-        if entry.name not in there:
-            raise InputError(
-                f"found the materials {', '.join(there)}; expected {entry.name!r} of "
-                f"{capture.file.name} too; give the result of a fit of this capture",
-                file=fitted.file,
-            )
+    stored = fitted.materials_of([m.name for m in capture.materials], capture.file.name)
     return tuple(
-        MapMaterial(m.name, m.brdf, m.principled, m.scale, m.normal_deviation)
-        for m in (there[entry.name] for entry in capture.materials)
+        MapMaterial(m.name, m.brdf, m.principled, m.scale, m.normal_deviation) for m in stored
     )
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..appearance.principled import Principled
 from ..basis import Basis, PrincipalBRDF
+from ..errors import InputError
 
 
 @dataclass(frozen=True)
@@ -55,3 +57,16 @@ class FittedResult:
     basis: Basis
     materials: tuple[FittedMaterial, ...]
     scene: Path | None
+
+    def materials_of(self, names: Sequence[str], capture: str) -> tuple[FittedMaterial, ...]:
+        """The materials with these names of a capture, in their order. Raises InputError if one is
+        missing."""
+        there = {material.name: material for material in self.materials}
+        for name in names:
+            if name not in there:
+                raise InputError(
+                    f"found the materials {', '.join(there)}; expected {name!r} of {capture} too; "
+                    "give the result of a fit of this capture",
+                    file=self.file,
+                )
+        return tuple(there[name] for name in names)

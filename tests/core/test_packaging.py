@@ -25,6 +25,7 @@ LIBRARIES = {"numpy", "scipy", "pycolmap", "OpenImageIO", "embreex"} | {
     "threadpoolctl",
     "tomlkit",
     "rawpy",  # where it exists
+    "flip_evaluator",  # likewise
 }
 BLENDER = {
     "bpy",
