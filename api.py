@@ -264,7 +264,8 @@ def predict(
     photos to predict, by name or index from 0; None for all of them. For photos that were not part
     of the fit, nothing is estimated from the photo itself: no exposure, pose or colour, and no
     light is refined. A pixel has the material that the fit assigned to the face it shows. Light is
-    direct, with cast shadows; effects of a diagnosis are not part of the prediction.
+    direct, with cast shadows. Of the effects of a diagnosis, displaced lamps (light_direction and
+    flash_offset) are part of the prediction.
 
     Each prediction has ``radiance``, ``encoded`` and ``measured``, (h, w, 3) float32, and
     ``errors``: typical error, relative RMS and RMSE in the encoding of the photo, over the pixels

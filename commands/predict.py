@@ -8,6 +8,7 @@ from typing import Any
 
 from ..core.capture import read_capture
 from ..core.counted import counted
+from ..core.jobs.displaced_lights import not_applied
 from ..core.jobs.photo_prediction import PhotoPrediction
 from ..core.jobs.predict_job import PredictJob
 from ..core.output_folder import check_out, staged_folder
@@ -15,17 +16,14 @@ from ..core.photo.image import write_png
 from ..core.predict.flip import MISSING, flip_available
 from ..core.report import errors_json
 from ..core.report.errors_json import PredictedPhoto
-from ..core.result import read_result
+from ..core.result import FittedResult, read_result
 from ..core.views.prediction_pictures import PredictionPictures
 from . import capture_arguments
 from .progress import Progress
 from .solve import check_threads
 
 HELP = "predict the photos of a capture from a result, and compare them"
-EFFECTS = (
-    "Light is direct, with cast shadows. Effects that a diagnosis found are not part of the "
-    "prediction. Nothing was estimated from the predicted photos."
-)
+ASSUMED = "Light is direct, with cast shadows. Nothing was estimated from the predicted photos."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,13 +51,24 @@ def run(arguments: argparse.Namespace) -> None:
 
         job = PredictJob(capture, result, take, arguments.threads)
         job.drain(Progress())
-        notes = (EFFECTS, *job.notes, *(() if flip_available() else (MISSING,)))
+        notes = (ASSUMED, *_effects_note(result), *job.notes)
+        notes += () if flip_available() else (MISSING,)
         content = errors_json.describe(photos, capture.file, result.file, notes)
         errors_json.write(folder / "errors.json", content)
     _print_summary(content)
     for note in notes:
         print(f"  note: {note}")
     print(f"wrote {3 * len(photos)} pictures and {out / 'errors.json'}")
+
+
+def _effects_note(result: FittedResult) -> tuple[str, ...]:
+    causes = not_applied(result.effects)
+    if not causes:
+        return ()
+    return (
+        f"The result takes {', '.join(causes)} into account, which the prediction does not "
+        "contain. Its errors are therefore too large.",
+    )
 
 
 def _print_summary(content: dict[str, Any]) -> None:

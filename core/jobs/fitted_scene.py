@@ -18,6 +18,7 @@ from ..inputs.lights import Lights, find_lights, refined
 from ..inputs.photos import LitPhotos
 from ..result import FittedResult
 from ..scan import Scan
+from .displaced_lights import displaced_lights
 from .face_assignment import face_materials
 from .fit_job import CaptureResult
 from .sampling import take_samples
@@ -33,7 +34,8 @@ class ScaledBRDF:
 
 @dataclass(frozen=True)
 class FittedScene:
-    """capture: that was fitted, with its scan, photos and lights (refined where it requests that).
+    """capture: that was fitted, with its scan, photos and lights (refined where it requests that,
+    and where a diagnosis found them).
     materials: in its order; face_material: (f,) int, index into them for each face."""
 
     capture: Capture
@@ -47,8 +49,10 @@ class FittedScene:
     @classmethod
     def of(cls, fitted: CaptureResult) -> FittedScene:
         """The scene of a fit in memory."""
+        effects = {e.cause: dict(zip(e.names, e.numbers, strict=True)) for e in fitted.effects}
+        lights = displaced_lights(fitted.lights, effects)
         return cls(
-            fitted.capture, fitted.scan, fitted.rays, fitted.photos, fitted.lights,
+            fitted.capture, fitted.scan, fitted.rays, fitted.photos, lights,
             tuple(ScaledBRDF(m.fit.brdf, m.scale) for m in fitted.materials),
             fitted.face_material,
         )  # fmt: skip
@@ -82,4 +86,5 @@ def scene_of_result(
         )
         face_material = face_materials(capture, scan, taken.votes)
     materials = tuple(ScaledBRDF(one.brdf, one.scale) for one in stored)
+    lights = displaced_lights(lights, result.effects)
     return FittedScene(capture, scan, rays, photos, lights, materials, face_material)

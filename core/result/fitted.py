@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..appearance.principled import Principled
@@ -49,7 +49,8 @@ class FittedMaterial:
 class FittedResult:
     """A result folder. file: its result.json; program: version of Patina that wrote it; capture:
     path of the capture file at the time of the fit; scene: the folder's scene.blend, None where
-    there is none."""
+    there is none. effects: causes that the materials take into account, with their parameters by
+    name."""
 
     file: Path
     program: str
@@ -57,6 +58,7 @@ class FittedResult:
     basis: Basis
     materials: tuple[FittedMaterial, ...]
     scene: Path | None
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def materials_of(self, names: Sequence[str], capture: str) -> tuple[FittedMaterial, ...]:
         """The materials with these names of a capture, in their order. Raises InputError if one is

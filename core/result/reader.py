@@ -22,6 +22,8 @@ MAX_MATERIALS = 1000
 MAX_COEFFICIENT = 1e3  # a coefficient of a training material is about 0.06
 MAX_LOG_RHO = 20.0  # ln(ρ·cosMap): a polished mirror's highlight has 10
 MAX_NAME_LENGTH = 200  # characters
+MAX_EFFECTS, MAX_PARAMETERS = 100, 10_000  # causes of a diagnosis; parameters of each
+MAX_PARAMETER = 1e9  # of an effect: a displacement in scan units may be large
 MAX_NORMAL_DEVIATION = 45.0  # degrees
 RANGES = {"ior": (1.0, 10.0), "coat_ior": (1.0, 10.0)}  # Principled inputs with other than 0 … 1
 FORBIDDEN = set('/\\:*?"<>|\0')
@@ -62,6 +64,7 @@ def read_result(path: Path, cache: Path | None = None) -> FittedResult:
         basis=basis,
         materials=materials,
         scene=scene if scene.is_file() else None,
+        effects=_effects(record),
     )
 
 
@@ -160,6 +163,20 @@ def _held_out(entry: Record) -> HeldOutError | None:
         _within(held, "error", 0.0, 1e12),
         _within(held, "typical", 0.0, 1e12) if "typical" in held else float("nan"),
     )
+
+
+def _effects(record: Record) -> dict[str, dict[str, float]]:
+    """Cause → parameter → value, of the causes that the materials take into account."""
+    if "effects" not in record:
+        return {}
+    found: dict[str, dict[str, float]] = {}
+    for entry in record.records("effects")[:MAX_EFFECTS]:
+        parameters = entry.record("parameters")
+        found[entry.text("cause")] = {
+            name: _within(parameters.record(name), "value", -MAX_PARAMETER, MAX_PARAMETER)
+            for name in list(parameters.values)[:MAX_PARAMETERS]
+        }
+    return found
 
 
 def _sentences(entry: Record) -> tuple[str, ...]:

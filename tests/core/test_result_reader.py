@@ -34,6 +34,20 @@ def test_written_result_is_read_back(tmp_path: Path) -> None:
         assert bronze.warnings == ("one", "two") and bronze.scale_known
 
 
+def test_effects_are_read_with_their_parameters(tmp_path: Path) -> None:
+    description = made.description(made.material("bronze", made.BRONZE))
+    parameters = {"flash, right": {"value": 0.2, "standard_error": 0.1, "unit": "scan units"}}
+    effect = {"cause": "flash_offset", "sentence": "It is there.", "parameters": parameters}
+    description["effects"] = [effect]
+    folder = made.write_result(tmp_path, description)
+    assert read_result(folder).effects == {"flash_offset": {"flash, right": 0.2}}
+    for wrong in ("0.2", float("inf"), 1e12):
+        parameters["flash, right"]["value"] = wrong
+        made.write_result(tmp_path, description)
+        with pytest.raises(InputError, match="value"):
+            read_result(folder)
+
+
 def test_scene_is_found_next_to_result(tmp_path: Path) -> None:
     folder = write_one_material(tmp_path)
     (folder / "scene.blend").write_bytes(b"")
