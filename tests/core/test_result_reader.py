@@ -41,7 +41,7 @@ def test_effects_are_read_with_their_parameters(tmp_path: Path) -> None:
     description["effects"] = [effect]
     folder = made.write_result(tmp_path, description)
     assert read_result(folder).effects == {"flash_offset": {"flash, right": 0.2}}
-    for wrong in ("0.2", float("inf"), 1e12):
+    for wrong in ("far", [0.2], 1e12):
         parameters["flash, right"]["value"] = wrong
         made.write_result(tmp_path, description)
         with pytest.raises(InputError, match="value"):
