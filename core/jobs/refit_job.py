@@ -32,6 +32,7 @@ ROUND_SHARE = 0.6  # of the remaining time of a second fit that one round takes
 STAGE = "fitting with the named causes"
 MIN_SAMPLES = 50  # of a material after correction
 CORRECTION_SHARE = 0.3  # fraction of a second fit's time that the correction of samples takes
+NOT_DISTINCT = "The 95 % intervals of all its parameters contain 0, at which it has no effect."
 STILL_BLURRED = (
     "The highlights of this material are as wide as in the photos, because narrower ones do not "
     "predict held-out photos better. A photo under a smaller lamp would show their true width."
@@ -42,9 +43,10 @@ class RefitJob(Job):
     """Sets ``result``, the fit with the effects taken into account; the first fit if there are
     none.
 
-    ``contradicted``: causes that were dropped because held-out photos are predicted worse with
-    them, each with the evidence. ``unused``: the same, where only the second fit is worse.
-    ``fitted``: the joint fit that the second one is based on, None if there is none.
+    ``contradicted``: causes that were dropped, each with the evidence: held-out photos are
+    predicted worse with them, or their parameters may be 0. ``unused``: the same, where only the
+    second fit is worse. ``fitted``: the joint fit that the second one is based on, None if there is
+    none.
 
     checked: a finished diagnosis. without: causes that it named and that are not corrected.
     exactly: correct for all others even if held-out photos are then predicted worse. portable:
@@ -73,6 +75,10 @@ class RefitJob(Job):
         smallest gain. Then add back each dropped cause that does no harm."""
         before, found = finished(self.checked.result), finished(self.checked.found)
         order = [t for t in correctable_effects(found) if t.effect.cause not in self.without]
+        if not self.exactly:
+            vague = [trial.effect.cause for trial in order if not trial.is_distinct]
+            self.contradicted.update(dict.fromkeys(vague, NOT_DISTINCT))
+            order = [trial for trial in order if trial.is_distinct]
         selected, dropped = list(order), list[Trial]()
         again: list[Refit] = []
         begin = 0.0

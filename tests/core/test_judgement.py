@@ -127,6 +127,12 @@ def _tried(cause: str, count: int, gain: float) -> Trial:
     return Trial(effect, np.ones(count), np.ones(count), by_region, 1000, 0.02, 0.0)
 
 
+@pytest.mark.parametrize(("x", "distinct"), [([0.5, -1.9], False), ([0.5, -2.1], True)])
+def test_parameters_that_may_all_be_0_are_not_distinct(x, distinct):
+    trial = replace(_tried("vignetting", 2, 1.0), x=np.array(x))
+    assert trial.is_distinct == distinct
+
+
 def test_the_simpler_of_two_nearly_equal_effects_is_chosen():
     best = best_of([_tried("environment_reflection", 64, 100.0), _tried("ambient_light", 3, 96.0)])
     assert best is not None and best.effect.cause == "ambient_light"

@@ -113,6 +113,28 @@ class Result:
     effects: tuple[str, ...] = ()
 
 
+def named(cause: str, is_distinct: bool = True) -> SimpleNamespace:
+    """A cause of a diagnosis."""
+    return SimpleNamespace(effect=SimpleNamespace(cause=cause), is_distinct=is_distinct)
+
+
+def test_causes_whose_parameters_may_be_0_are_contradicted(monkeypatch):
+    accepted = [named("flash_offset"), named("veiling_glare", is_distinct=False)]
+    monkeypatch.setattr(refit_job, "correctable_effects", lambda found: accepted)
+    monkeypatch.setattr(refit_job, "_applied", lambda trial, model: trial.effect.cause)
+
+    def fitted(self, before, found, taken, done):
+        yield Step("fitting", done)
+        return [Refit(Material(("again",)), {}, ())], SimpleNamespace(model=None), None
+
+    monkeypatch.setattr(refit_job.RefitJob, "_with", fitted)
+    checked = SimpleNamespace(result=Result((Material(("first",)),)), found=SimpleNamespace())
+    job = refit_job.RefitJob(checked, portable=False)
+    job.drain()
+    assert job.result.effects == ("flash_offset",)
+    assert list(job.contradicted) == ["veiling_glare"]
+
+
 @pytest.mark.parametrize(
     ("order", "guilty"),
     [
@@ -129,7 +151,7 @@ def test_causes_that_worsen_held_out_photos_are_removed(monkeypatch, order, guil
 
     Causes of smaller gain are removed first; causes whose removal does not help are restored.
     """
-    accepted = [SimpleNamespace(effect=SimpleNamespace(cause=name)) for name in order]
+    accepted = [named(name) for name in order]
     monkeypatch.setattr(refit_job, "correctable_effects", lambda found: accepted)
     monkeypatch.setattr(refit_job, "_applied", lambda trial, model: trial.effect.cause)
     fractions = []

@@ -16,6 +16,7 @@ Vector = NDArray[np.float64]
 
 MIN_STANDARD_ERRORS = 2.5  # of the gain over regions, in a joint fit
 MAX_GROWTH = 1.03  # of the RMS error of held-out regions: outliers may hardly be predicted worse
+HALF_WIDTH_95 = 1.96  # standard errors from the centre of a 95 % interval to its ends
 MODEL_ERROR_RATIO = 3.0
 """Errors of parameters in units of the standard error that curvature and jackknife give. These do
 not know that no measured material is exactly in the basis. Measured on scans with materials of no
@@ -110,6 +111,15 @@ class Trial:
     def standard_errors(self) -> Vector:
         """(p,) of that part."""
         return np.sqrt(np.maximum(self.variance, 0.0))
+
+    @property
+    def is_distinct(self) -> bool:
+        """Whether the 95 % interval of at least one parameter does not contain 0, no effect. True
+        where no variance is known."""
+        x, errors = np.ravel(self.identified), np.ravel(self.standard_errors)
+        if not len(x) or len(x) != len(errors):
+            return True
+        return bool(np.any(np.abs(x) > HALF_WIDTH_95 * errors))
 
     def in_fit(self, fitted: ModelFit, variances: tuple[Array, ...]) -> Trial:
         """The trial with its parameters in another joint fit. variances: of the parameters of each
