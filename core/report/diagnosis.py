@@ -57,7 +57,8 @@ def _pictures(folder: Path, found: Diagnosis, context: DiagnosisContext) -> str:
         for kind, fitted in fits.items():
             file = f"residual_{photo:02d}_{kind}.png"
             # both in the standard deviations of the first fit, so that the colours compare
-            residual = fitted.residual * (fitted.deviation / found.before.deviation)
+            with np.errstate(invalid="ignore"):  # pixels that do not count have none: inf / inf
+                residual = fitted.residual * (fitted.deviation / found.before.deviation)
             write_png(folder / file, residual_picture(pixels, residual, int(photo)))
             pictures += f"<img src='{file}' alt='{kind}'>"
         rows.append(f"<figure>{pictures}<figcaption>Photo {photo + 1}</figcaption></figure>")
