@@ -41,6 +41,7 @@ def run(data: Path) -> None:
 def _held_out_photos(cases: list[tuple[str, Path]]) -> None:
     """Print the errors of the photos HELD_OUT, predicted from a fit of the others."""
     import patina
+    from patina.core.predict.errors import PhotoErrors
 
     print("| capture | typical | relative RMS | encoded RMSE | by photo |")
     print("|---|---|---|---|---|")
@@ -52,7 +53,7 @@ def _held_out_photos(cases: list[tuple[str, Path]]) -> None:
             patina.select_photos(capture, [k for k in range(len(names)) if k not in held])
         )
         errors = [found.errors for found in patina.predict(capture, fitted, photos=held)]
-        mean = type(errors[0]).mean(errors)
+        mean = PhotoErrors.mean(errors)
         each = ", ".join(f"{one.encoded_rmse:.3f}" for one in errors)
         print(f"| {label} | {100 * mean.typical:.1f} % | {100 * mean.relative_rms:.1f} % | "
               f"{mean.encoded_rmse:.4f} | {each} |", flush=True)  # fmt: skip

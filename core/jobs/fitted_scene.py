@@ -35,8 +35,8 @@ class ScaledBRDF:
 @dataclass(frozen=True)
 class FittedScene:
     """capture: that was fitted, with its scan, photos and lights (refined where it requests that,
-    and where a diagnosis found them).
-    materials: in its order; face_material: (f,) int, index into them for each face."""
+    and where a diagnosis found them). materials: in its order; face_material: (f,) int, index into
+    them for each face."""
 
     capture: Capture
     scan: Scan

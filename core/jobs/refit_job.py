@@ -13,6 +13,7 @@ from ..concurrency.steps import relayed
 from ..diagnose.correction.sample_correction import CorrectedSamples, correct_samples
 from ..diagnose.correction.sample_pixels import pixels_of_samples
 from ..diagnose.effects.base.capabilities import NeedsPhoto, WidensHighlights
+from ..diagnose.forward.pixels import Pixels
 from ..diagnose.selection.diagnosis import Diagnosis, Trial
 from ..diagnose.selection.effect_subset import correctable_effects, with_causes
 from ..diagnose.solver.model import Model
@@ -159,7 +160,9 @@ class RefitJob(Job):
     def _refit_material(
         self, index: int, material: MaterialResult, model: Model, start: float, share: float
     ) -> Generator[Step, None, Refit]:
-        found = yield from self._corrected_samples(index, material.name, model, Step(STAGE, start))
+        step = Step(STAGE, start)
+        pixels = yield from self._sample_pixels(index, material.name, model, step)
+        found = yield from self._corrected_samples(material.name, pixels, model, step)
         count = np.count_nonzero(found.table.read)
         if count < MIN_SAMPLES:
             raise PatinaError(
@@ -175,7 +178,7 @@ class RefitJob(Job):
             model = with_brdf(model, index, known.fit.brdf)
             start += share
             step = Step(STAGE, start)
-            found = yield from self._corrected_samples(index, material.name, model, step)
+            found = yield from self._corrected_samples(material.name, pixels, model, step)
 
         def fit_again(
             table: SampleTable, judge: Judge | None, start: float, share: float
@@ -190,14 +193,20 @@ class RefitJob(Job):
         warnings = (*_clipping_warnings(found.table), *((STILL_BLURRED,) if blurred else ()))
         return Refit(fitted, found.light, warnings, blurred)
 
-    def _corrected_samples(
+    def _sample_pixels(
         self, index: int, name: str, model: Model, step: Step
+    ) -> Generator[Step, None, Pixels]:
+        """The pixels of a material's samples; photos are read where an effect needs them."""
+        before, table = finished(self.checked.result), self.checked.fit.samples[name]
+        read = any(isinstance(effect, NeedsPhoto) for effect in model.effects)
+        steps = pixels_of_samples(table, index, before.capture, before.scan, before.photos, read)
+        return (yield from relayed(steps, lambda _: step))
+
+    def _corrected_samples(
+        self, name: str, pixels: Pixels, model: Model, step: Step
     ) -> Generator[Step, None, CorrectedSamples]:
         before, setting = finished(self.checked.result), finished(self.checked.context)
         table = self.checked.fit.samples[name]
-        read = any(isinstance(effect, NeedsPhoto) for effect in model.effects)
-        steps = pixels_of_samples(table, index, before.capture, before.scan, before.photos, read)
-        pixels = yield from relayed(steps, lambda _: step)
         tilt = float(np.radians(normal_deviation(before)))
         correcting = correct_samples(table, pixels, model, setting, tilt)
         return (yield from relayed(correcting, lambda _: step))

@@ -10,13 +10,15 @@ from pathlib import Path
 
 from patina.core.capture import read_capture
 from patina.core.concurrency.job import finished
+from patina.core.diagnose.selection.trial import HALF_WIDTH_95
 from patina.core.jobs import FitJob
 from patina.core.jobs.check_job import CheckJob
 from patina.core.jobs.diagnose_job import DiagnoseJob
 
-from ..hunt.judged import HALF_WIDTH_95
+from ..experiments.materials import materials
+from ..hunt.judged import brdf_error
 from .make import CAPTURE, Truth, make
-from .parameter_errors import brdf_error, parameter_errors
+from .parameter_errors import parameter_errors
 from .real_sets import make_real
 
 NOT_PHYSICAL = ("outside_basis", "unknown")
@@ -105,8 +107,9 @@ def judged(
         row = _row(truth, job.checked, source, seconds)
         if source != "simulated" or cause in ("none", "second_material"):
             return row
+        true, plain = materials([truth.material])[0], _plain_error(seed, threads)
         before, after = (
-            brdf_error(finished(result), truth) / _plain_error(seed, threads)
+            brdf_error(finished(result), true) / plain
             for result in (job.checked.result, job.result)
         )
         return replace(row, brdf=after, brdf_before=before)
@@ -119,7 +122,7 @@ def _plain_error(seed: int, threads: int | None) -> float:
         truth = make(Path(folder), "none", 0.0, seed)
         job = FitJob(read_capture(Path(folder) / CAPTURE), threads=threads, portable=False)
         job.drain()
-        return brdf_error(finished(job.result), truth)
+        return brdf_error(finished(job.result), materials([truth.material])[0])
 
 
 def _row(truth: Truth, job: DiagnoseJob, source: str, seconds: float) -> FieldRow:

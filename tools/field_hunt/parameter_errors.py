@@ -1,17 +1,13 @@
-"""Errors of the parameters of named causes, and of the BRDF, against the truth of a capture."""
+"""Errors of the parameters of named causes against the truth of a capture."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from patina.core.basis import default_basis, mapping
 from patina.core.diagnose.effects.black_level import BlackLevel
 from patina.core.diagnose.forward.diagnosis_context import DiagnosisContext
 from patina.core.diagnose.selection.trial import Trial
-from patina.core.fit.spread import directions
-from patina.core.jobs import CaptureResult
 
-from ..experiments.materials import materials
 from ..hunt.judged import parameter_errors as parameter_errors_of_hunt
 from .make import Truth
 
@@ -42,15 +38,3 @@ def parameter_errors(trial: Trial, truth: Truth, context: DiagnosisContext) -> l
     else:
         return parameter_errors_of_hunt(trial, known, context)
     return [round(float(e), 2) for e in (x - wanted) / np.maximum(deviation, 1e-12)]
-
-
-def brdf_error(result: CaptureResult, truth: Truth) -> float:
-    """Return the RMS difference of ln(ρ·cosMap + ε) to the true BRDF over all directions, of the
-    first material."""
-    angles = directions(default_basis().grid)
-    weight = mapping.cos_map(angles)
-    ours, true = (
-        mapping.log_weighted(brdf.evaluate(angles), weight)
-        for brdf in (result.materials[0].fit.brdf, materials([truth.material])[0])
-    )
-    return float(np.sqrt(np.mean((ours - true) ** 2)))

@@ -15,14 +15,15 @@ from patina.core.basis import PrincipalBRDF, default_basis, mapping
 from patina.core.capture import read_capture
 from patina.core.diagnose.forward.diagnosis_context import DiagnosisContext
 from patina.core.diagnose.selection.diagnosis import Trial
+from patina.core.diagnose.selection.trial import HALF_WIDTH_95
 from patina.core.fit.spread import directions
 from patina.core.jobs import CaptureResult, FitJob
 from patina.core.jobs.check_job import CheckJob
 
+from ..experiments.materials import Material
 from .make import CAPTURE, OUTSIDERS, Truth, make, make_plain
 from .state import state
 
-HALF_WIDTH_95 = 1.96  # standard errors from the centre of a 95 % interval to its ends
 OWN_BRDF = ("second_material", "subsurface", "anisotropy", "outside_basis", "interreflection")
 """Causes that change the material, so that the BRDF drawn from the seed is not the truth."""
 
@@ -109,7 +110,8 @@ def judged(cause: str, strength: float, seed: int, threads: int | None = None) -
     error = error_before = None
     if not set(cause.split("+")) & set(OWN_BRDF):
         plain = _plain_error(seed, threads)
-        error, error_before = (_brdf_error(fit, truth) / plain for fit in (after, before))
+        true = _true_brdf(truth)
+        error, error_before = (brdf_error(fit, true) / plain for fit in (after, before))
     return Row(
         cause=cause,
         wanted=strength,
@@ -135,21 +137,26 @@ def _plain_error(seed: int, threads: int | None) -> float:
         job = FitJob(read_capture(Path(folder) / CAPTURE), threads=threads, portable=False)
         job.drain()
     assert job.result is not None
-    return _brdf_error(job.result, truth)
+    return brdf_error(job.result, _true_brdf(truth))
 
 
-def _brdf_error(result: CaptureResult, truth: Truth) -> float:
-    """Return the RMS difference of ln(ρ·cosMap + ε) to the true BRDF over all directions."""
+def _true_brdf(truth: Truth) -> PrincipalBRDF:
+    """Return the BRDF that the photos were rendered with."""
     basis = default_basis()
     assert basis.training is not None
-    rows = basis.training[3 * truth.material : 3 * truth.material + 3]
-    angles = directions(basis.grid)
+    return PrincipalBRDF(basis, basis.training[3 * truth.material : 3 * truth.material + 3])
+
+
+def brdf_error(result: CaptureResult, true: PrincipalBRDF | Material) -> float:
+    """Return the RMS difference of ln(ρ·cosMap + ε) between the first material and its true BRDF,
+    over all directions."""
+    angles = directions(default_basis().grid)
     weight = mapping.cos_map(angles)
-    ours, true = (
+    ours, truth = (
         mapping.log_weighted(brdf.evaluate(angles), weight)
-        for brdf in (result.materials[0].fit.brdf, PrincipalBRDF(basis, rows))
+        for brdf in (result.materials[0].fit.brdf, true)
     )
-    return float(np.sqrt(np.mean((ours - true) ** 2)))
+    return float(np.sqrt(np.mean((ours - truth) ** 2)))
 
 
 def _nearness(inverse: float, light: int, context: DiagnosisContext) -> float:
