@@ -77,7 +77,7 @@ def test_an_effect_is_hidden_in_real_photographs(shared, tmp_path):
 @pytest.mark.parametrize(
     ("cause", "seed"),
     [
-        ("none", 3), ("flash_offset", 3), ("light_direction", 2), ("clipping", 2),
+        ("none", 3), ("flash_offset", 3), ("light_direction", 2), ("clipping", 3),
     ],
 )  # fmt: skip
 def test_hidden_effects_are_named_on_scans_as_they_are(cause, seed, shared):
