@@ -68,14 +68,14 @@ class PhotoSampler:
         θo).
 
         points, normals: (n, 3) of the texels, scan frame."""
-        facing, view, pixels = self._facing(points, normals)
-        weights, corners = _corners(pixels, self.camera)
+        facing, view, pixels = self.facing(points, normals)
+        weights, corners = bilinear_corners(pixels, self.camera)
         shown = self.labels.shown.ravel()[corners]
         some = (shown > 0).any(axis=1)
         facing, view, weights, corners, shown = (
             a[some] for a in (facing, view, weights, corners, shown)
         )
-        seen = ~self._hidden(points[facing], normals[facing], view)
+        seen = ~self.hidden(points[facing], normals[facing], view)
         facing, view, weights, corners, shown = (
             a[seen] for a in (facing, view, weights, corners, shown)
         )
@@ -92,7 +92,7 @@ class PhotoSampler:
         )  # fmt: skip
         return samples, facing, votes
 
-    def _facing(self, points: Array, normals: Array) -> tuple[NDArray[np.intp], Array, Array]:
+    def facing(self, points: Array, normals: Array) -> tuple[NDArray[np.intp], Array, Array]:
         """(rows (k,) of the points that face the camera and lie inside the photo, unit directions
         to the camera (k, 3), pixel positions (k, 2))."""
         centre = self.camera.pose.centre
@@ -110,7 +110,7 @@ class PhotoSampler:
         rows = rows[inside]
         return rows, view[rows], pixels[inside]
 
-    def _hidden(self, points: Array, normals: Array, view: Array) -> NDArray[np.bool_]:
+    def hidden(self, points: Array, normals: Array, view: Array) -> NDArray[np.bool_]:
         """(n,) True where the mesh hides a point from the camera."""
         limits = None
         if not self.camera.orthographic:
@@ -138,7 +138,7 @@ class PhotoSampler:
         lit = np.flatnonzero((cos_i > MIN_COSINE) & (incidence.irradiance > 1e-30).all(axis=1))
         some = incidence.select(lit)
         point, normal = point[lit], normal[lit]
-        lit = lit[~self._shadowed(point, normal, some)]
+        lit = lit[~self.shadowed(point, normal, some)]
         texel, material, cos_i = texel[lit], material[lit], cos_i[lit]
         view, weights, corners = view[lit], weights[lit], corners[lit]
         incidence, normal = incidence.select(lit), normals[texel]
@@ -177,7 +177,7 @@ class PhotoSampler:
             gloss[own] = np.where(shiny, part.gloss / body, 0.0)
         return TexelSamples(texel, scale, error, specular, gloss, material)
 
-    def _shadowed(self, points: Array, normals: Array, light: Incidence) -> NDArray[np.bool_]:
+    def shadowed(self, points: Array, normals: Array, light: Incidence) -> NDArray[np.bool_]:
         """(n,) True where any part of the light's disc is hidden: penumbras count as shadow."""
         blocked = cast_shadow(self.rays, points, normals, light.towards, light.distance)
         radius = angular_radius(self.light, light)
@@ -205,7 +205,7 @@ def angular_radius(light: Light, incidence: Incidence) -> Array | None:
     return None
 
 
-def _corners(pixels: Array, camera: Camera) -> tuple[Array, NDArray[np.intp]]:
+def bilinear_corners(pixels: Array, camera: Camera) -> tuple[Array, NDArray[np.intp]]:
     """(weights (n, 4), flat pixels (n, 4)) of bilinear interpolation at positions (n, 2); pixel
     centres are at half-integers."""
     at = pixels - 0.5

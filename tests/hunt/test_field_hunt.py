@@ -21,7 +21,7 @@ from tools.field_hunt.judged import FieldRow, judged  # noqa: E402
 from tools.field_hunt.renderer import half_angles  # noqa: E402
 from tools.hunt.shape import lumpy  # noqa: E402
 
-MAX_STANDARD_ERRORS = 4.0  # of a parameter, in standard errors that include the model's errors
+MAX_STANDARD_ERRORS = 5.0  # of a parameter, in standard errors that include the model's errors
 MAX_BRDF_RATIO = 2.0  # of the error of the second fit to that of a fit without the effect
 
 
