@@ -6,6 +6,7 @@ import argparse
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from ..core.brdf import merl_file
@@ -13,38 +14,58 @@ from ..core.capture import read_capture
 from ..core.concurrency.job import Step, peak_memory
 from ..core.fit.measured_result import MeasuredResult
 from ..core.jobs import CaptureResult, FitJob, Stage, finished
+from ..core.jobs.varying_job import MODES, VaryingJob
 from ..core.output_folder import check_out, staged_folder
 from ..core.report import result_json, write_report
 from ..core.report.figures import reach
+from ..core.varying import storage
 from . import capture_arguments
 from .needs_blender import has_blender
 from .progress import Progress
 from .solve import check_threads
 
 NO_SCENE = "scene.blend was not written, because it needs Blender. All other files are complete."
+NOT_VARYING = (
+    "The materials in scene.blend are even. The variation over the surface is in varying.npz, and "
+    "`predict` uses it."
+)
 HELP = "fit every material of a capture and write the results"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     capture_arguments.add_arguments(parser, "the results")
+    parser.add_argument(
+        "--varying", choices=MODES, default="never",
+        help="estimate how colour, gloss and normals vary over the surface: if held-out photos "
+        "prefer it (auto), never, or always (default %(default)s)",
+    )  # fmt: skip
 
 
 def run(arguments: argparse.Namespace) -> None:
     check_threads(arguments.threads)
-    fit_to_folder(arguments.capture, arguments.out, arguments.threads)
+    fit_to_folder(arguments.capture, arguments.out, arguments.threads, arguments.varying)
 
 
-def fit_to_folder(capture_file: Path, out: Path, threads: int | None = None) -> CaptureResult:
+def fit_to_folder(
+    capture_file: Path, out: Path, threads: int | None = None, varying: str = "never"
+) -> CaptureResult:
     """Fit a capture. Write result.json, NAME.binary, report/ and, with Blender, scene.blend to
-    ``out``. Raises PatinaError."""
+    ``out``. varying: one of MODES; where the materials vary, varying.npz too. Raises PatinaError.
+    """
     out = check_out(out)
-    progress = Progress(share=0.85)
+    progress = Progress(share=0.85 if varying == "never" else 0.5)
     job = FitJob(read_capture(capture_file), threads=threads)
     job.drain(progress)
-    result = finished(job.result)
-    progress.share = 1.0
+    result, stages = finished(job.result), job.stages
+    if varying != "never":
+        more = VaryingJob(result, varying)
+        progress.start, progress.share = 0.5, 0.35
+        more.drain(progress)
+        stages = [*stages, *more.stages]
+        result = replace(result, varying=more.result, notes=(*result.notes, *more.notes))
+    progress.start, progress.share = 0.0, 1.0
     with staged_folder(out) as folder:
-        write_results(folder, out, result, job.stages, progress)
+        write_results(folder, out, result, stages, progress)
     print_summary(out, result)
     return result
 
@@ -72,6 +93,10 @@ def write_results(
             from ..scene.export.blend_file import write_blend  # needs bpy
 
             notes = write_blend(folder / "scene.blend", out / "scene.blend", result, stages)
+    if result.varying is not None:
+        with timed(stages, storage.NAME, progress, 0.99):
+            storage.write(folder / storage.NAME, result.varying)
+        notes = (*notes, *((NOT_VARYING,) if has_blender() else ()))
     result_json.write(folder / "result.json", result, stages, notes)
 
 
@@ -104,6 +129,8 @@ def print_summary(out: Path, result: CaptureResult) -> None:
         print(f"      {out / (material.name + '.binary')}")
     if has_blender():
         print(f"      {out / 'scene.blend'}")
+    if result.varying is not None:
+        print(f"      {out / storage.NAME}")
     print(f"      {out / 'report' / 'index.html'}")
     if not has_blender():
         print(f"note: {NO_SCENE}")

@@ -30,6 +30,7 @@ from ..inputs.photos import LitPhotos
 from ..samples import MeasuredPoints, SampleSink, SampleTable
 from ..samples.level import at_typical_level
 from ..scan import Scan
+from ..varying.varying_surface import VaryingSurface
 from .applied_effects import AppliedEffect
 from .estimators import Estimate, estimate
 from .face_assignment import face_materials
@@ -87,7 +88,8 @@ class CaptureResult:
 
     face_material: (f,) int, index into ``materials`` for each face. notes: what was read, assumed
     and left out, one sentence each. effects: causes found by a diagnosis that the materials take
-    into account.
+    into account. varying: how the materials vary over the surface, None where they are even or
+    where this was not estimated.
     """
 
     capture: Capture
@@ -100,6 +102,7 @@ class CaptureResult:
     materials: tuple[MaterialResult, ...]
     face_material: NDArray[np.int32]
     effects: tuple[AppliedEffect, ...] = ()
+    varying: VaryingSurface | None = None
 
 
 def with_portable(

@@ -18,6 +18,8 @@ from ..inputs.lights import Lights, find_lights, refined
 from ..inputs.photos import LitPhotos
 from ..result import FittedResult
 from ..scan import Scan
+from ..varying import storage
+from ..varying.varying_surface import VaryingSurface
 from .displaced_lights import displaced_lights
 from .face_assignment import face_materials
 from .fit_job import CaptureResult
@@ -36,7 +38,7 @@ class ScaledBRDF:
 class FittedScene:
     """capture: that was fitted, with its scan, photos and lights (refined where it requests that,
     and where a diagnosis found them). materials: in its order; face_material: (f,) int, index into
-    them for each face."""
+    them for each face. varying: how they vary over the surface, None where they are even."""
 
     capture: Capture
     scan: Scan
@@ -45,6 +47,7 @@ class FittedScene:
     lights: Lights
     materials: tuple[ScaledBRDF, ...]
     face_material: NDArray[np.int32]
+    varying: VaryingSurface | None = None
 
     @classmethod
     def of(cls, fitted: CaptureResult) -> FittedScene:
@@ -55,6 +58,7 @@ class FittedScene:
             fitted.capture, fitted.scan, fitted.rays, fitted.photos, lights,
             tuple(ScaledBRDF(m.fit.brdf, m.scale) for m in fitted.materials),
             fitted.face_material,
+            fitted.varying,
         )  # fmt: skip
 
 
@@ -87,4 +91,7 @@ def scene_of_result(
         face_material = face_materials(capture, scan, taken.votes)
     materials = tuple(ScaledBRDF(one.brdf, one.scale) for one in stored)
     lights = displaced_lights(lights, result.effects)
-    return FittedScene(capture, scan, rays, photos, lights, materials, face_material)
+    varying = None
+    if result.varying is not None:
+        varying = storage.read(result.varying, scan.mesh, len(materials))
+    return FittedScene(capture, scan, rays, photos, lights, materials, face_material, varying)

@@ -20,6 +20,9 @@ from ..photo.encoding import Encoding
 from ..predict.compose import predict_photo
 from ..predict.errors import PhotoErrors
 from ..samples.take import halo, light_surface
+from ..varying.level import MaterialLevel
+from ..varying.node_model import NodeModel
+from ..varying.varying_surface import predict_varying
 from .fit_job import CaptureResult
 from .fitted_scene import FittedScene
 
@@ -104,17 +107,28 @@ def predict_one(given: PredictionInputs, place: int) -> Generator[float, None, P
     lines = PixelRays.of(camera)
     columns = fitted.rays.cover.columns(camera)
     windows = list(bands(camera, halo(margins), columns, BAND_PIXELS))
+    models = [
+        NodeModel.of(MaterialLevel.of("", one.brdf, one.scale))
+        for one in (() if fitted.varying is None else fitted.materials)
+    ]
     for done, window in enumerate(windows):
         yield done / (1 + len(windows))
         view = view_window(fitted.rays, lines, window)
         lighting = light_surface(fitted.rays, view, light, camera)
         material = fitted.face_material[view.face]
-        parts = [
-            (material == index, found.brdf, found.scale)
-            for index, found in enumerate(fitted.materials)
-        ]
+        pixels = [material == index for index in range(len(fitted.materials))]
+        if fitted.varying is None:
+            parts = [
+                (own, found.brdf, found.scale)
+                for own, found in zip(pixels, fitted.materials, strict=True)
+            ]
+            predicted = predict_photo(view, lighting, parts)
+        else:
+            predicted = predict_varying(
+                view, lighting, fitted.varying, list(zip(pixels, models, strict=True))
+            )
         wanted = view.pixel[view.wanted]
-        radiance[wanted] = predict_photo(view, lighting, parts)[view.wanted]
+        radiance[wanted] = predicted[view.wanted]
         inner[wanted] = ~_near_outline(view, margins.silhouette)[view.wanted]
     yield len(windows) / (1 + len(windows))
     compared = inner & np.isfinite(radiance[:, 0])

@@ -8,39 +8,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import half_difference
-from ..angles.vectors import dot, tangents
+from ..angles.vectors import dot
 from ..capture import Capture
 from ..geometry import RayScene
-from ..geometry.view import cast_shadow
 from ..inputs.photos import LitPhoto
-from ..light import DistantLight, Incidence, Light, MountedLight, NearLight
+from ..light import Light
 from ..scan import Camera, Scan
-from .labels import PixelLabels, label_pixels
-from .level import MaterialLevel
+from ..varying.labels import label_pixels
+from ..varying.level import MaterialLevel
+from ..varying.surface_photo import MIN_COSINE, SurfacePhoto, bilinear_corners
 from .slots import TexelSamples
 
 Array = NDArray[np.floating]
 
-MIN_COSINE = 0.1  # of light and view: the default of the samples of a fit
 RELATIVE_ERROR = 0.03  # of the radiance: misregistration, resampling, model error
 NOISE = 0.002  # error of dark pixels, as a fraction of the photo's 95th percentile
 GRAZING_ERROR = 0.03  # relative, times 1/cos − 1 of light and view: fits are least accurate there
 MIN_SPECULAR_SHARE = 0.1  # of the reflectance: with less, a sample has no information on gloss
 SPECULAR_ERROR = 0.25  # of the specular part, since the gloss of the surface may vary
-RIM_RAYS = 4  # shadow rays to the rim of a light with a size
 
 
 @dataclass(frozen=True)
-class PhotoSampler:
-    """One photo, prepared for sampling texels. radiance: (h, w, 3) linear. bright: the 95th
-    percentile of the mean radiance of reliable pixels. levels: the fitted materials, in the order
-    of the capture."""
+class PhotoSampler(SurfacePhoto):
+    """One photo, prepared for sampling texels. bright: the 95th percentile of the mean radiance of
+    reliable pixels. levels: the fitted materials, in the order of the capture."""
 
-    rays: RayScene
-    camera: Camera
-    light: Light
-    radiance: NDArray[np.float32]
-    labels: PixelLabels
     levels: tuple[MaterialLevel, ...]
     bright: float
 
@@ -91,32 +83,6 @@ class PhotoSampler:
             trusted[rows, 0] - 1,
         )  # fmt: skip
         return samples, facing, votes
-
-    def facing(self, points: Array, normals: Array) -> tuple[NDArray[np.intp], Array, Array]:
-        """(rows (k,) of the points that face the camera and lie inside the photo, unit directions
-        to the camera (k, 3), pixel positions (k, 2))."""
-        centre = self.camera.pose.centre
-        if self.camera.orthographic:
-            view = np.broadcast_to(-self.camera.pose.rotation[2], points.shape)
-        else:
-            offset = centre - points
-            view = offset / np.maximum(np.linalg.norm(offset, axis=1, keepdims=True), 1e-12)
-        cosine = np.einsum("ij,ij->i", normals, view)
-        rows = np.flatnonzero(cosine > MIN_COSINE)
-        pixels = self.camera.project(points[rows])
-        with np.errstate(invalid="ignore"):
-            inside = (pixels >= 0.5).all(axis=1) & (pixels[:, 0] <= self.camera.width - 0.5)
-            inside &= pixels[:, 1] <= self.camera.height - 0.5
-        rows = rows[inside]
-        return rows, view[rows], pixels[inside]
-
-    def hidden(self, points: Array, normals: Array, view: Array) -> NDArray[np.bool_]:
-        """(n,) True where the mesh hides a point from the camera."""
-        limits = None
-        if not self.camera.orthographic:
-            limits = np.linalg.norm(self.camera.pose.centre - points, axis=1)
-        lift = np.float32(self.rays.lift) * normals.astype(np.float32)
-        return self.rays.occluded(points, view, limits, lift)
 
     def _samples(
         self,
@@ -176,46 +142,3 @@ class PhotoSampler:
             shiny = level.split.whole | (specular[own] > MIN_SPECULAR_SHARE)
             gloss[own] = np.where(shiny, part.gloss / body, 0.0)
         return TexelSamples(texel, scale, error, specular, gloss, material)
-
-    def shadowed(self, points: Array, normals: Array, light: Incidence) -> NDArray[np.bool_]:
-        """(n,) True where any part of the light's disc is hidden: penumbras count as shadow."""
-        blocked = cast_shadow(self.rays, points, normals, light.towards, light.distance)
-        radius = angular_radius(self.light, light)
-        if radius is None:
-            return blocked
-        first, second = tangents(light.towards)
-        for k in range(RIM_RAYS):
-            turn = 2 * np.pi * k / RIM_RAYS
-            offset = np.tan(radius)[:, None] * (np.cos(turn) * first + np.sin(turn) * second)
-            towards = light.towards + offset
-            towards = towards / np.linalg.norm(towards, axis=1, keepdims=True)
-            blocked |= cast_shadow(self.rays, points, normals, towards, light.distance)
-        return blocked
-
-
-def angular_radius(light: Light, incidence: Incidence) -> Array | None:
-    """(n,) angular radius of the light in radians at each point; None for a light without size."""
-    if isinstance(light, DistantLight):
-        return None if light.angular_radius <= 0 else np.full(
-            len(incidence.towards), light.angular_radius
-        )  # fmt: skip
-    if isinstance(light, NearLight | MountedLight) and light.radius > 0:
-        assert incidence.distance is not None
-        return np.arctan(light.radius / np.maximum(incidence.distance, 1e-12))
-    return None
-
-
-def bilinear_corners(pixels: Array, camera: Camera) -> tuple[Array, NDArray[np.intp]]:
-    """(weights (n, 4), flat pixels (n, 4)) of bilinear interpolation at positions (n, 2); pixel
-    centres are at half-integers."""
-    at = pixels - 0.5
-    low = np.floor(at).astype(np.intp)
-    low[:, 0] = np.clip(low[:, 0], 0, max(camera.width - 2, 0))
-    low[:, 1] = np.clip(low[:, 1], 0, max(camera.height - 2, 0))
-    x, y = np.clip((at - low).T, 0.0, 1.0)
-    right = np.minimum(low[:, 0] + 1, camera.width - 1)
-    below = np.minimum(low[:, 1] + 1, camera.height - 1)
-    weights = np.stack([(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y], axis=1)
-    columns = np.stack([low[:, 0], right, low[:, 0], right], axis=1)
-    rows = np.stack([low[:, 1], low[:, 1], below, below], axis=1)
-    return weights.astype(np.float32), rows * camera.width + columns

@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..fit.measured_result import MeasuredResult
 from ..jobs import CaptureResult
 from ..result import FittedResult
-from .labels import MAX_MATERIALS
+from ..varying.labels import MAX_MATERIALS
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from ..inputs import capture_data
 from ..jobs import CaptureResult, MaterialResult, Stage
 from ..jobs.applied_effects import AppliedEffect
 from ..light import Light
+from ..varying import storage
 from .figures import half_width, notable_gains
 
 MANIFEST = Path(__file__).parents[2] / "blender_manifest.toml"
@@ -67,11 +68,28 @@ def describe(
         else dict(zip(("before", "after"), result.lights.unexplained, strict=True)),
         "lights": [_light(result, light) for light in result.lights.by_name.values()],
         "effects": [_effect(effect) for effect in result.effects],
+        "varying": _varying(result),
         "materials": [_material(result, m) for m in result.materials],
         "warnings": list(notes),
         "stages": [
             {"name": s.name, "seconds": round(s.seconds, 3), "peak_mb": _rounded(s.peak_mb, 1)}
             for s in stages
+        ],
+    }
+
+
+def _varying(result: CaptureResult) -> dict[str, Any] | None:
+    """The file of the variation over the surface, and what varies over each material."""
+    surface = result.varying
+    if surface is None:
+        return None
+    return {
+        "file": storage.NAME,
+        "nodes": len(surface.grid),
+        "spacing": surface.grid.spacing,
+        "materials": [
+            {"name": material.name, "varies": kind.kind, "held_out_cost": kind.cost}
+            for material, kind in zip(result.materials, surface.materials, strict=True)
         ],
     }
 

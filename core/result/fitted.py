@@ -50,7 +50,8 @@ class FittedResult:
     """A result folder. file: its result.json; program: version of Patina that wrote it; capture:
     path of the capture file at the time of the fit; scene: the folder's scene.blend, None where
     there is none. effects: causes that the materials take into account, with their parameters by
-    name."""
+    name. varying: the folder's file of the variation over the surface, None where the materials are
+    even."""
 
     file: Path
     program: str
@@ -59,6 +60,7 @@ class FittedResult:
     materials: tuple[FittedMaterial, ...]
     scene: Path | None
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    varying: Path | None = None
 
     def materials_of(self, names: Sequence[str], capture: str) -> tuple[FittedMaterial, ...]:
         """The materials with these names of a capture, in their order. Raises InputError if one is

@@ -65,6 +65,7 @@ def read_result(path: Path, cache: Path | None = None) -> FittedResult:
         materials=materials,
         scene=scene if scene.is_file() else None,
         effects=_effects(record),
+        varying=_varying(record, file.parent),
     )
 
 
@@ -176,6 +177,21 @@ def _effects(record: Record) -> dict[str, dict[str, float]]:
             name: _within(parameters.record(name), "value", -MAX_PARAMETER, MAX_PARAMETER)
             for name in list(parameters.values)[:MAX_PARAMETERS]
         }
+    return found
+
+
+def _varying(record: Record, folder: Path) -> Path | None:
+    """The file of the variation over the surface. It must be in the folder of the result."""
+    if record.values.get("varying") is None:
+        return None
+    entry = record.record("varying")
+    name = entry.text("file")
+    found = folder / name
+    if name in ("", ".", "..") or FORBIDDEN & set(name) or not found.is_file():
+        raise entry.error(
+            f"is {shown(name)}; expected a file in the folder of the result; copy the whole folder",
+            "file",
+        )
     return found
 
 

@@ -25,7 +25,7 @@ from ...core.appearance import osl_atlas
 from ...core.appearance.lobe_fit import fit_lobe_stack
 from ...core.appearance.principled_fit import fit_principled
 from ...core.basis import PrincipalBRDF
-from ...core.maps.split import split_body
+from ...core.varying.split import split_body
 from ..property_keys import SHOWN_TRAITS
 from ..session.handlers import attach, detach
 from ..session.running_job import redraw

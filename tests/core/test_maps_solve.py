@@ -8,10 +8,10 @@ import pytest
 from patina.core.angles import Angles
 from patina.core.maps.slots import SLOTS, TexelSamples, TexelSlots
 from patina.core.maps.solve import solve_texels, weighted_median
-from patina.core.maps.split import EVERYTHING, split_body
 from patina.core.maps.surround import VertexScales
 from patina.core.maps.texels import rasterise
 from patina.core.scan import Mesh
+from patina.core.varying.split import EVERYTHING, split_body
 
 
 def filled_slots(samples):

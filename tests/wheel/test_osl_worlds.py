@@ -16,7 +16,7 @@ from patina.core.angles import half_difference  # noqa: E402
 from patina.core.appearance.energy import directional_albedo  # noqa: E402
 from patina.core.appearance.principled import Principled  # noqa: E402
 from patina.core.basis import PrincipalBRDF  # noqa: E402
-from patina.core.maps.split import split_body  # noqa: E402
+from patina.core.varying.split import split_body  # noqa: E402
 from patina.scene.export import relight  # noqa: E402
 from patina.scene.material import material_nodes  # noqa: E402
 from tests.projected import projected  # noqa: E402

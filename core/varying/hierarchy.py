@@ -1,0 +1,197 @@
+"""The hierarchical prior: parameters of nodes as a sum of fields from coarse to fine.
+
+    θ(node) = Σ_l δ_l(cell of the node at level l),   δ_l ~ N(0, Σ_l)
+
+Each level has cells of half the size of those before. A node that one photo shows differs from its
+surroundings only as far as Σ_l, the covariance over the surface, allows; one that many photos show
+follows them. Σ_l, with the correlations of the parameters, is estimated from the photos (empirical
+Bayes by expectation–maximisation, Efron and Morris 1973).
+
+At each level one Gauss–Newton step is made for all cells at once, on the logarithm of the radiance,
+with Student-t errors. The pixels of one cell in one photo have errors in common (of the normals, of
+the material), so that they count as no more than MAX_PIXELS_PER_PHOTO.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..statistics.student_t import weights_of_squares
+from .cells import Cells
+from .node_model import COUNT, LIMITS, TILT, NodeModel
+from .observations import Observations
+
+Array = NDArray[np.floating]
+
+COARSEST = 24  # cells along the object's longest side at the first level
+MAX_PIXELS_PER_PHOTO = 5.0  # of a cell that count as independent
+CHANNEL_SHARE = 0.5  # three channels of a pixel count as one and a half: their errors are alike
+MIN_ERROR, MAX_ERROR = 0.01, 0.5  # of the logarithm of the radiance, that no parameter explains
+BLACK_SHARE = 0.03  # of the median radiance, added before the logarithm
+EM_ROUNDS = 20
+EM_CELLS = 4_000  # that Σ is estimated from
+FIRST_DEVIATION = np.array([0.4, 0.4, 0.4, 0.4, 0.3, 0.16, 0.16, 0.16])
+"""Standard deviations that the estimate of the first level's Σ starts from; each next level starts
+from LEVEL_RATIO times those of the one before."""
+LEVEL_RATIO = 0.7
+MIN_DEVIATION = 1e-3
+MAX_STEP = np.array([1, 1, 1, 1, 0.5, 0.15, 0.15, 0.15])  # of one level
+CHUNK = 1 << 17  # observations at once, to limit memory
+
+
+@dataclass(frozen=True)
+class NodeFields:
+    """Parameters (n, 8) of n nodes and their variances (n, 8), both float32. deviation: (levels,
+    8) standard deviations of each level's Σ; error: of the logarithm of the radiance that remains
+    at the finest level."""
+
+    parameters: NDArray[np.float32]
+    variance: NDArray[np.float32]
+    deviation: Array
+    error: float
+
+
+def edges_of_levels(points: NDArray[np.float64], spacing: float) -> list[float]:
+    """Edge lengths of the cells of all levels, down to about the spacing of the nodes."""
+    size = float(np.ptp(points, axis=0).max()) / COARSEST
+    count = max(1, 1 + round(float(np.log2(max(size / spacing, 1.0)))))
+    return [size / 2**level for level in range(count)]
+
+
+def solve(
+    model: NodeModel,
+    seen: Observations,
+    points: NDArray[np.float64],
+    normals: NDArray[np.floating],
+    edges: list[float],
+    free: NDArray[np.bool_],
+) -> Iterator[tuple[float, NodeFields]]:
+    """Estimate the parameters of n nodes; yields (fraction done, fields so far) after each level.
+
+    seen: observations of nodes 0 … n − 1. points, normals: (n, 3), scan frame. edges: of the cells
+    of each level, scan units. free: (8,) parameters that may differ from 0.
+    """
+    normal = np.asarray(normals, np.float32)
+    theta = np.zeros((len(points), COUNT), np.float32)
+    variance = np.zeros_like(theta)
+    which = np.flatnonzero(free)
+    black = BLACK_SHARE * float(np.median(seen.radiance.mean(axis=1))) if len(seen) else 1.0
+    deviations, error = [], MAX_ERROR
+    start = FIRST_DEVIATION[which]
+    for number, edge in enumerate(edges):
+        cells = Cells.group(points, edge)
+        step = _Step.of(model, seen, normal, theta, cells, which, black)
+        change, spread, sigma = step.posterior(np.diag(start**2))
+        change = np.clip(change, -MAX_STEP[which], MAX_STEP[which])
+        both = cells.interpolated(np.concatenate([change, spread], axis=1), points)
+        theta[:, which] += both[:, : len(which)]
+        np.clip(theta, -LIMITS, LIMITS, out=theta)
+        variance[:, which] += both[:, len(which) :]
+        found = np.zeros(COUNT)
+        found[which] = np.sqrt(np.diag(sigma))
+        deviations.append(found)
+        start, error = LEVEL_RATIO * start, step.error
+        yield (number + 1) / len(edges), NodeFields(theta, variance, np.array(deviations), error)
+
+
+@dataclass(frozen=True)
+class _Step:
+    """Normal equations (c, k, k) and right-hand sides (c, k) of c cells; error: of the logarithm of
+    the radiance; tied: the free parameters that are components of the tilt."""
+
+    normal: Array
+    right: Array
+    error: float
+    tied: NDArray[np.bool_]
+
+    @classmethod
+    def of(
+        cls,
+        model: NodeModel,
+        seen: Observations,
+        normal: NDArray[np.float32],
+        theta: NDArray[np.float32],
+        cells: Cells,
+        which: NDArray[np.intp],
+        black: float,
+    ) -> _Step:
+        k = len(which)
+        matrix, right = np.zeros((k, k, cells.count)), np.zeros((k, cells.count))
+        cell = cells.of[seen.node]
+        photos = int(seen.photo.max(initial=0)) + 1
+        together = np.bincount(cell.astype(np.int64) * photos + seen.photo)
+        error = _remaining_error(model, seen, normal, theta, black)
+        for part in _chunks(len(seen)):
+            some, at = seen.select(part), cell[part]
+            node = some.node
+            predicted, slope = model.derivatives(some.shading, normal[node], theta[node])
+            predicted += np.float32(black)
+            residual = np.log(np.maximum(some.radiance, 0) + black) - np.log(predicted)
+            slope = slope[:, :, which] / predicted[:, :, None]
+            alike = together[at.astype(np.int64) * photos + some.photo]
+            weight = weights_of_squares(np.square(residual).mean(axis=1) / error**2)
+            weight *= np.minimum(1.0, MAX_PIXELS_PER_PHOTO / alike) * CHANNEL_SHARE / error**2
+            weighted = slope * weight[:, None, None].astype(np.float32)
+            each = np.einsum("mci,mc->im", weighted, residual)
+            product = np.einsum("mci,mcj->ijm", weighted, slope)
+            for i in range(k):
+                right[i] += np.bincount(at, each[i], cells.count)
+                for j in range(i, k):
+                    matrix[i, j] += np.bincount(at, product[i, j], cells.count)
+        for i in range(k):
+            matrix[i, :i] = matrix[:i, i]
+        tied = (which >= TILT.start) & (which < TILT.stop)
+        return cls(np.moveaxis(matrix, 2, 0), right.T, error, tied)
+
+    def posterior(self, sigma: Array) -> tuple[Array, Array, Array]:
+        """(mean (c, k), variance (c, k) of the cells, Σ (k, k)), Σ estimated from ``sigma`` on."""
+        seen = np.flatnonzero(np.trace(self.normal, axis1=1, axis2=2) > 0)
+        some = seen[:: max(1, len(seen) // EM_CELLS)]
+        for _ in range(EM_ROUNDS if len(some) else 0):
+            mean, covariance = self._posterior(some, sigma)
+            sigma = mean.T @ mean / len(some) + covariance.mean(axis=0)
+            if self.tied.any():  # all directions are alike
+                own = np.flatnonzero(self.tied)
+                sigma[own] = sigma[:, own] = 0.0
+                turn = np.square(mean[:, own]).mean() + np.mean(
+                    np.diagonal(covariance, axis1=1, axis2=2)[:, own]
+                )
+                sigma[own, own] = turn
+            sigma[np.diag_indices(len(sigma))] += MIN_DEVIATION**2
+        mean = np.zeros((len(self.right), len(sigma)))
+        variance = np.tile(np.diag(sigma), (len(self.right), 1))
+        for part in _chunks(len(seen)):
+            rows = seen[part]
+            mean[rows], covariance = self._posterior(rows, sigma)
+            variance[rows] = np.diagonal(covariance, axis1=1, axis2=2)
+        return mean, variance, sigma
+
+    def _posterior(self, rows: NDArray[np.intp], sigma: Array) -> tuple[Array, Array]:
+        """(mean (r, k), covariance (r, k, k)) of cells."""
+        covariance = np.linalg.inv(self.normal[rows] + np.linalg.inv(sigma))
+        return np.einsum("rij,rj->ri", covariance, self.right[rows]), covariance
+
+
+def _remaining_error(
+    model: NodeModel,
+    seen: Observations,
+    normal: NDArray[np.float32],
+    theta: NDArray[np.float32],
+    black: float,
+) -> float:
+    """Robust standard deviation of the logarithm of the radiance, from a part of the
+    observations."""
+    some = seen.select(np.arange(0, len(seen), max(1, len(seen) // CHUNK)))
+    if not len(some):
+        return MAX_ERROR
+    predicted = model.radiance(some.shading, normal[some.node], theta[some.node])
+    residual = np.log(np.maximum(some.radiance, 0) + black) - np.log(predicted + black)
+    return float(np.clip(np.median(np.abs(residual)) / 0.6745, MIN_ERROR, MAX_ERROR))
+
+
+def _chunks(count: int) -> list[slice]:
+    return [slice(i, min(i + CHUNK, count)) for i in range(0, count, CHUNK)]

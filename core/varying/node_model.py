@@ -1,0 +1,119 @@
+"""The radiance of a surface whose reflectance varies, and its derivatives.
+
+At a node, the BRDF of the material is split into a diffuse body and a specular part (split.py)
+and changed to
+
+    ρ = exp(a) · body + exp(s − 2 g) · specular(θh'),   tan θh' = tan θh / exp(g)
+
+with the normal n + t, normalised. The eight parameters of a node are a (three channels: logarithm
+of the factor of the diffuse colour), s (the same of the specular part), g (of the roughness α, with
+the stretch invariance of GGX and Beckmann distributions, Heitz 2014, section 5.3) and t (a vector
+in the scan frame; only its part along the surface matters, and a vector, unlike two angles, can be
+interpolated). All are 0 for the even material.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..angles import Angles, half_difference
+from ..angles.vectors import tangents
+from ..basis.log_table import LogTable
+from .level import MaterialLevel
+
+Array = NDArray[np.floating]
+
+COUNT = 8  # parameters of a node
+DIFFUSE, SPECULAR, GLOSS, TILT = slice(0, 3), 3, 4, slice(5, 8)
+LIMITS = np.array([3, 3, 3, 2.5, 0.9, 0.4, 0.4, 0.4], np.float32)
+"""Largest size of each parameter: a factor of 20 of the diffuse colour, 12 of the specular part,
+2.5 of the roughness; a tilt of 22 degrees."""
+GLOSS_STEP, TILT_STEP = 0.1, 0.02  # of the finite differences
+MIN_COSINE = 0.02  # of a tilted normal: a tilt shall not turn a lit node away from the light
+MAX_THETA_H = 1.55  # radians, before the tangent
+
+
+class Shading(NamedTuple):
+    """Light and view at m points. light, view: (m, 3) unit, from the surface; irradiance: (m, 3) on
+    a surface that faces the light. float32, scan frame."""
+
+    light: NDArray[np.float32]
+    view: NDArray[np.float32]
+    irradiance: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class NodeModel:
+    """The BRDF of one material as its nodes need it. table: of the BRDF; body: (3,)
+    diffuse level in 1/sr; scale: factor of the photos' reflectance in the fit."""
+
+    table: LogTable
+    body: NDArray[np.float32]
+    scale: float
+
+    @classmethod
+    def of(cls, level: MaterialLevel) -> NodeModel:
+        """The model of a fitted material. One without a diffuse body is scaled as a whole."""
+        table = LogTable.of(level.brdf.basis, level.brdf.coefficients)
+        return cls(table, level.split.body.astype(np.float32), level.scale)
+
+    def radiance(self, seen: Shading, normal: Array, parameters: Array) -> NDArray[np.float32]:
+        """(m, 3) radiance at points with smooth normals (m, 3)."""
+        body, specular = self._lit(seen, tilted(normal, parameters), parameters)
+        return body + specular
+
+    def derivatives(
+        self, seen: Shading, normal: Array, parameters: Array
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """(radiance (m, 3), its derivatives (m, 3, 8) by the parameters)."""
+        turned = tilted(normal, parameters)
+        body, specular = self._lit(seen, turned, parameters)
+        total = body + specular
+        out = np.zeros((*total.shape, COUNT), np.float32)
+        for channel in range(3):
+            out[:, channel, channel] = body[:, channel]
+        out[:, :, SPECULAR] = specular
+        rougher = parameters.copy()
+        rougher[:, GLOSS] += GLOSS_STEP
+        out[:, :, GLOSS] = (sum(self._lit(seen, turned, rougher)) - total) / GLOSS_STEP
+        for way in tangents(turned):
+            further = _unit(turned + np.float32(TILT_STEP) * way)
+            change = (sum(self._lit(seen, further, parameters)) - total) / TILT_STEP
+            out[:, :, TILT] += change[:, :, None] * way[:, None, :].astype(np.float32)
+        return total, out
+
+    def _lit(
+        self, seen: Shading, normal: Array, parameters: Array
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Radiance (m, 3) of the diffuse and of the specular part, with normals (m, 3)."""
+        cosine = np.maximum(np.einsum("ij,ij->i", normal, seen.light), MIN_COSINE)
+        light = seen.irradiance * (cosine / np.float32(self.scale))[:, None]
+        body, specular = self._parts(half_difference(normal, seen.light, seen.view), parameters)
+        return body * light, specular * light
+
+    def _parts(
+        self, angles: Angles, parameters: Array
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        gloss = parameters[:, GLOSS]
+        tangent = np.tan(np.minimum(angles.theta_h, MAX_THETA_H)) * np.exp(-gloss)
+        stretched = np.arctan(tangent).astype(np.float32)
+        rho = self.table.evaluate(Angles(stretched, angles.theta_d, angles.phi_d))
+        body = np.minimum(rho, self.body)
+        factor = np.exp(parameters[:, SPECULAR] - 2 * gloss)[:, None]
+        return body * np.exp(parameters[:, DIFFUSE]), (rho - body) * factor
+
+
+def tilted(normal: Array, parameters: Array) -> NDArray[np.float32]:
+    """(m, 3) unit normals of nodes with smooth normals (m, 3) and parameters (m, 8)."""
+    tilt = parameters[:, TILT]
+    along = np.einsum("ij,ij->i", tilt, normal)[:, None] * normal
+    return _unit(normal + tilt - along)
+
+
+def _unit(v: Array) -> NDArray[np.float32]:
+    size = np.linalg.norm(v, axis=1, keepdims=True)
+    return np.asarray(v / np.maximum(size, 1e-20), np.float32)

@@ -1,0 +1,95 @@
+"""What each photo shows at the nodes of a surface grid: radiance, light and view."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .node_model import Shading
+from .surface_grid import SurfaceGrid
+from .surface_photo import MIN_COSINE, SurfacePhoto, bilinear_corners
+
+CHUNK = 1 << 17  # nodes projected at once, to limit memory
+
+
+@dataclass(frozen=True)
+class Observations:
+    """m observations of nodes, sorted by node.
+
+    node: (m,) int32; photo: (m,) int16; material: (m,) uint8, index of the pixel's material;
+    radiance: (m, 3) linear; light, view: (m, 3) unit, from the surface; irradiance: (m, 3) on a
+    surface that faces the light. float32, scan frame.
+    """
+
+    node: NDArray[np.int32]
+    photo: NDArray[np.int16]
+    material: NDArray[np.uint8]
+    radiance: NDArray[np.float32]
+    light: NDArray[np.float32]
+    view: NDArray[np.float32]
+    irradiance: NDArray[np.float32]
+
+    def __len__(self) -> int:
+        return len(self.node)
+
+    @property
+    def shading(self) -> Shading:
+        """Light and view of each."""
+        return Shading(self.light, self.view, self.irradiance)
+
+    def select(self, rows: NDArray | slice) -> Observations:
+        """The observations ``rows``, an increasing subset."""
+        return Observations(*(getattr(self, f.name)[rows] for f in fields(self)))
+
+    @staticmethod
+    def joined(parts: list[Observations]) -> Observations:
+        """All observations, sorted by node; those of a node in the order of ``parts``."""
+        names = [f.name for f in fields(Observations)]
+        order = np.argsort(np.concatenate([p.node for p in parts]), kind="stable")
+        return Observations(*(np.concatenate([getattr(p, n) for p in parts])[order] for n in names))
+
+
+def observe(look: SurfacePhoto, photo: int, grid: SurfaceGrid) -> Observations:
+    """The observations of all nodes that are visible, lit, and on reliable pixels of one photo."""
+    parts = []
+    for begin in range(0, len(grid), CHUNK):
+        rows = np.arange(begin, min(begin + CHUNK, len(grid)))
+        parts.append(_chunk(look, photo, grid.points(rows), grid.normals(rows), begin))
+    return Observations.joined(parts)
+
+
+def _chunk(
+    look: SurfacePhoto,
+    photo: int,
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    first: int,
+) -> Observations:
+    rows, view, pixels = look.facing(points, normals)
+    weights, corners = bilinear_corners(pixels, look.camera)
+    trusted = look.labels.trusted.ravel()[corners]
+    good = (trusted > 0).all(axis=1) & (trusted == trusted[:, :1]).all(axis=1)
+    rows, view, weights, corners, trusted = (
+        a[good] for a in (rows, view, weights, corners, trusted)
+    )
+    light = look.light.incidence(points[rows], look.camera)
+    cosine = np.einsum("ij,ij->i", normals[rows], light.towards)
+    lit = (cosine > MIN_COSINE) & (light.irradiance > 1e-30).all(axis=1)
+    lit &= ~look.hidden(points[rows], normals[rows], view)
+    lit[lit] &= ~look.shadowed(points[rows[lit]], normals[rows[lit]], light.select(lit))
+    rows, view, weights, corners = (a[lit] for a in (rows, view, weights, corners))
+    light = light.select(lit)
+    flat = look.radiance.reshape(-1, 3)
+    radiance = np.einsum("nj,njc->nc", weights, flat[corners])
+    n = len(rows)
+    return Observations(
+        node=(rows + first).astype(np.int32),
+        photo=np.full(n, photo, np.int16),
+        material=(trusted[lit, 0] - 1).astype(np.uint8),
+        radiance=radiance.astype(np.float32),
+        light=np.broadcast_to(light.towards, (n, 3)).astype(np.float32),
+        view=np.asarray(view, np.float32),
+        irradiance=np.broadcast_to(light.irradiance, (n, 3)).astype(np.float32),
+    )

@@ -1,0 +1,106 @@
+"""A surface whose reflectance and normals vary: parameters of the materials at the nodes of a
+grid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry import SurfaceView
+from ..samples.take import Lighting
+from ..scan import Mesh
+from .node_model import NodeModel, Shading, tilted
+from .surface_grid import SurfaceGrid
+
+VARIATIONS: dict[str, tuple[int, ...]] = {
+    "even": (),
+    "diffuse": (0, 1, 2),
+    "diffuse and normals": (0, 1, 2, 5, 6, 7),
+    "diffuse, specular, gloss and normals": (0, 1, 2, 3, 4, 5, 6, 7),
+}
+"""What may vary over a material → the parameters of its nodes (node_model.py), simplest first."""
+
+
+@dataclass(frozen=True)
+class MaterialVariation:
+    """What varies over one material. kind: a key of VARIATIONS. cost: kind → mean cost of held-out
+    photos, in nats a pixel; empty where nothing was held out."""
+
+    kind: str
+    cost: dict[str, float]
+
+
+@dataclass(frozen=True)
+class VaryingSurface:
+    """grid: of the nodes. parameters: (n, 8) float32; deviation: (n, 8) float32, their standard
+    errors; photos: (n,) uint16, number of photos that show the node lit. materials: in the order of
+    the capture."""
+
+    grid: SurfaceGrid
+    parameters: NDArray[np.float32]
+    deviation: NDArray[np.float32]
+    photos: NDArray[np.uint16]
+    materials: tuple[MaterialVariation, ...]
+
+    @property
+    def varies(self) -> bool:
+        """Whether any material is not even."""
+        return any(material.kind != "even" for material in self.materials)
+
+    def at(
+        self, face: NDArray[np.integer], second: NDArray[np.floating], third: NDArray[np.floating]
+    ) -> NDArray[np.float32]:
+        """(m, 8) parameters at points of faces, given by barycentric weights of their second and
+        third vertex."""
+        node, weight = self.grid.at(face, second, third)
+        return np.einsum("mk,mkc->mc", weight, self.parameters[node])
+
+
+def predict_varying(
+    view: SurfaceView,
+    lighting: Lighting,
+    surface: VaryingSurface,
+    parts: Sequence[tuple[NDArray[np.bool_], NodeModel]],
+) -> NDArray[np.float32]:
+    """(n, 3) radiance of a view's pixels: 0 in shadow, NaN where no material was fitted.
+
+    parts: ((n,) pixels of the view, model) of every material."""
+    values = np.full((len(view.pixel), 3), np.nan, np.float32)
+    for pixels, model in parts:
+        values[pixels] = 0.0
+        lit = np.flatnonzero(pixels & ~lighting.shadowed)
+        face = view.face[lit]
+        second, third = barycentric(surface.grid.mesh, face, view.point[lit])
+        parameters = surface.at(face, second, third)
+        light = lighting.incidence.select(lit)
+        shape = len(lit), 3
+        normal = np.asarray(view.normal[lit], np.float32)
+        towards = np.broadcast_to(light.towards, shape).astype(np.float32)
+        shading = Shading(
+            towards,
+            np.asarray(view.view[lit], np.float32),
+            np.broadcast_to(light.irradiance, shape).astype(np.float32),
+        )
+        facing = np.einsum("ij,ij->i", tilted(normal, parameters), towards) > 0
+        radiance = model.radiance(shading, normal, parameters)
+        values[lit] = np.where(facing[:, None], radiance, 0.0)
+    return values
+
+
+def barycentric(
+    mesh: Mesh, face: NDArray[np.integer], points: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Weights (m,) of the second and third vertex of faces at points (m, 3) on them."""
+    a, b, c = (mesh.vertices[mesh.faces[face, k]] for k in range(3))
+    first, second, away = b - a, c - a, points - a
+    d11, d12, d22, p1, p2 = (
+        np.einsum("ij,ij->i", u, v)
+        for u, v in (
+            (first, first), (first, second), (second, second), (away, first), (away, second),
+        )
+    )  # fmt: skip
+    area = np.maximum(d11 * d22 - d12**2, 1e-300)
+    return (d22 * p1 - d12 * p2) / area, (d11 * p2 - d12 * p1) / area

@@ -1,0 +1,103 @@
+"""The variation of a material over a surface is found in photos of another model than Patina's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from patina.core.concurrency.steps import drained
+from patina.core.varying.choice import Nodes, choose
+from patina.core.varying.hierarchy import NodeFields, edges_of_levels, solve
+from patina.core.varying.node_model import COUNT, DIFFUSE, TILT, Shading, tilted
+from tests.core.varying_scene import ALBEDO, SPACING, VaryingScene, fitted_model, scene
+
+ALL = np.ones(COUNT, bool)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return fitted_model()
+
+
+def solved(model, made: VaryingScene, free=ALL) -> NodeFields:
+    edges = edges_of_levels(made.points, SPACING)
+    *_, (_, fields) = solve(model, made.seen, made.points, made.normals, edges, free)
+    return fields
+
+
+def angle(one, other):
+    return np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", one, other), -1, 1)))
+
+
+def test_derivatives_are_those_of_the_radiance(model):
+    rng = np.random.default_rng(2)
+    up = np.tile([0.0, 0.0, 1.0], (50, 1)) + 0.3 * rng.normal(size=(50, 3))
+    normal = (up / np.linalg.norm(up, axis=1, keepdims=True)).astype(np.float32)
+    made = scene(1, 3)
+    seen = Shading(*(a[:50] for a in made.seen.shading))
+    parameters = 0.1 * rng.normal(size=(50, COUNT)).astype(np.float32)
+    radiance, slope = model.derivatives(seen, normal, parameters)
+    way = 0.003 * rng.normal(size=(50, COUNT)).astype(np.float32)
+    other = model.radiance(seen, normal, parameters + way)
+    expected = radiance + np.einsum("mcp,mp->mc", slope, way)
+    assert np.linalg.norm(expected - other) < 0.3 * np.linalg.norm(other - radiance)
+
+
+def test_colour_and_normals_are_found(model):
+    made = scene(10, 0, tilt=3.0)
+    fields = solved(model, made)
+    found = ALBEDO * np.exp(fields.parameters[:, DIFFUSE])
+    ratio = np.log(found / made.colour)
+    before = np.log(ALBEDO / made.colour)
+    assert ratio.std() < 0.25 * before.std()
+    normal = tilted(made.normals, fields.parameters)
+    assert np.median(angle(normal, made.true_normals)) < 0.4 * np.median(
+        angle(made.normals, made.true_normals)
+    )
+
+
+def test_standard_errors_cover_the_errors_of_the_colour(model):
+    made = scene(6, 1)
+    fields = solved(model, made)
+    error = np.log(ALBEDO * np.exp(fields.parameters[:, DIFFUSE]) / made.colour)
+    error -= error.mean(axis=0)  # a level common to all nodes is that of the fit
+    within = np.abs(error) < 1.645 * np.sqrt(fields.variance[:, DIFFUSE])
+    assert 0.8 < within.mean() <= 1.0
+
+
+def test_photo_that_was_not_seen_is_predicted_better(model):
+    made = scene(8, 4)
+    held = made.seen.photo == 7
+    few = VaryingScene(
+        made.points, made.normals, made.true_normals, made.colour, made.seen.select(~held)
+    )
+    out = made.seen.select(held)
+    theta = solved(model, few).parameters[out.node]
+    normal = made.normals[out.node]
+
+    def error(parameters):
+        predicted = model.radiance(out.shading, normal, parameters)
+        return np.sqrt(np.mean((predicted / out.radiance - 1) ** 2))
+
+    assert error(theta) < 0.4 * error(np.zeros_like(theta))
+
+
+@pytest.mark.slow
+def test_surface_that_varies_is_distinguished_from_an_even_one(model):
+    for vary, expected in ((True, "diffuse"), (False, "even")):
+        made = scene(6, 5, vary=vary)
+        found = drained(choose(model, made.seen, Nodes(made.points, made.normals, SPACING)))
+        assert found.kind.startswith(expected), found
+
+
+def test_nodes_without_photos_take_the_values_around_them(model):
+    made = scene(6, 6)
+    hole = np.abs(made.points[:, :2]).max(axis=1) < 0.06
+    few = made.seen.select(~hole[made.seen.node])
+    fields = solved(model, VaryingScene(made.points, made.normals, made.true_normals,
+                                        made.colour, few))  # fmt: skip
+    found = np.log(ALBEDO * np.exp(fields.parameters[hole][:, DIFFUSE]) / made.colour[hole])
+    assert np.abs(found).max() < 0.4
+    colour = fields.variance[:, DIFFUSE]
+    assert colour[hole].mean() > 1.3 * colour[~hole].mean()
+    assert np.abs(fields.parameters[hole][:, TILT]).max() < 0.1
