@@ -6,7 +6,6 @@ import argparse
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 from ..core.brdf import merl_file
@@ -53,17 +52,12 @@ def fit_to_folder(
     ``out``. varying: one of MODES; where the materials vary, varying.npz too. Raises PatinaError.
     """
     out = check_out(out)
-    progress = Progress(share=0.85 if varying == "never" else 0.5)
-    job = FitJob(read_capture(capture_file), threads=threads)
+    progress = Progress(share=0.85)
+    fit = FitJob(read_capture(capture_file), threads=threads)
+    job = fit if varying == "never" else VaryingJob(fit, varying)
     job.drain(progress)
     result, stages = finished(job.result), job.stages
-    if varying != "never":
-        more = VaryingJob(result, varying)
-        progress.start, progress.share = 0.5, 0.35
-        more.drain(progress)
-        stages = [*stages, *more.stages]
-        result = replace(result, varying=more.result, notes=(*result.notes, *more.notes))
-    progress.start, progress.share = 0.0, 1.0
+    progress.share = 1.0
     with staged_folder(out) as folder:
         write_results(folder, out, result, stages, progress)
     print_summary(out, result)

@@ -11,9 +11,8 @@ from ..core.concurrency.job import Step
 class Progress:
     """Call with each Step. Prints when the stage changes, and every 5 seconds within a stage."""
 
-    def __init__(self, share: float = 1.0, start: float = 0.0) -> None:
+    def __init__(self, share: float = 1.0) -> None:
         self.share = share  # of the whole command that the job takes (0..1)
-        self.start = start  # fraction of the command that is done before the job
         self.stage = ""
         self.printed_at = 0.0
 
@@ -21,7 +20,7 @@ class Progress:
         now = time.monotonic()
         if step.stage != self.stage or now - self.printed_at > 5.0:
             print(
-                f"[{100 * (self.start + self.share * step.fraction):3.0f} %] {step.stage}",
+                f"[{100 * self.share * step.fraction:3.0f} %] {step.stage}",
                 file=sys.stderr,
                 flush=True,
             )

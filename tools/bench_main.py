@@ -18,6 +18,7 @@ BENCHES = (
     "light",
     "find_light",
     "real",
+    "varying",
     "solve",
     "noise",
     "viewport",

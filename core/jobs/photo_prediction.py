@@ -199,7 +199,7 @@ def _lights(capture: Capture, fitted: FittedScene, photos: LitPhotos, unit: floa
         more = find_lights(replace(capture, lights=others), fitted.scan, photos)
         for entry in others:
             light = more.by_name[entry.name]
-            if not (light.known and fitted.lights.known and fitted.capture.fit.absolute):
+            if not (light.known and fitted.lights.known):
                 raise capture.error(
                     f"the light {entry.name!r} is not in the fitted capture, and its strength "
                     "relative to the fitted lights is unknown; give irradiance or intensity in "

@@ -1,4 +1,4 @@
-"""Estimate how the materials of a fit vary over the surface."""
+"""Fit a capture, and estimate how its materials vary over the surface."""
 
 from __future__ import annotations
 
@@ -6,169 +6,196 @@ from collections.abc import Generator, Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..concurrency.background import in_background, steps_in_background
-from ..concurrency.job import Job, Step
+from ..concurrency.job import Job, Step, finished
 from ..concurrency.steps import relayed
 from ..fit.measured_result import MeasuredResult
-from ..inputs import capture_data
 from ..varying.choice import Nodes, choose
-from ..varying.hierarchy import edges_of_levels, solve
-from ..varying.labels import label_pixels
+from ..varying.conversion import typical_samples
+from ..varying.hierarchy import NodeFields
 from ..varying.level import MaterialLevel
 from ..varying.node_model import COUNT, NodeModel
-from ..varying.observations import Observations, observe
-from ..varying.surface_grid import SurfaceGrid
-from ..varying.surface_photo import SurfacePhoto
+from ..varying.observations import Observations
 from ..varying.varying_surface import VARIATIONS, MaterialVariation, VaryingSurface
-from .fit_job import CaptureResult
+from .fit_job import CaptureResult, FitJob, MaterialResult, with_portable
+from .surface_observations import SurfaceObservations, observe_surface, pixel_size
 
 MODES = ("auto", "never", "always")
-MAX_NODES = 2_000_000
-"""Nodes of a grid. Each takes 60 bytes for every photo that shows it."""
-MAX_OBSERVATIONS = 40_000_000  # nodes times photos: 2.4 GB
-CHOICE_NODES = 100_000  # of the grid that the choice uses
-READ, CHOSEN = 0.15, 0.6  # fractions of the time after which photos are read and kinds are chosen
+EVEN, DIFFUSE, *FURTHER = VARIATIONS
+EVERYTHING = FURTHER[-1]
+MAX_NODES = 1_000_000  # of the grid: the texels that a mesh covers in a texture of 1400 × 1400
+MAX_OBSERVATIONS = 40_000_000  # nodes times photos, 60 bytes each
+NODES_PER_PIXEL = 4.0  # at most: half a pixel apart, photos are interpolated without loss
+CHOICE_NODES = 30_000  # of a material, that choice and refits use
+REFITS = 2  # of the BRDF, without the variation found so far
+FITTED, OBSERVED, CHOSEN = 0.3, 0.35, 0.75
+"""Fractions of the time after which the fit is done, photos are read, and kinds are chosen."""
 
 
 class VaryingJob(Job):
-    """Sets ``result`` when the job is done: None where every material is even, as "auto" finds by
-    held-out photos; ``notes``: sentences for the user.
+    """Sets ``result``: the fit of ``fit`` with the variation of its materials, and with their BRDFs
+    fitted again without it. It is the fit as it was where held-out photos find all materials even.
 
-    mode: "auto", or "always" for all that can vary.
+    fit: that has not run, or that has finished. mode: "auto", or "always" for all that can vary.
+    nodes: of the grid on the mesh.
     """
 
-    def __init__(self, fitted: CaptureResult, mode: str = "auto", nodes: int = MAX_NODES) -> None:
+    def __init__(self, fit: FitJob, mode: str = "auto", nodes: int = MAX_NODES) -> None:
         super().__init__()
-        self.fitted, self.mode, self.nodes = fitted, mode, nodes
-        self.result: VaryingSurface | None = None
-        self.notes: tuple[str, ...] = ()
+        self.portable, fit.portable = fit.portable, False  # of the final materials only
+        self.fit, self.mode, self.nodes = fit, mode, nodes
+        self.result: CaptureResult | None = None
 
     def run(self) -> Iterator[Step]:
-        """Choose what varies on a coarse grid, then estimate it on a fine one."""
-        models = tuple(_model(self.fitted, index) for index in range(len(self.fitted.materials)))
-        everything = list(VARIATIONS)[-1]
-        kinds = tuple(MaterialVariation(everything, {}) for _ in models)
-        start = 0.0
-        if self.mode == "auto":
-            kinds, start = (yield from self._chosen(models)), CHOSEN
-        self.notes = tuple(
-            _sentence(material.name, kind)
-            for material, kind in zip(self.fitted.materials, kinds, strict=True)
+        """Fit, choose what varies on a coarse grid, then estimate it on a fine one."""
+        if self.fit.result is None:
+            for step in self.fit.run():
+                yield Step(step.stage, FITTED * step.fraction)
+        before = finished(self.fit.result)
+        coarse = yield from observe_surface(before, CHOICE_NODES, FITTED, OBSERVED - FITTED)
+        materials, kinds = list(before.materials), list[MaterialVariation]()
+        share = (CHOSEN - OBSERVED) / len(materials)
+        for index in range(len(materials)):
+            material, kind = yield from self._chosen(index, coarse, OBSERVED + index * share, share)
+            materials[index] = material
+            kinds.append(kind)
+        surface = None
+        if any(kind.kind != EVEN for kind in kinds):
+            surface = yield from self._surface(before, materials, kinds)
+        if self.portable:
+            for index, material in enumerate(materials):
+                start = CHOSEN if surface is None else 0.95
+                materials[index] = yield from with_portable(material, start, self.fit.threads)
+        notes = tuple(_sentence(m.name, k) for m, k in zip(materials, kinds, strict=True))
+        self.result = replace(
+            before, materials=tuple(materials), varying=surface, notes=(*before.notes, *notes)
         )
-        if all(kind.kind == "even" for kind in kinds):
-            return
-        photos = len(self.fitted.capture.photos)
-        grid = yield from in_background(
-            lambda: SurfaceGrid.with_nodes(
-                self.fitted.scan.mesh, min(self.nodes, MAX_OBSERVATIONS // max(photos, 1))
-            ),
-            Step("dividing the mesh", start),
-        )
-        seen = yield from self._observed(grid, start, READ * (1 - start))
-        begin = start + READ * (1 - start)
-        n = len(grid)
-        parameters, variance = (np.zeros((n, COUNT), np.float32) for _ in range(2))
-        material = self._materials(grid)
-        for index, model in enumerate(models):
-            free = np.zeros(COUNT, bool)
-            free[list(VARIATIONS[kinds[index].kind])] = True
-            rows = np.flatnonzero(material == index)
-            own = _of_material(seen, rows, index, n)
-            if not free.any() or not len(own):
-                continue
-            points, normals = grid.points(rows), grid.normals(rows).astype(np.float32)
-            share = (1 - begin) / len(models)
-            steps = solve(model, own, points, normals, edges_of_levels(points, grid.spacing), free)
-            step = Step("estimating the variation", begin + index * share)
-            while True:
-                found = yield from in_background(lambda s=steps: next(s, None), step)  # type: ignore[misc]
-                if found is None:
-                    break
-                done, fields = found
-                step = Step("estimating the variation", begin + (index + done) * share)
-            parameters[rows], variance[rows] = fields.parameters, fields.variance
-        photos_of = np.bincount(seen.node, minlength=n).astype(np.uint16)
-        self.result = VaryingSurface(grid, parameters, np.sqrt(variance), photos_of, kinds)
 
     def _chosen(
-        self, models: tuple[NodeModel, ...]
-    ) -> Generator[Step, None, tuple[MaterialVariation, ...]]:
-        """What varies over each material, by photos that are held out."""
-        mesh = self.fitted.scan.mesh
-        grid = SurfaceGrid.with_nodes(mesh, CHOICE_NODES)
-        seen = yield from self._observed(grid, 0.0, READ)
-        material = self._materials(grid)
-        kinds = []
-        share = (CHOSEN - READ) / len(models)
-        for index, model in enumerate(models):
-            rows = np.flatnonzero(material == index)
-            own = _of_material(seen, rows, index, len(grid))
-            if not len(own):
-                kinds.append(MaterialVariation("even", {}))
-                continue
-            nodes = Nodes(grid.points(rows), grid.normals(rows).astype(np.float32), grid.spacing)
-            at = READ + index * share
-            kinds.append(
-                (
-                    yield from relayed(
-                        steps_in_background(choose(model, own, nodes)),
-                        lambda done, at=at: Step(  # type: ignore[misc]
-                            "predicting held-out photos", at + share * done
-                        ),
-                    )
-                )
+        self, index: int, coarse: SurfaceObservations, start: float, share: float
+    ) -> Generator[Step, None, tuple[MaterialResult, MaterialVariation]]:
+        """(a material with its BRDF fitted without the variation, what varies)."""
+        material = finished(self.fit.result).materials[index]
+        seen, nodes = coarse.of_material(index, CHOICE_NODES)
+        if not len(seen):
+            return material, MaterialVariation(EVEN)
+        model = _model(material)
+        if self.mode == "auto":
+            kind = yield from _choice(model, seen, nodes, (EVEN, DIFFUSE), start, 0.25 * share)
+            if kind.kind == EVEN:
+                return material, kind
+        part = 0.25 * share / REFITS
+        for number in range(REFITS):
+            at = start + 0.25 * share + number * part
+            material = yield from self._without_variation(index, material, seen, nodes, at, part)
+        if self.mode == "always":
+            return material, MaterialVariation(EVERYTHING)
+        rest = yield from _choice(
+            _model(material), seen, nodes, (DIFFUSE, *FURTHER), start + 0.5 * share, 0.5 * share
+        )
+        even = {EVEN: kind.cost[EVEN]}, {EVEN: kind.typical[EVEN]}
+        return material, MaterialVariation(
+            rest.kind, {**even[0], **rest.cost}, {**even[1], **rest.typical}
+        )
+
+    def _without_variation(
+        self,
+        index: int,
+        material: MaterialResult,
+        seen: Observations,
+        nodes: Nodes,
+        start: float,
+        share: float,
+    ) -> Generator[Step, None, MaterialResult]:
+        """The material, fitted to samples without the variation of its diffuse colour."""
+        step, model = Step("fitting without the variation", start), _model(material)
+        fields = yield from _last(nodes, model, seen, DIFFUSE, step, 0.0)
+        table = yield from in_background(
+            lambda: typical_samples(model, seen, nodes.points, nodes.normals, fields.parameters),
+            step,
+        )
+        capture = self.fit.capture
+        self.fit.capture = replace(capture, fit=replace(capture.fit, held_out=False))
+        try:
+            again = yield from self.fit.fit_again(
+                index, table, material, start + 0.3 * share, 0.7 * share
             )
-        return tuple(kinds)
+        finally:
+            self.fit.capture = capture
+        # its own errors would be those of samples that the variation was removed from
+        return replace(again, held_out=material.held_out, samples=material.samples)
 
-    def _observed(
-        self, grid: SurfaceGrid, start: float, share: float
-    ) -> Generator[Step, None, Observations]:
-        """The observations of all nodes in all photos."""
-        fitted, count = self.fitted, len(self.fitted.capture.photos)
-        parts = []
-        for place in range(count):
-            step = Step("reading the surface in the photos", start + share * place / count)
-            parts.append((yield from in_background(lambda p=place: _one(fitted, grid, p), step)))  # type: ignore[misc]
-        return Observations.joined(parts)
-
-    def _materials(self, grid: SurfaceGrid) -> NDArray[np.integer]:
-        """(n,) material of each node; −1 for vertices without a face."""
-        face = grid.places[0]
-        return np.where(face >= 0, self.fitted.face_material[face], -1)
-
-
-def _one(fitted: CaptureResult, grid: SurfaceGrid, place: int) -> Observations:
-    """The observations of one photo."""
-    capture, scan = fitted.capture, fitted.scan
-    camera = capture_data.camera_of(capture, scan, place)
-    photo, light = fitted.photos.read(place), fitted.lights.of(capture, place)
-    labels = label_pixels(capture, scan, fitted.rays, camera, place, photo, light)
-    surface = SurfacePhoto(fitted.rays, camera, light, photo.radiance, labels)
-    return observe(surface, place, grid)
+    def _surface(
+        self,
+        before: CaptureResult,
+        materials: list[MaterialResult],
+        kinds: list[MaterialVariation],
+    ) -> Generator[Step, None, VaryingSurface]:
+        """The variation on a fine grid."""
+        pixels = NODES_PER_PIXEL * before.scan.mesh.area / pixel_size(before) ** 2
+        count = int(min(self.nodes, MAX_OBSERVATIONS / len(before.capture.photos), pixels))
+        fine = yield from observe_surface(before, count, CHOSEN, 0.05)
+        n = len(fine.grid)
+        parameters, variance = (np.zeros((n, COUNT), np.float32) for _ in range(2))
+        share = (0.95 - CHOSEN - 0.05) / len(materials)
+        for index, material in enumerate(materials):
+            seen, nodes = fine.of_material(index)
+            if kinds[index].kind == EVEN or not len(seen):
+                continue
+            step = Step("estimating the variation", CHOSEN + 0.05 + index * share)
+            fields = yield from _last(nodes, _model(material), seen, kinds[index].kind, step, share)
+            rows = fine.rows(index)
+            parameters[rows], variance[rows] = fields.parameters, fields.variance
+        return VaryingSurface(fine.grid, parameters, np.sqrt(variance), fine.photos, tuple(kinds))
 
 
-def _model(fitted: CaptureResult, index: int) -> NodeModel:
-    material = fitted.materials[index]
+def _choice(
+    model: NodeModel,
+    seen: Observations,
+    nodes: Nodes,
+    kinds: tuple[str, ...],
+    start: float,
+    share: float,
+) -> Generator[Step, None, MaterialVariation]:
+    return (
+        yield from relayed(
+            steps_in_background(choose(model, seen, nodes, kinds)),
+            lambda done: Step("predicting held-out photos", start + share * done),
+        )
+    )
+
+
+def _last(
+    nodes: Nodes, model: NodeModel, seen: Observations, kind: str, step: Step, share: float
+) -> Generator[Step, None, NodeFields]:
+    """The fields after the finest level."""
+    steps = nodes.solve(model, seen, kind)
+    fields, start = None, step.fraction
+    while True:
+        found = yield from in_background(lambda: next(steps, None), step)
+        if found is None:
+            return finished(fields)
+        done, fields = found
+        step = Step(step.stage, start + share * done)
+
+
+def _model(material: MaterialResult) -> NodeModel:
     off = material.fit.normal_deviation if isinstance(material.fit, MeasuredResult) else 0.0
     return NodeModel.of(MaterialLevel.of(material.name, material.fit.brdf, material.scale, off))
 
 
-def _of_material(
-    seen: Observations, rows: NDArray[np.intp], index: int, count: int
-) -> Observations:
-    """The observations of one material at its own nodes ``rows``, numbered from 0."""
-    number = np.full(count, -1, np.int32)
-    number[rows] = np.arange(len(rows), dtype=np.int32)
-    own = seen.select(np.flatnonzero((seen.material == index) & (number[seen.node] >= 0)))
-    return replace(own, node=number[own.node])
-
-
 def _sentence(name: str, kind: MaterialVariation) -> str:
     """What was found about a material, for the user."""
-    if kind.kind != "even":
-        return f"{name} varies over the surface: {kind.kind}."
+    if kind.kind != EVEN:
+        errors = ""
+        if kind.typical:
+            errors = (
+                f" Held-out photos are predicted with a typical error of "
+                f"{100 * kind.typical[kind.kind]:.1f} % instead of "
+                f"{100 * kind.typical[EVEN]:.1f} %."
+            )
+        return f"{name} varies over the surface: {kind.kind}.{errors}"
     if not kind.cost:
         return f"{name} is taken as even: too few photos show it."
     return f"{name} is even: photos that were held out are not predicted better with variation."

@@ -88,7 +88,12 @@ def _varying(result: CaptureResult) -> dict[str, Any] | None:
         "nodes": len(surface.grid),
         "spacing": surface.grid.spacing,
         "materials": [
-            {"name": material.name, "varies": kind.kind, "held_out_cost": kind.cost}
+            {
+                "name": material.name,
+                "varies": kind.kind,
+                "held_out_cost": kind.cost,
+                "held_out_typical": kind.typical,
+            }
             for material, kind in zip(result.materials, surface.materials, strict=True)
         ],
     }

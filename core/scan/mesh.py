@@ -80,6 +80,12 @@ class Mesh:
         return normals[welded]
 
     @cached_property
+    def area(self) -> float:
+        """Area of all faces, square scan units."""
+        a, b, c = self.vertices[self.faces].transpose(1, 0, 2)
+        return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+    @cached_property
     def size(self) -> float:
         """Diagonal of the bounding box of the vertices that faces use, scan units."""
         used = self.vertices[np.unique(self.faces)]

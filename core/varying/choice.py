@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..statistics.student_t import robust_cost
-from .hierarchy import BLACK_SHARE, edges_of_levels, solve
+from .hierarchy import BLACK_SHARE, NodeFields, edges_of_levels, solve
 from .node_model import COUNT, NodeModel
 from .observations import Observations
 from .varying_surface import VARIATIONS, MaterialVariation
 
-FOLDS = 4  # groups of photos, each held out once
+FOLDS = 3  # groups of photos, each held out once
 MIN_PHOTOS = 3  # with fewer, one photo cannot be predicted from the others
 MIN_ERROR = 0.01  # of the logarithm of the radiance
 STANDARD_ERRORS = 2.0  # of the difference over photos by which a more varied kind must be better
@@ -25,72 +25,86 @@ CHUNK = 1 << 17
 @dataclass(frozen=True)
 class Nodes:
     """n nodes of one material. points, normals: (n, 3), scan frame; spacing: distance of
-    neighbouring nodes, scan units."""
+    neighbouring nodes; mesh_edge: mean length of an edge of the mesh; both in scan units."""
 
     points: NDArray[np.float64]
     normals: NDArray[np.float32]
     spacing: float
+    mesh_edge: float
+
+    def solve(
+        self, model: NodeModel, seen: Observations, kind: str
+    ) -> Iterator[tuple[float, NodeFields]]:
+        """The fields of what a key of VARIATIONS lets vary; see hierarchy.solve."""
+        free = np.zeros(COUNT, bool)
+        free[list(VARIATIONS[kind])] = True
+        edges = edges_of_levels(self.points, self.spacing)
+        return solve(model, seen, self.points, self.normals, edges, free, self.mesh_edge)
 
 
 def choose(
-    model: NodeModel, seen: Observations, nodes: Nodes
+    model: NodeModel, seen: Observations, nodes: Nodes, kinds: Sequence[str]
 ) -> Generator[float, None, MaterialVariation]:
-    """Choose a key of VARIATIONS by cross-validation over photos; yields the fraction done.
+    """Choose one of ``kinds``, simplest first, by cross-validation over photos; yields the fraction
+    done.
 
     The simplest kind is kept unless a more varied one predicts held-out photos better, by
-    STANDARD_ERRORS of the difference over photos. With fewer than MIN_PHOTOS it is "even".
+    STANDARD_ERRORS of the difference over photos. With fewer than MIN_PHOTOS it is the first.
     """
     photos = np.unique(seen.photo)
     if len(photos) < MIN_PHOTOS:
-        return MaterialVariation("even", {})
+        return MaterialVariation(kinds[0])
     black = BLACK_SHARE * float(np.median(seen.radiance.mean(axis=1)))
     zero = np.zeros((len(nodes.points), COUNT), np.float32)
-    error = max(float(np.median(np.abs(_residual(model, seen, nodes, zero, black)))), MIN_ERROR)
-    error /= 0.6745
-    costs: dict[str, list[float]] = {kind: [] for kind in VARIATIONS}
-    sizes: dict[str, list[float]] = {kind: [] for kind in VARIATIONS}
+    residual, _ = _errors(model, seen, nodes, zero, black)
+    error = max(float(np.median(np.abs(residual))) / 0.6745, MIN_ERROR)
+    costs: dict[str, list[float]] = {kind: [] for kind in kinds}
+    typical: dict[str, list[float]] = {kind: [] for kind in kinds}
     folds = [photos[k::FOLDS] for k in range(min(FOLDS, len(photos)))]
-    done, total = 0, len(folds) * len(VARIATIONS)
+    done, total = 0, len(folds) * len(kinds)
     for fold in folds:
         out = np.isin(seen.photo, fold)
         fitted, held = seen.select(~out), seen.select(out)
-        for kind, which in VARIATIONS.items():
+        for kind in kinds:
             theta = zero
-            if which and len(fitted):
-                free = np.zeros(COUNT, bool)
-                free[list(which)] = True
-                edges = edges_of_levels(nodes.points, nodes.spacing)
-                for _, fields in solve(model, fitted, nodes.points, nodes.normals, edges, free):
+            if VARIATIONS[kind] and len(fitted):
+                for _, fields in nodes.solve(model, fitted, kind):
                     theta = fields.parameters
-            residual = _residual(model, held, nodes, theta, black)
+            residual, relative = _errors(model, held, nodes, theta, black)
             for photo in fold:
-                own = residual[held.photo == photo]
-                costs[kind].append(float(robust_cost(own / error).mean()))
-                sizes[kind].append(float(np.median(np.abs(own))))
+                own = held.photo == photo
+                costs[kind].append(float(robust_cost(residual[own] / error).mean()))
+                typical[kind].append(float(np.median(relative[own])))
             done += 1
             yield done / total
-    chosen = "even"
-    for kind in list(VARIATIONS)[1:]:
+    chosen = kinds[0]
+    for kind in kinds[1:]:
         gain = np.array(costs[chosen]) - np.array(costs[kind])
         sure = gain.mean() > STANDARD_ERRORS * gain.std(ddof=1) / np.sqrt(len(gain))
         least = MIN_GAIN if chosen == "even" else 0.0
-        if sure and np.mean(sizes[kind]) < (1 - least) * np.mean(sizes[chosen]):
+        if sure and np.mean(typical[kind]) < (1 - least) * np.mean(typical[chosen]):
             chosen = kind
-    return MaterialVariation(chosen, {kind: float(np.mean(c)) for kind, c in costs.items()})
+    return MaterialVariation(chosen, _means(costs), _means(typical))
 
 
-def _residual(
+def _means(values: dict[str, list[float]]) -> dict[str, float]:
+    return {kind: float(np.mean(found)) for kind, found in values.items()}
+
+
+def _errors(
     model: NodeModel,
     seen: Observations,
     nodes: Nodes,
     theta: NDArray[np.float32],
     black: float,
-) -> NDArray[np.floating]:
-    """(m, 3) measured minus predicted logarithm of the radiance."""
-    out = np.empty((len(seen), 3), np.float32)
+) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+    """((m, 3) measured minus predicted logarithm of the radiance, (m, 3) relative error)."""
+    log, relative = np.empty((2, len(seen), 3), np.float32)
     for begin in range(0, len(seen), CHUNK):
         part = slice(begin, begin + CHUNK)
         some = seen.select(part)
         predicted = model.radiance(some.shading, nodes.normals[some.node], theta[some.node])
-        out[part] = np.log(np.maximum(some.radiance, 0) + black) - np.log(predicted + black)
-    return out
+        measured = np.maximum(some.radiance, 0)
+        log[part] = np.log(measured + black) - np.log(predicted + black)
+        relative[part] = np.abs(predicted - measured) / np.maximum(measured, black)
+    return log, relative

@@ -67,9 +67,10 @@ class NodeModel:
         return body + specular
 
     def derivatives(
-        self, seen: Shading, normal: Array, parameters: Array
+        self, seen: Shading, normal: Array, parameters: Array, free: NDArray[np.bool_]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """(radiance (m, 3), its derivatives (m, 3, 8) by the parameters)."""
+        """(radiance (m, 3), its derivatives (m, 3, 8) by the parameters). free: (8,); others get 0,
+        which saves time."""
         turned = tilted(normal, parameters)
         body, specular = self._lit(seen, turned, parameters)
         total = body + specular
@@ -77,10 +78,11 @@ class NodeModel:
         for channel in range(3):
             out[:, channel, channel] = body[:, channel]
         out[:, :, SPECULAR] = specular
-        rougher = parameters.copy()
-        rougher[:, GLOSS] += GLOSS_STEP
-        out[:, :, GLOSS] = (sum(self._lit(seen, turned, rougher)) - total) / GLOSS_STEP
-        for way in tangents(turned):
+        if free[GLOSS]:
+            rougher = parameters.copy()
+            rougher[:, GLOSS] += GLOSS_STEP
+            out[:, :, GLOSS] = (sum(self._lit(seen, turned, rougher)) - total) / GLOSS_STEP
+        for way in tangents(turned) if free[TILT].any() else ():
             further = _unit(turned + np.float32(TILT_STEP) * way)
             change = (sum(self._lit(seen, further, parameters)) - total) / TILT_STEP
             out[:, :, TILT] += change[:, :, None] * way[:, None, :].astype(np.float32)

@@ -87,7 +87,7 @@ def _surface(stored: Any, path: Path, mesh: Mesh, materials: int, declared: int)
     )
     photos = stored["photos"]
     kinds = tuple(
-        MaterialVariation(str(entry["kind"]), dict(entry["cost"]))
+        MaterialVariation(str(entry["kind"]), dict(entry["cost"]), dict(entry["typical"]))
         for entry in json.loads(str(stored["materials"]))
     )
     if parameters.shape != (n, COUNT) or deviation.shape != (n, COUNT) or photos.shape != (n,):

@@ -144,8 +144,12 @@ class SurfaceGrid:
         return np.asarray(a * (1 - second - third) + b * second + c * third)
 
     @cached_property
+    def mesh_edge(self) -> float:
+        """Mean length of an edge of the mesh, scan units."""
+        first, second = self.mesh.vertices[self.edges.T]
+        return float(np.linalg.norm(second - first, axis=1).mean())
+
+    @cached_property
     def spacing(self) -> float:
         """Root mean area of a node's surroundings, scan units."""
-        a, b, c = self.mesh.vertices[self.mesh.faces].transpose(1, 0, 2)
-        area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
-        return float(np.sqrt(area / max(len(self), 1)))
+        return float(np.sqrt(self.mesh.area / max(len(self), 1)))

@@ -4,7 +4,7 @@ grid."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +27,12 @@ VARIATIONS: dict[str, tuple[int, ...]] = {
 @dataclass(frozen=True)
 class MaterialVariation:
     """What varies over one material. kind: a key of VARIATIONS. cost: kind → mean cost of held-out
-    photos, in nats a pixel; empty where nothing was held out."""
+    photos, in nats a pixel; typical: kind → median relative error of their radiance. Both are empty
+    where nothing was held out."""
 
     kind: str
-    cost: dict[str, float]
+    cost: dict[str, float] = field(default_factory=dict)
+    typical: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

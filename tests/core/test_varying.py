@@ -7,11 +7,10 @@ import pytest
 
 from patina.core.concurrency.steps import drained
 from patina.core.varying.choice import Nodes, choose
-from patina.core.varying.hierarchy import NodeFields, edges_of_levels, solve
+from patina.core.varying.hierarchy import NodeFields
 from patina.core.varying.node_model import COUNT, DIFFUSE, TILT, Shading, tilted
+from patina.core.varying.varying_surface import VARIATIONS
 from tests.core.varying_scene import ALBEDO, SPACING, VaryingScene, fitted_model, scene
-
-ALL = np.ones(COUNT, bool)
 
 
 @pytest.fixture(scope="module")
@@ -19,10 +18,13 @@ def model():
     return fitted_model()
 
 
-def solved(model, made: VaryingScene, free=ALL) -> NodeFields:
-    edges = edges_of_levels(made.points, SPACING)
-    *_, (_, fields) = solve(model, made.seen, made.points, made.normals, edges, free)
+def solved(model, made: VaryingScene) -> NodeFields:
+    *_, (_, fields) = nodes_of(made).solve(model, made.seen, list(VARIATIONS)[-1])
     return fields
+
+
+def nodes_of(made: VaryingScene) -> Nodes:
+    return Nodes(made.points, made.normals, SPACING, SPACING)
 
 
 def angle(one, other):
@@ -36,7 +38,7 @@ def test_derivatives_are_those_of_the_radiance(model):
     made = scene(1, 3)
     seen = Shading(*(a[:50] for a in made.seen.shading))
     parameters = 0.1 * rng.normal(size=(50, COUNT)).astype(np.float32)
-    radiance, slope = model.derivatives(seen, normal, parameters)
+    radiance, slope = model.derivatives(seen, normal, parameters, np.ones(COUNT, bool))
     way = 0.003 * rng.normal(size=(50, COUNT)).astype(np.float32)
     other = model.radiance(seen, normal, parameters + way)
     expected = radiance + np.einsum("mcp,mp->mc", slope, way)
@@ -86,7 +88,7 @@ def test_photo_that_was_not_seen_is_predicted_better(model):
 def test_surface_that_varies_is_distinguished_from_an_even_one(model):
     for vary, expected in ((True, "diffuse"), (False, "even")):
         made = scene(6, 5, vary=vary)
-        found = drained(choose(model, made.seen, Nodes(made.points, made.normals, SPACING)))
+        found = drained(choose(model, made.seen, nodes_of(made), list(VARIATIONS)))
         assert found.kind.startswith(expected), found
 
 

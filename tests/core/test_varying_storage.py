@@ -21,7 +21,7 @@ def surface() -> VaryingSurface:
     rng = np.random.default_rng(0)
     values = 0.05 * rng.normal(size=(2, len(grid), COUNT)).astype(np.float32)
     photos = rng.integers(0, 20, len(grid)).astype(np.uint16)
-    kinds = (MaterialVariation("diffuse", {"even": 0.5, "diffuse": 0.3}),)
+    kinds = (MaterialVariation("diffuse", {"even": 0.5}, {"even": 0.2}),)
     return VaryingSurface(grid, values[0], np.abs(values[1]), photos, kinds)
 
 

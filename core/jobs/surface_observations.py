@@ -1,0 +1,93 @@
+"""What all photos of a fit show at the nodes of a grid on its mesh, for one material at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..concurrency.background import in_background
+from ..concurrency.job import Step
+from ..inputs import capture_data
+from ..varying.choice import Nodes
+from ..varying.labels import label_pixels
+from ..varying.observations import Observations, observe
+from ..varying.surface_grid import SurfaceGrid
+from ..varying.surface_photo import SurfacePhoto
+from .fit_job import CaptureResult
+
+
+@dataclass(frozen=True)
+class SurfaceObservations:
+    """grid: on the mesh; material: (n,) index of the material of each node, −1 for vertices without
+    a face; seen: observations of all nodes in all photos."""
+
+    grid: SurfaceGrid
+    material: NDArray[np.integer]
+    seen: Observations
+
+    def rows(self, index: int) -> NDArray[np.intp]:
+        """The nodes of one material."""
+        return np.flatnonzero(self.material == index)
+
+    def of_material(self, index: int, limit: int | None = None) -> tuple[Observations, Nodes]:
+        """(the observations of one material at its own nodes, numbered from 0; these nodes). limit:
+        largest number of nodes, a random part of more."""
+        grid, rows = self.grid, self.rows(index)
+        spacing = grid.spacing
+        if limit is not None and len(rows) > limit:
+            spacing *= np.sqrt(len(rows) / limit)
+            rows = np.sort(np.random.default_rng(0).choice(rows, limit, replace=False))
+        number = np.full(len(grid), -1, np.int32)
+        number[rows] = np.arange(len(rows), dtype=np.int32)
+        keep = (self.seen.material == index) & (number[self.seen.node] >= 0)
+        own = self.seen.select(np.flatnonzero(keep))
+        normals = grid.normals(rows).astype(np.float32)
+        nodes = Nodes(grid.points(rows), normals, spacing, grid.mesh_edge)
+        return replace(own, node=number[own.node]), nodes
+
+    @property
+    def photos(self) -> NDArray[np.uint16]:
+        """(n,) number of photos that show each node lit."""
+        return np.bincount(self.seen.node, minlength=len(self.grid)).astype(np.uint16)
+
+
+def observe_surface(
+    fitted: CaptureResult, nodes: int, start: float, share: float
+) -> Generator[Step, None, SurfaceObservations]:
+    """Read every photo at the nodes of a grid of about ``nodes`` nodes. start, share: the part of
+    the job that this takes."""
+    mesh, count = fitted.scan.mesh, len(fitted.capture.photos)
+    grid = yield from in_background(
+        lambda: SurfaceGrid.with_nodes(mesh, nodes), Step("dividing the mesh", start)
+    )
+    parts = []
+    for place in range(count):
+        step = Step("reading the surface in the photos", start + share * place / count)
+        parts.append((yield from in_background(lambda p=place: _one(fitted, grid, p), step)))  # type: ignore[misc]
+    face = grid.places[0]
+    material = np.where(face >= 0, fitted.face_material[face], -1)
+    return SurfaceObservations(grid, material, Observations.joined(parts))
+
+
+def pixel_size(fitted: CaptureResult) -> float:
+    """Median size of a pixel on the surface over all photos, scan units."""
+    sizes = []
+    for place in range(len(fitted.capture.photos)):
+        camera = capture_data.camera_of(fitted.capture, fitted.scan, place)
+        centre = fitted.scan.mesh.vertices[fitted.scan.mesh.faces[:, 0]].mean(axis=0)
+        away = np.linalg.norm(centre - camera.pose.centre)
+        sizes.append(float(camera.footprint(np.array([away], np.float32))[0]))
+    return float(np.median(sizes))
+
+
+def _one(fitted: CaptureResult, grid: SurfaceGrid, place: int) -> Observations:
+    """The observations of one photo."""
+    capture, scan = fitted.capture, fitted.scan
+    camera = capture_data.camera_of(capture, scan, place)
+    photo, light = fitted.photos.read(place), fitted.lights.of(capture, place)
+    labels = label_pixels(capture, scan, fitted.rays, camera, place, photo, light)
+    surface = SurfacePhoto(fitted.rays, camera, light, photo.radiance, labels)
+    return observe(surface, place, grid)
