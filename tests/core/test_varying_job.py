@@ -1,0 +1,111 @@
+"""A painted sphere: what varies is found, written, read back, and used in predictions."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from patina.commands import command_line
+from patina.core.capture import read_capture
+from patina.core.concurrency.steps import drained
+from patina.core.jobs import FitJob, finished
+from patina.core.jobs.photo_prediction import predict_one, prediction_inputs
+from patina.core.jobs.select_photos import select_photos
+from patina.core.jobs.varying_job import VaryingJob
+from patina.core.predict.errors import PhotoErrors
+from patina.core.varying.node_model import DIFFUSE
+from tests import make_capture as made
+
+DIFFUSE_BRDF = np.array([0.16, 0.05, 0.04])  # 1/sr, of the material that make_capture uses
+NODES = 20_000
+
+
+def paint(normal):
+    """Factor (n, 3) of the diffuse colour: bands around three axes."""
+    return 1 + 0.45 * np.sin(5 * normal)
+
+
+def painted(normal, light, view):
+    return made.blinn(normal, light, view) + DIFFUSE_BRDF * (paint(normal) - 1)
+
+
+def held_out_errors(capture, fitted, place):
+    given = prediction_inputs(capture, fitted)
+    return drained(predict_one(given, place)).errors
+
+
+@pytest.fixture(scope="module")
+def banded(tmp_path_factory):
+    """(capture of 17 photos, the job of a fit of the first 16)."""
+    capture = read_capture(
+        made.make_capture(tmp_path_factory.mktemp("banded"), photos=17, brdf=painted)
+    )
+    job = VaryingJob(FitJob(select_photos(capture, range(16)), portable=False), nodes=NODES)
+    job.drain()
+    return capture, job
+
+
+@pytest.mark.slow
+def test_painted_sphere_varies_and_a_photo_is_predicted_better(banded):
+    capture, job = banded
+    result = finished(job.result)
+    kind = result.varying.materials[0]
+    assert kind.kind != "even"
+    assert kind.typical[kind.kind] < 0.5 * kind.typical["even"]
+    assert any("varies over the surface" in note for note in result.notes)
+    even = held_out_errors(capture, finished(job.fit.result), 16)
+    varied = held_out_errors(capture, result, 16)
+    assert isinstance(varied, PhotoErrors)
+    assert varied.encoded_rmse < 0.6 * even.encoded_rmse
+    assert varied.typical < 0.6 * even.typical
+
+
+@pytest.mark.slow
+def test_colour_of_nodes_is_that_of_the_paint(banded):
+    _, job = banded
+    surface = finished(job.result).varying
+    normal = surface.grid.points(slice(None)) - made.CENTRE
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    seen = surface.photos >= 3
+    assert seen.mean() > 0.3
+    error = surface.parameters[seen][:, DIFFUSE] - np.log(paint(normal[seen]))
+    error -= np.median(error, axis=0)  # the level belongs to the BRDF
+    spread = np.log(paint(normal[seen])).std(axis=0)
+    assert np.all(np.median(np.abs(error), axis=0) < 0.25 * spread)
+    within = np.abs(error) < 1.645 * surface.deviation[seen][:, DIFFUSE]
+    assert 0.8 < within.mean() < 0.99
+
+
+@pytest.mark.slow
+def test_even_sphere_keeps_its_material(tmp_path):
+    capture = read_capture(made.make_capture(tmp_path, photos=8))
+    job = VaryingJob(FitJob(capture, portable=False), nodes=NODES)
+    job.drain()
+    result, before = finished(job.result), finished(job.fit.result)
+    assert result.varying is None
+    assert result.materials == before.materials
+    assert any("is even" in note for note in result.notes)
+
+
+@pytest.mark.slow
+def test_fit_writes_the_variation_and_predict_uses_it(tmp_path, monkeypatch):
+    monkeypatch.setattr("patina.commands.fit.has_blender", lambda: False)
+    capture = str(made.make_capture(tmp_path, photos=8, brdf=painted))
+
+    def run(*words: str) -> int:
+        return command_line.main([*words])
+
+    errors = []
+    for mode in ("never", "auto"):
+        result, out = str(tmp_path / mode), tmp_path / f"predicted_{mode}"
+        assert run("fit", capture, "--out", result, "--varying", mode) == 0
+        assert run("predict", capture, result, "--out", str(out)) == 0
+        errors.append(json.loads((out / "errors.json").read_text("utf-8"))["fitted"])
+    assert not (tmp_path / "never" / "varying.npz").exists()
+    described = json.loads((tmp_path / "auto" / "result.json").read_text("utf-8"))["varying"]
+    assert described["file"] == "varying.npz" and described["materials"][0]["varies"] != "even"
+    assert errors[1]["encoded_rmse"] < 0.6 * errors[0]["encoded_rmse"]
+    (tmp_path / "auto" / "varying.npz").unlink()
+    assert run("predict", capture, str(tmp_path / "auto"), "--out", str(tmp_path / "p")) != 0
