@@ -18,6 +18,7 @@ FOLDS = 3  # groups of photos, each held out once
 MIN_PHOTOS = 3  # with fewer, one photo cannot be predicted from the others
 MIN_ERROR = 0.01  # of the logarithm of the radiance
 STANDARD_ERRORS = 2.0  # of the difference over photos by which a more varied kind must be better
+MAX_RMS_GROWTH = 1.02  # highlights, which the cost hardly sees, may hardly be predicted worse
 MIN_GAIN = 0.02  # relative decrease of the error that makes a surface uneven
 CHUNK = 1 << 17
 
@@ -49,17 +50,19 @@ def choose(
     done.
 
     The simplest kind is kept unless a more varied one predicts held-out photos better, by
-    STANDARD_ERRORS of the difference over photos. With fewer than MIN_PHOTOS it is the first.
+    STANDARD_ERRORS of the difference over photos, without a larger RMS error of the radiance. With
+    fewer than MIN_PHOTOS it is the first.
     """
     photos = np.unique(seen.photo)
     if len(photos) < MIN_PHOTOS:
         return MaterialVariation(kinds[0])
     black = BLACK_SHARE * float(np.median(seen.radiance.mean(axis=1)))
     zero = np.zeros((len(nodes.points), COUNT), np.float32)
-    residual, _ = _errors(model, seen, nodes, zero, black)
+    residual, _, _ = _errors(model, seen, nodes, zero, black)
     error = max(float(np.median(np.abs(residual))) / 0.6745, MIN_ERROR)
     costs: dict[str, list[float]] = {kind: [] for kind in kinds}
     typical: dict[str, list[float]] = {kind: [] for kind in kinds}
+    rms: dict[str, list[float]] = {kind: [] for kind in kinds}
     folds = [photos[k::FOLDS] for k in range(min(FOLDS, len(photos)))]
     done, total = 0, len(folds) * len(kinds)
     for fold in folds:
@@ -70,11 +73,13 @@ def choose(
             if VARIATIONS[kind] and len(fitted):
                 for _, fields in nodes.solve(model, fitted, kind):
                     theta = fields.parameters
-            residual, relative = _errors(model, held, nodes, theta, black)
+            residual, relative, difference = _errors(model, held, nodes, theta, black)
             for photo in fold:
                 own = held.photo == photo
                 costs[kind].append(float(robust_cost(residual[own] / error).mean()))
                 typical[kind].append(float(np.median(relative[own])))
+                square = np.square(difference[own]).mean()
+                rms[kind].append(float(np.sqrt(square / np.square(held.radiance[own]).mean())))
             done += 1
             yield done / total
     chosen = kinds[0]
@@ -82,6 +87,7 @@ def choose(
         gain = np.array(costs[chosen]) - np.array(costs[kind])
         sure = gain.mean() > STANDARD_ERRORS * gain.std(ddof=1) / np.sqrt(len(gain))
         least = MIN_GAIN if chosen == "even" else 0.0
+        sure &= np.mean(rms[kind]) < MAX_RMS_GROWTH * np.mean(rms[chosen])
         if sure and np.mean(typical[kind]) < (1 - least) * np.mean(typical[chosen]):
             chosen = kind
     return MaterialVariation(chosen, _means(costs), _means(typical))
@@ -97,14 +103,16 @@ def _errors(
     nodes: Nodes,
     theta: NDArray[np.float32],
     black: float,
-) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
-    """((m, 3) measured minus predicted logarithm of the radiance, (m, 3) relative error)."""
-    log, relative = np.empty((2, len(seen), 3), np.float32)
+) -> tuple[NDArray[np.floating], NDArray[np.floating], NDArray[np.floating]]:
+    """(measured minus predicted logarithm of the radiance, relative error, error of the radiance),
+    each (m, 3)."""
+    log, relative, error = np.empty((3, len(seen), 3), np.float32)
     for begin in range(0, len(seen), CHUNK):
         part = slice(begin, begin + CHUNK)
         some = seen.select(part)
         predicted = model.radiance(some.shading, nodes.normals[some.node], theta[some.node])
         measured = np.maximum(some.radiance, 0)
         log[part] = np.log(measured + black) - np.log(predicted + black)
-        relative[part] = np.abs(predicted - measured) / np.maximum(measured, black)
-    return log, relative
+        error[part] = predicted - measured
+        relative[part] = np.abs(error[part]) / np.maximum(measured, black)
+    return log, relative, error
