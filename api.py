@@ -40,10 +40,12 @@ from .core.jobs.check_job import CheckJob
 from .core.jobs.exported_result import exported_result
 from .core.jobs.photo_prediction import PhotoPrediction, predict_one, prediction_inputs
 from .core.jobs.select_photos import photo_indices, select_photos
+from .core.jobs.varying_job import MODES, VaryingJob
 from .core.output_folder import check_out, staged_folder
 from .core.predict.errors import PhotoErrors
 from .core.report import diagnosis_json, result_json, write_report
 from .core.samples import SampleTable
+from .core.varying import storage
 
 __all__ = [
     "DEMO_CAPTURE",
@@ -177,15 +179,18 @@ def fit(
     capture: Capture,
     *,
     basis: Basis | None = None,
+    varying: str = "never",
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> FitResult:
     """Fit the BRDF of every material of a capture.
 
-    basis: principal components of the fit, None for the embedded basis. threads: number of threads
-    that read the photos, None for one per core, at most four; the result does not depend on it.
-    progress: called before each step. Raises InputError for wrong or missing photos, masks or
-    lights, and if a material has no usable lit pixel.
+    basis: principal components of the fit, None for the embedded basis. varying: whether colour,
+    gloss and normals vary over the surface: "auto" if held-out photos prefer it, "never" or
+    "always"; the variation is ``result.details.varying``. threads: number of threads that read the
+    photos, None for one per core, at most four; the result does not depend on it. progress: called
+    before each step. Raises InputError for wrong or missing photos, masks or lights, for another
+    word in ``varying``, and if a material has no usable lit pixel.
 
     >>> import numpy as np
     >>> import patina
@@ -201,9 +206,12 @@ def fit(
     ((1, 3), True)
     """
     _check_threads(threads)
-    job = FitJob(capture, basis=basis, threads=threads, keep=True)
+    if varying not in MODES:
+        raise InputError(f"found {varying!r}, expected one of {', '.join(MODES)}", key="varying")
+    fitting = FitJob(capture, basis=basis, threads=threads, keep=True)
+    job = fitting if varying == "never" else VaryingJob(fitting, varying)
     _drain(job, progress)
-    return FitResult(finished(job.result), dict(job.samples), tuple(job.stages))
+    return FitResult(finished(job.result), dict(fitting.samples), tuple(job.stages))
 
 
 def diagnose(
@@ -326,6 +334,8 @@ def export(
         for name in requested:
             if name == RECORD:
                 result_json.write(staging / "result.json", result.details, result.stages, ())
+                if result.details.varying is not None:
+                    storage.write(staging / storage.NAME, result.details.varying)
             elif name == REPORT:
                 for _ in write_report(staging / "report", result.details):
                     pass

@@ -7,14 +7,17 @@ import json
 import numpy as np
 import pytest
 
+import patina
 from patina.commands import command_line
 from patina.core.capture import read_capture
 from patina.core.concurrency.steps import drained
+from patina.core.errors import InputError
 from patina.core.jobs import FitJob, finished
 from patina.core.jobs.photo_prediction import predict_one, prediction_inputs
 from patina.core.jobs.select_photos import select_photos
 from patina.core.jobs.varying_job import VaryingJob
 from patina.core.predict.errors import PhotoErrors
+from patina.core.result import read_result
 from patina.core.varying.node_model import DIFFUSE
 from tests import make_capture as made
 
@@ -107,5 +110,17 @@ def test_fit_writes_the_variation_and_predict_uses_it(tmp_path, monkeypatch):
     described = json.loads((tmp_path / "auto" / "result.json").read_text("utf-8"))["varying"]
     assert described["file"] == "varying.npz" and described["materials"][0]["varies"] != "even"
     assert errors[1]["encoded_rmse"] < 0.6 * errors[0]["encoded_rmse"]
+    with pytest.raises(InputError, match="expected one of auto, never, always"):
+        patina.fit(patina.load_capture(capture), varying="sometimes")
     (tmp_path / "auto" / "varying.npz").unlink()
     assert run("predict", capture, str(tmp_path / "auto"), "--out", str(tmp_path / "p")) != 0
+
+
+@pytest.mark.slow
+def test_library_exports_the_variation(tmp_path):
+    capture = patina.load_capture(made.make_capture(tmp_path, photos=8, brdf=painted))
+    found = patina.fit(capture, varying="always")
+    assert found.details.varying.varies
+    patina.export(found, tmp_path / "out", ["json"])
+    assert (tmp_path / "out" / "varying.npz").is_file()
+    assert read_result(tmp_path / "out").varying == tmp_path / "out" / "varying.npz"
