@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from ..inputs.photos import LitPhotos
 from ..result import FittedResult
 from ..scan import Scan
 from ..varying import storage
+from ..varying.node_model import NodeModel
 from ..varying.varying_surface import VaryingSurface
 from .displaced_lights import displaced_lights
 from .face_assignment import face_materials
@@ -48,6 +50,11 @@ class FittedScene:
     materials: tuple[ScaledBRDF, ...]
     face_material: NDArray[np.int32]
     varying: VaryingSurface | None = None
+
+    @cached_property
+    def node_models(self) -> tuple[NodeModel, ...]:
+        """The materials as the nodes of a varying surface need them."""
+        return tuple(NodeModel.of(one.brdf, one.scale) for one in self.materials)
 
     @classmethod
     def of(cls, fitted: CaptureResult) -> FittedScene:

@@ -20,8 +20,6 @@ from ..photo.encoding import Encoding
 from ..predict.compose import predict_photo
 from ..predict.errors import PhotoErrors
 from ..samples.take import halo, light_surface
-from ..varying.level import MaterialLevel
-from ..varying.node_model import NodeModel
 from ..varying.varying_surface import predict_varying
 from .fit_job import CaptureResult
 from .fitted_scene import FittedScene
@@ -107,10 +105,6 @@ def predict_one(given: PredictionInputs, place: int) -> Generator[float, None, P
     lines = PixelRays.of(camera)
     columns = fitted.rays.cover.columns(camera)
     windows = list(bands(camera, halo(margins), columns, BAND_PIXELS))
-    models = [
-        NodeModel.of(MaterialLevel.of("", one.brdf, one.scale))
-        for one in (() if fitted.varying is None else fitted.materials)
-    ]
     for done, window in enumerate(windows):
         yield done / (1 + len(windows))
         view = view_window(fitted.rays, lines, window)
@@ -125,7 +119,7 @@ def predict_one(given: PredictionInputs, place: int) -> Generator[float, None, P
             predicted = predict_photo(view, lighting, parts)
         else:
             predicted = predict_varying(
-                view, lighting, fitted.varying, list(zip(pixels, models, strict=True))
+                view, lighting, fitted.varying, list(zip(pixels, fitted.node_models, strict=True))
             )
         wanted = view.pixel[view.wanted]
         radiance[wanted] = predicted[view.wanted]

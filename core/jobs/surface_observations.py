@@ -77,8 +77,7 @@ def pixel_size(fitted: CaptureResult) -> float:
     sizes = []
     for place in range(len(fitted.capture.photos)):
         camera = capture_data.camera_of(fitted.capture, fitted.scan, place)
-        centre = fitted.scan.mesh.vertices[fitted.scan.mesh.faces[:, 0]].mean(axis=0)
-        away = np.linalg.norm(centre - camera.pose.centre)
+        away = np.linalg.norm(fitted.rays.origin - camera.pose.centre)
         sizes.append(float(camera.footprint(np.array([away], np.float32))[0]))
     return float(np.median(sizes))
 

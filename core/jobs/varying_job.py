@@ -10,19 +10,17 @@ import numpy as np
 from ..concurrency.background import in_background, steps_in_background
 from ..concurrency.job import Job, Step, finished
 from ..concurrency.steps import relayed
-from ..fit.measured_result import MeasuredResult
 from ..varying.choice import Nodes, choose
 from ..varying.conversion import typical_samples
 from ..varying.hierarchy import NodeFields
-from ..varying.level import MaterialLevel
 from ..varying.node_model import COUNT, NodeModel
 from ..varying.observations import Observations
-from ..varying.varying_surface import VARIATIONS, MaterialVariation, VaryingSurface
+from ..varying.varying_surface import EVEN, VARIATIONS, MaterialVariation, VaryingSurface
 from .fit_job import CaptureResult, FitJob, MaterialResult, with_portable
 from .surface_observations import SurfaceObservations, observe_surface, pixel_size
 
 MODES = ("auto", "never", "always")
-EVEN, DIFFUSE, *FURTHER = VARIATIONS
+_, DIFFUSE, *FURTHER = VARIATIONS
 EVERYTHING = FURTHER[-1]
 MAX_NODES = 1_000_000  # of the grid: the texels that a mesh covers in a texture of 1400 × 1400
 MAX_OBSERVATIONS = 40_000_000  # nodes times photos, 60 bytes each
@@ -124,7 +122,7 @@ class VaryingJob(Job):
         finally:
             self.fit.capture = capture
         # its own errors would be those of samples that the variation was removed from
-        return replace(again, held_out=material.held_out, samples=material.samples)
+        return replace(again, held_out=material.held_out)
 
     def _surface(
         self,
@@ -181,8 +179,7 @@ def _last(
 
 
 def _model(material: MaterialResult) -> NodeModel:
-    off = material.fit.normal_deviation if isinstance(material.fit, MeasuredResult) else 0.0
-    return NodeModel.of(MaterialLevel.of(material.name, material.fit.brdf, material.scale, off))
+    return NodeModel.of(material.fit.brdf, material.scale)
 
 
 def _sentence(name: str, kind: MaterialVariation) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..concurrency.job import Step
 from ..scan import Mesh
-from ..varying.level import MaterialLevel
+from .level import MaterialLevel
 from .look import PhotoSampler
 from .slots import TexelSlots
 from .solve import TexelScales, solve_texels

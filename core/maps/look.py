@@ -15,8 +15,8 @@ from ..inputs.photos import LitPhoto
 from ..light import Light
 from ..scan import Camera, Scan
 from ..varying.labels import label_pixels
-from ..varying.level import MaterialLevel
 from ..varying.surface_photo import MIN_COSINE, SurfacePhoto, bilinear_corners
+from .level import MaterialLevel
 from .slots import TexelSamples
 
 Array = NDArray[np.floating]

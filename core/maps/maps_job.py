@@ -20,8 +20,8 @@ from ..jobs.sampling import take_samples
 from ..result import FittedResult
 from ..samples import SampleTable
 from ..scan import Mesh, Scan
-from ..varying.level import MaterialLevel
 from .gather import Gathered, gather_band
+from .level import MaterialLevel
 from .look import PhotoSampler
 from .material import MapMaterial, from_fit, from_result
 from .normals import TurnedNormals, tangent_normals

@@ -25,7 +25,7 @@ from ..fit.measured.normals import refine_normals
 from ..fit.measured.patches import Patches
 from ..samples import SampleTable
 from ..scan import Mesh
-from ..varying.level import MaterialLevel
+from .level import MaterialLevel
 from .texels import Texels
 
 Array = NDArray[np.float64]

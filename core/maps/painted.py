@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 from ..appearance.cube_root import COARSE, Target
 from ..appearance.layer_albedo import ior_from_f0
 from ..appearance.principled import MIN_ROUGHNESS, Principled
-from ..varying.level import MaterialLevel
+from .level import MaterialLevel
 
 Array = NDArray[np.float64]
 

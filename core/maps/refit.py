@@ -29,7 +29,7 @@ from ..jobs.estimators import estimate
 from ..jobs.fit_job import FitJob
 from ..samples import SampleTable
 from ..scan import Mesh
-from ..varying.level import MaterialLevel
+from .level import MaterialLevel
 from .settle import TexelMaps
 from .texels import Texels
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scan import Mesh
-from ..varying.level import MaterialLevel
 from .gather import Gathered
+from .level import MaterialLevel
 from .surround import VertexScales
 from .texels import Texels
 

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..statistics.student_t import robust_cost
-from .hierarchy import BLACK_SHARE, NodeFields, edges_of_levels, solve
+from .hierarchy import MIN_ERROR, NodeFields, edges_of_levels, near_black, robust_deviation, solve
 from .node_model import COUNT, NodeModel
 from .observations import Observations
-from .varying_surface import VARIATIONS, MaterialVariation
+from .varying_surface import EVEN, VARIATIONS, MaterialVariation
 
 FOLDS = 3  # groups of photos, each held out once
 MIN_PHOTOS = 3  # with fewer, one photo cannot be predicted from the others
-MIN_ERROR = 0.01  # of the logarithm of the radiance
 STANDARD_ERRORS = 2.0  # of the difference over photos by which a more varied kind must be better
 MAX_RMS_GROWTH = 1.02  # highlights, which the cost hardly sees, may hardly be predicted worse
 MIN_GAIN = 0.02  # relative decrease of the error that makes a surface uneven
@@ -56,10 +55,10 @@ def choose(
     photos = np.unique(seen.photo)
     if len(photos) < MIN_PHOTOS:
         return MaterialVariation(kinds[0])
-    black = BLACK_SHARE * float(np.median(seen.radiance.mean(axis=1)))
+    black = near_black(seen)
     zero = np.zeros((len(nodes.points), COUNT), np.float32)
     residual, _, _ = _errors(model, seen, nodes, zero, black)
-    error = max(float(np.median(np.abs(residual))) / 0.6745, MIN_ERROR)
+    error = max(robust_deviation(residual), MIN_ERROR)
     costs: dict[str, list[float]] = {kind: [] for kind in kinds}
     typical: dict[str, list[float]] = {kind: [] for kind in kinds}
     rms: dict[str, list[float]] = {kind: [] for kind in kinds}
@@ -86,7 +85,7 @@ def choose(
     for kind in kinds[1:]:
         gain = np.array(costs[chosen]) - np.array(costs[kind])
         sure = gain.mean() > STANDARD_ERRORS * gain.std(ddof=1) / np.sqrt(len(gain))
-        least = MIN_GAIN if chosen == "even" else 0.0
+        least = MIN_GAIN if chosen == EVEN else 0.0
         sure &= np.mean(rms[kind]) < MAX_RMS_GROWTH * np.mean(rms[chosen])
         if sure and np.mean(typical[kind]) < (1 - least) * np.mean(typical[chosen]):
             chosen = kind

@@ -55,10 +55,9 @@ CHUNK = 1 << 17  # observations at once, to limit memory
 
 @dataclass(frozen=True)
 class NodeFields:
-    """Parameters (n, 8) of n nodes and their variances (n, 8), both float32; the
-    variances are those of the finest level, and 0 before. deviation: (levels,
-    8) standard deviations of each level's Σ; error: of the logarithm of the radiance that remains
-    at the finest level."""
+    """Parameters (n, 8) of n nodes and their variances (n, 8), both float32; the variances are 0
+    before the finest level. deviation: (levels, 8) standard deviations of each level's Σ; error: of
+    the logarithm of the radiance that remains."""
 
     parameters: NDArray[np.float32]
     variance: NDArray[np.float32]
@@ -91,7 +90,7 @@ def solve(
     normal = np.asarray(normals, np.float32)
     theta = np.zeros((len(points), COUNT), np.float32)
     which = np.flatnonzero(free)
-    black = BLACK_SHARE * float(np.median(seen.radiance.mean(axis=1))) if len(seen) else 1.0
+    black = near_black(seen)
     levels: list[_Level] = []
     start = FIRST_DEVIATION[which]
     error = _remaining_error(model, seen, normal, theta, black)
@@ -235,7 +234,17 @@ def _remaining_error(
         return MAX_ERROR
     predicted = model.radiance(some.shading, normal[some.node], theta[some.node])
     residual = np.log(np.maximum(some.radiance, 0) + black) - np.log(predicted + black)
-    return float(np.clip(np.median(np.abs(residual)) / 0.6745, MIN_ERROR, MAX_ERROR))
+    return float(np.clip(robust_deviation(residual), MIN_ERROR, MAX_ERROR))
+
+
+def near_black(seen: Observations) -> float:
+    """The radiance that is added before the logarithm."""
+    return BLACK_SHARE * float(np.median(seen.radiance.mean(axis=1))) if len(seen) else 1.0
+
+
+def robust_deviation(residual: Array) -> float:
+    """Standard deviation by the median of the absolute values: outliers do not matter."""
+    return float(np.median(np.abs(residual)) / 0.6745)
 
 
 def _chunks(count: int) -> list[slice]:

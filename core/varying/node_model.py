@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 
 from ..angles import Angles, half_difference
 from ..angles.vectors import tangents
+from ..basis import PrincipalBRDF
 from ..basis.log_table import LogTable
-from .level import MaterialLevel
+from .split import split_body
 
 Array = NDArray[np.floating]
 
@@ -56,10 +57,9 @@ class NodeModel:
     scale: float
 
     @classmethod
-    def of(cls, level: MaterialLevel) -> NodeModel:
+    def of(cls, brdf: PrincipalBRDF, scale: float = 1.0) -> NodeModel:
         """The model of a fitted material. One without a diffuse body is scaled as a whole."""
-        table = LogTable.of(level.brdf.basis, level.brdf.coefficients)
-        return cls(table, level.split.body.astype(np.float32), level.scale)
+        return cls(brdf.log_table, split_body(brdf.evaluate).body.astype(np.float32), scale)
 
     def radiance(self, seen: Shading, normal: Array, parameters: Array) -> NDArray[np.float32]:
         """(m, 3) radiance at points with smooth normals (m, 3)."""

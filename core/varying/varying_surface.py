@@ -15,8 +15,9 @@ from ..scan import Mesh
 from .node_model import NodeModel, Shading, tilted
 from .surface_grid import SurfaceGrid
 
+EVEN = "even"
 VARIATIONS: dict[str, tuple[int, ...]] = {
-    "even": (),
+    EVEN: (),
     "diffuse": (0, 1, 2),
     "diffuse and normals": (0, 1, 2, 5, 6, 7),
     "diffuse, specular, gloss and normals": (0, 1, 2, 3, 4, 5, 6, 7),
@@ -50,7 +51,7 @@ class VaryingSurface:
     @property
     def varies(self) -> bool:
         """Whether any material is not even."""
-        return any(material.kind != "even" for material in self.materials)
+        return any(material.kind != EVEN for material in self.materials)
 
     def at(
         self, face: NDArray[np.integer], second: NDArray[np.floating], third: NDArray[np.floating]

@@ -12,12 +12,12 @@ from patina.core.capture import read_capture
 from patina.core.errors import InputError
 from patina.core.jobs import FitJob
 from patina.core.maps import MapsJob, MapsSettings
+from patina.core.maps.level import MaterialLevel
 from patina.core.maps.normals import corner_tangents
 from patina.core.maps.write import albedo, base_color, describe, write_maps
 from patina.core.report import result_json
 from patina.core.result import read_result
 from patina.core.scan import Mesh
-from patina.core.varying.level import MaterialLevel
 from tests import make_capture as made
 
 DIFFUSE_BRDF = np.array([0.16, 0.05, 0.04])  # 1/sr, of the material that make_capture uses

@@ -10,7 +10,6 @@ import numpy as np
 from patina.core.angles import Angles, half_difference, light_view
 from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.fit import ridge
-from patina.core.varying.level import MaterialLevel
 from patina.core.varying.node_model import NodeModel
 from patina.core.varying.observations import Observations
 
@@ -50,7 +49,7 @@ def fitted_model() -> NodeModel:
     rho = ALBEDO / np.pi + ggx(normal, light, view)[:, None]
     _, q = basis.rows(angles, 20)
     brdf = PrincipalBRDF(basis, ridge.solve(q, basis.mapped(rho, angles)))
-    return NodeModel.of(MaterialLevel.of("even", brdf))
+    return NodeModel.of(brdf)
 
 
 def scene(photos: int, seed: int, vary: bool = True, tilt: float = 0.0) -> VaryingScene:

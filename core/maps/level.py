@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..angles import Angles
 from ..basis import PrincipalBRDF
-from .split import BodySplit, split_body
+from ..varying.split import BodySplit, split_body
 
 Array = NDArray[np.floating]
 
