@@ -209,7 +209,9 @@ def test_sliders_are_saved_and_new_fit_resets_them() -> None:
     assert bpy.ops.patina.fit() == {"FINISHED"}
     material = bpy.data.materials["surface"]
     assert not extension("scene.material.trait_offsets").state(material)
-    assert material_state(material)["coefficients"] == before["coefficients"]
+    # not bit for bit: sums of float32 depend on where memory happens to lie
+    again = np.array(material_state(material)["coefficients"])
+    np.testing.assert_allclose(again, before["coefficients"], atol=0.01 * 0.75 / np.sqrt(300))
 
 
 def test_timer_updates_and_stops() -> None:
