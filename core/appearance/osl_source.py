@@ -17,6 +17,9 @@ LAMPS = 8  # largest number of lamps
 # inputs that are paths of pictures
 COMPONENTS, REMAINDER, SAMPLING = "components", "remainder", "sampling"
 ALPHAS = "alphas"  # of the lobes that Cycles samples
+BODY = "body"  # level of the diffuse body, 1/sr
+# factors over the surface: of the diffuse body, of the specular part, of α
+BODY_SCALE, SPECULAR_SCALE, ROUGHNESS_SCALE = "body_scale", "specular_scale", "roughness_scale"
 # the table of the world, and the rows of the rotation from world space to its picture
 WORLD = ("world", "world_x", "world_y", "world_z")
 
@@ -66,8 +69,10 @@ def inputs(count: int) -> list[Input]:
         Input(SAMPLING, "Sampling", "string", ""),
         Input("shading_normal", "Normal", "vector", (0.0, 0.0, 0.0)),
         Input("scale", "Reflectance Scale", "float", 1.0),
-        Input("body", "Body", "vector", (0.0, 0.0, 0.0), hidden=True),
-        Input("body_scale", "Body Scale", "color", (1.0, 1.0, 1.0)),
+        Input(BODY, "Body", "vector", (0.0, 0.0, 0.0), hidden=True),
+        Input(BODY_SCALE, "Body Scale", "color", (1.0, 1.0, 1.0)),
+        Input(SPECULAR_SCALE, "Specular Scale", "float", 1.0),
+        Input(ROUGHNESS_SCALE, "Roughness Scale", "float", 1.0),
         Input(ALPHAS, "Lobes", "vector", (0.02, 0.1, 0.5), hidden=True),
         *coefficient_inputs(count),
         Input(WORLD[0], "World", "string", "", hidden=True),

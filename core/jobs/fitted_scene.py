@@ -89,8 +89,13 @@ def scene_of_result(
             refined(lights, capture, scan, photos, rays, result.basis),
             lambda done: Step("refining the lights", 0.5 * done),
         )
+    varying = None
+    if result.varying is not None:
+        varying = storage.read(result.varying, scan.mesh, len(stored))
     face_material = np.zeros(len(scan.mesh.faces), np.int32)
-    if len(capture.materials) > 1:
+    if varying is not None:
+        face_material = varying.face_material.astype(np.int32)
+    elif len(capture.materials) > 1:
         taken = yield from relayed(
             take_samples(capture, scan, rays, photos, lights, threads=threads),
             lambda done: Step("assigning materials to the mesh", 0.5 + 0.5 * done),
@@ -98,7 +103,4 @@ def scene_of_result(
         face_material = face_materials(capture, scan, taken.votes)
     materials = tuple(ScaledBRDF(one.brdf, one.scale) for one in stored)
     lights = displaced_lights(lights, result.effects)
-    varying = None
-    if result.varying is not None:
-        varying = storage.read(result.varying, scan.mesh, len(materials))
     return FittedScene(capture, scan, rays, photos, lights, materials, face_material, varying)

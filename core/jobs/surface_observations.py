@@ -10,13 +10,15 @@ from numpy.typing import NDArray
 
 from ..concurrency.background import in_background
 from ..concurrency.job import Step
+from ..fit.measured_result import MeasuredResult
 from ..inputs import capture_data
-from ..varying.choice import Nodes
+from ..varying.choice import MIN_NORMAL_ERROR, Nodes
+from ..varying.hierarchy import MAX_TILT
 from ..varying.labels import label_pixels
 from ..varying.observations import Observations, observe
 from ..varying.surface_grid import SurfaceGrid
 from ..varying.surface_photo import SurfacePhoto
-from .fit_job import CaptureResult
+from .fit_job import CaptureResult, MaterialResult
 
 
 @dataclass(frozen=True)
@@ -32,9 +34,11 @@ class SurfaceObservations:
         """The nodes of one material."""
         return np.flatnonzero(self.material == index)
 
-    def of_material(self, index: int, limit: int | None = None) -> tuple[Observations, Nodes]:
-        """(the observations of one material at its own nodes, numbered from 0; these nodes). limit:
-        largest number of nodes, a random part of more."""
+    def of_material(
+        self, index: int, material: MaterialResult, limit: int | None = None
+    ) -> tuple[Observations, Nodes]:
+        """(the observations of material ``index`` at its own nodes, numbered from 0; these nodes).
+        limit: largest number of nodes, a random part of more."""
         grid, rows = self.grid, self.rows(index)
         spacing = grid.spacing
         if limit is not None and len(rows) > limit:
@@ -45,7 +49,10 @@ class SurfaceObservations:
         keep = (self.seen.material == index) & (number[self.seen.node] >= 0)
         own = self.seen.select(np.flatnonzero(keep))
         normals = grid.normals(rows).astype(np.float32)
-        nodes = Nodes(grid.points(rows), normals, spacing, grid.mesh_edge)
+        error = MIN_NORMAL_ERROR
+        if isinstance(material.fit, MeasuredResult):
+            error = float(np.clip(np.radians(material.fit.normal_deviation), error, MAX_TILT))
+        nodes = Nodes(grid.points(rows), normals, spacing, grid.mesh_edge, error)
         return replace(own, node=number[own.node]), nodes
 
     @property

@@ -13,6 +13,7 @@ from ..concurrency.steps import relayed
 from ..varying.choice import Nodes, choose
 from ..varying.conversion import typical_samples
 from ..varying.hierarchy import NodeFields
+from ..varying.labels import check_material_count
 from ..varying.node_model import COUNT, NodeModel
 from ..varying.observations import Observations
 from ..varying.varying_surface import EVEN, VARIATIONS, MaterialVariation, VaryingSurface
@@ -47,6 +48,7 @@ class VaryingJob(Job):
 
     def run(self) -> Iterator[Step]:
         """Fit, choose what varies on a coarse grid, then estimate it on a fine one."""
+        check_material_count(self.fit.capture)
         if self.fit.result is None:
             for step in self.fit.run():
                 yield Step(step.stage, FITTED * step.fraction)
@@ -75,7 +77,7 @@ class VaryingJob(Job):
     ) -> Generator[Step, None, tuple[MaterialResult, MaterialVariation]]:
         """(a material with its BRDF fitted without the variation, what varies)."""
         material = finished(self.fit.result).materials[index]
-        seen, nodes = coarse.of_material(index, CHOICE_NODES)
+        seen, nodes = coarse.of_material(index, material, CHOICE_NODES)
         if not len(seen):
             return material, MaterialVariation(EVEN)
         model = _model(material)
@@ -138,14 +140,21 @@ class VaryingJob(Job):
         parameters, variance = (np.zeros((n, COUNT), np.float32) for _ in range(2))
         share = (0.95 - CHOSEN - 0.05) / len(materials)
         for index, material in enumerate(materials):
-            seen, nodes = fine.of_material(index)
+            seen, nodes = fine.of_material(index, material)
             if kinds[index].kind == EVEN or not len(seen):
                 continue
             step = Step("estimating the variation", CHOSEN + 0.05 + index * share)
             fields = yield from _last(nodes, _model(material), seen, kinds[index].kind, step, share)
             rows = fine.rows(index)
             parameters[rows], variance[rows] = fields.parameters, fields.variance
-        return VaryingSurface(fine.grid, parameters, np.sqrt(variance), fine.photos, tuple(kinds))
+        return VaryingSurface(
+            fine.grid,
+            parameters,
+            np.sqrt(variance),
+            fine.photos,
+            before.face_material.astype(np.uint8),
+            tuple(kinds),
+        )
 
 
 def _choice(

@@ -20,12 +20,13 @@ from ..jobs.sampling import take_samples
 from ..result import FittedResult
 from ..samples import SampleTable
 from ..scan import Mesh, Scan
+from ..varying import storage
 from .gather import Gathered, gather_band
 from .level import MaterialLevel
 from .look import PhotoSampler
-from .material import MapMaterial, from_fit, from_result
+from .maps_result import MapsResult, baked_maps, levels_of, notes_of, with_dielectrics
+from .material import from_fit, from_result
 from .normals import TurnedNormals, tangent_normals
-from .painted import painted_principled
 from .refit import Paint, PaintlessFitJob, levels_without_paint, scaled
 from .settle import TexelMaps, complete_maps
 from .texels import Texels, check_size, rasterise
@@ -44,31 +45,12 @@ Unwrap = Callable[[Mesh], NDArray[np.float32]]
 @dataclass(frozen=True)
 class MapsSettings:
     """size: texels a side. refits: number of refits of the BRDF to samples with the colour
-    variation removed, if the colour varies over the surface. normal: make a normal map too."""
+    variation removed, if the colour varies over the surface. normal: make a normal map too.
+    The last two have no effect on results whose variation was estimated with the fit."""
 
     size: int = 2048
     refits: int = REFITS
     normal: bool = False
-
-
-@dataclass(frozen=True)
-class MapsResult:
-    """texels: those that the mesh covers; maps: their values; levels, materials: in the order of
-    the capture; unwrapped: True if the texture coordinates were made by this job; refit: the fit
-    with the colour variation removed, None if none was needed; normal: (n, 3) unit normals of the
-    texels in their tangent frames, None if not requested or without enough samples; notes:
-    sentences for the user."""
-
-    capture: Capture
-    scan: Scan
-    texels: Texels
-    maps: TexelMaps
-    levels: tuple[MaterialLevel, ...]
-    materials: tuple[MapMaterial, ...]
-    unwrapped: bool
-    refit: CaptureResult | None
-    normal: NDArray[np.float32] | None
-    notes: tuple[str, ...]
 
 
 class MapsJob(Job):
@@ -92,7 +74,8 @@ class MapsJob(Job):
         self.result: MapsResult | None = None
 
     def run(self) -> Iterator[Step]:
-        """Read the scan and the lights, sample every photo, then smooth and fill the maps."""
+        """Read the scan. Where the variation was estimated with the fit, make the maps of it; else
+        read the lights, sample every photo, then smooth and fill the maps."""
         capture = self.capture
         check_size(self.settings.size)
         own = from_result(capture, self.fitted)
@@ -105,26 +88,30 @@ class MapsJob(Job):
             yield Step("unwrapping the mesh", 0.01)
             scan = replace(scan, mesh=replace(scan.mesh, uv=self.unwrap(scan.mesh)))
         texels = rasterise(scan.mesh, self.settings.size)
+        if self.fitted.varying is not None:
+            step = Step("computing maps of the variation", 0.1)
+            surface = storage.read(self.fitted.varying, scan.mesh, len(own))
+            self.result = yield from in_background(
+                lambda: baked_maps(capture, scan, texels, surface, own, unwrapped), step
+            )
+            return
         yield Step("reading the scan", 0.02)
         rays = RayScene.build(scan.mesh)
         photos = LitPhotos.open(capture)
         lights = yield from self._lights(scan, photos, rays)
         see = _PhotoInputs(capture, scan, rays, photos, lights)
-        levels = _levels(own)
+        levels = levels_of(own)
         refit = yield from self._without_paint(see, texels, levels)
         if refit is not None:
             own = from_fit(refit)
-            levels = _levels(own)
+            levels = levels_of(own)
         maps = yield from self._maps(see, texels, levels, 0.8, 0.16)
-        own = tuple(
-            replace(m, principled=painted_principled(level, m.principled))
-            for m, level in zip(own, levels, strict=True)
-        )
+        own = with_dielectrics(own, levels)
         normal = None
         if self.settings.normal:
             paint = Paint(scan.mesh, texels, maps, levels)
             normal = yield from self._normal(see, paint)
-        notes = _notes(texels, levels, unwrapped, refit is not None)
+        notes = notes_of(texels, levels, unwrapped, refit is not None)
         self.result = MapsResult(
             capture, scan, texels, maps, levels, own, unwrapped, refit, normal, notes
         )
@@ -140,7 +127,11 @@ class MapsJob(Job):
         def work() -> NDArray[np.float32] | None:
             plain = [paint.removed(i, scaled(t, paint.levels[i])) for i, t in enumerate(tables)]
             turned = TurnedNormals.of(plain, paint.levels)
-            return None if turned is None else tangent_normals(paint.mesh, paint.texels, turned)
+            if turned is None:
+                return None
+            return tangent_normals(
+                paint.mesh, paint.texels, lambda p: turned.at_texels(paint.mesh, paint.texels, p)
+            )
 
         return (yield from in_background(work, step))
 
@@ -255,10 +246,6 @@ class _PhotoInputs:
             yield Step("sampling texels in the photos", begin + share * place / count), look
 
 
-def _levels(materials: tuple[MapMaterial, ...]) -> tuple[MaterialLevel, ...]:
-    return tuple(MaterialLevel.of(m.name, m.brdf, m.scale, m.normal_deviation) for m in materials)
-
-
 def _painted(maps: TexelMaps, levels: tuple[MaterialLevel, ...]) -> bool:
     """True if the colour of any material varies by more than a fit of one BRDF tolerates. Judged by
     the central 68 % of the well-measured texels, so that a few wrong ones do not matter."""
@@ -272,36 +259,3 @@ def _painted(maps: TexelMaps, levels: tuple[MaterialLevel, ...]) -> bool:
         if (0.5 * (high - low) / max(middle, 1e-6)) ** 2 > MAX_VARIATION**2 + noise**2:
             return True
     return False
-
-
-def _notes(
-    texels: Texels, levels: tuple[MaterialLevel, ...], unwrapped: bool, refitted: bool
-) -> tuple[str, ...]:
-    notes = []
-    if refitted:
-        notes.append(
-            "The colour varies over the surface. The BRDF was fitted again to samples with this "
-            "variation removed; the new fit is written to the folder of the maps. Its errors on "
-            "held-out photos are those of photos without the variation."
-        )
-    if unwrapped:
-        notes.append(
-            "The mesh has no texture coordinates. They were made by Blender's Smart UV Project."
-        )
-    if texels.overlapped:
-        share = 100 * texels.overlapped / len(texels)
-        notes.append(
-            f"{share:.1f} % of the texels are covered by more than one face (overlapping UVs). The "
-            "first of these faces is used."
-        )
-    if texels.outside:
-        notes.append(
-            f"{texels.outside:,} faces have texture coordinates outside 0 … 1. They get no map."
-        )
-    notes += [
-        f"{level.name}: only {100 * level.split.share:.0f} % of the reflected light is diffuse. "
-        "The maps therefore scale the whole reflectance."
-        for level in levels
-        if level.split.whole
-    ]
-    return tuple(notes)

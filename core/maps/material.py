@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from ..appearance.principled import Principled
 from ..basis import PrincipalBRDF
 from ..capture import Capture
-from ..errors import InputError
 from ..fit.measured_result import MeasuredResult
 from ..jobs import CaptureResult
 from ..result import FittedResult
-from ..varying.labels import MAX_MATERIALS
+from ..varying.labels import check_material_count
 
 
 @dataclass(frozen=True)
@@ -29,13 +28,8 @@ class MapMaterial:
 
 def from_result(capture: Capture, fitted: FittedResult) -> tuple[MapMaterial, ...]:
     """The materials in the order of the capture. Raises InputError if one is missing in the result,
-    or if there are more than MAX_MATERIALS."""
-    if len(capture.materials) > MAX_MATERIALS:
-        raise InputError(
-            f"found {len(capture.materials)} materials; expected at most {MAX_MATERIALS} for "
-            "maps; combine some of them",
-            file=capture.file,
-        )
+    or if there are too many."""
+    check_material_count(capture)
     stored = fitted.materials_of([m.name for m in capture.materials], capture.file.name)
     return tuple(
         MapMaterial(m.name, m.brdf, m.principled, m.scale, m.normal_deviation) for m in stored

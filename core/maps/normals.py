@@ -13,7 +13,7 @@ sums. The corrections are a few degrees, so an error of one degree in a tangent 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,6 +76,10 @@ class TurnedNormals:
             return None
         return cls(np.concatenate(points), np.concatenate(turns), float(np.max(sizes)))
 
+    def at_texels(self, mesh: Mesh, texels: Texels, part: slice) -> Array:
+        """(m, 3) corrected unit normals of the texels ``part``."""
+        return self.at(texels.points(mesh, part), texels.normals(mesh, part))
+
     def at(self, points: Array, normals: Array) -> Array:
         """(n, 3) corrected unit normals at points (n, 3) with the smooth normals ``normals`` (n,
         3)."""
@@ -95,13 +99,15 @@ class TurnedNormals:
         return out
 
 
-def tangent_normals(mesh: Mesh, texels: Texels, turned: TurnedNormals) -> NDArray[np.float32]:
+def tangent_normals(
+    mesh: Mesh, texels: Texels, normals: Callable[[slice], Array]
+) -> NDArray[np.float32]:
     """(n, 3) corrected unit normals of all texels in their tangent frames; (0, 0, 1) is the smooth
-    normal of the mesh."""
+    normal of the mesh. normals: function that returns them in the scan frame for a part."""
     corner, tangents, sign = corner_tangents(mesh)
     out = np.empty((len(texels), 3), np.float32)
     for begin in range(0, len(texels), CHUNK):
-        part = slice(begin, begin + CHUNK)
+        part = slice(begin, min(begin + CHUNK, len(texels)))
         normal = texels.normals(mesh, part)
         face = texels.face[part]
         second, third = (w[part, None].astype(np.float64) for w in (texels.second, texels.third))
@@ -110,7 +116,7 @@ def tangent_normals(mesh: Mesh, texels: Texels, turned: TurnedNormals) -> NDArra
         tangent -= np.einsum("nc,nc->n", tangent, normal)[:, None] * normal
         tangent = _unit(tangent)
         other = sign[face, None] * np.cross(normal, tangent)
-        found = turned.at(texels.points(mesh, part), normal)
+        found = normals(part)
         frame = np.stack([tangent, other, normal], axis=1)
         out[part] = np.einsum("nij,nj->ni", frame, found)
     return out

@@ -1,4 +1,4 @@
-"""Maps as image files (base colour, roughness, scale, shares, coverage) and maps.json."""
+"""Maps as image files (base colour, roughness, factors, shares, coverage) and maps.json."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from ..files import write_text_atomic
 from ..photo import write_png
 from ..photo.image import write_exr
 from .dilate import dilated, margin_of
-from .maps_job import MapsResult
+from .maps_result import MapsResult
 from .settle import MaterialMaps
 
 Format = Literal["exr", "png"]
 BLEND = "blend"  # NAME of the maps that blend all materials
 PHOTO_STEP = 25  # grey levels of coverage.png for each photo
 MAX_ERROR = 0.5  # relative error that is white in uncertainty.png
-MAX_ROUGHNESS = 1.0
+MAX_ROUGHNESS = MAX_SPECULAR = 1.0  # of the inputs of a Principled BSDF
 FORMAT = 1  # version of maps.json
 
 
@@ -60,6 +60,14 @@ def roughness(result: MapsResult, index: int) -> NDArray[np.float32]:
     return _rougher(result.maps.materials[index], float(fitted))
 
 
+def specular(result: MapsResult, index: int) -> NDArray[np.float32]:
+    """(n,) Specular IOR Level of the fitted Principled BSDF times the factor of the specular
+    part."""
+    fitted = float(result.materials[index].principled.specular_ior_level)
+    factor = result.maps.materials[index].specular
+    return np.clip(fitted * factor, 0.0, MAX_SPECULAR).astype(np.float32)
+
+
 def albedo(result: MapsResult, index: int) -> NDArray[np.float32]:
     """(n, 3) albedo of the diffuse body, π·D·scale; the base colour of a material that is scaled as
     a whole."""
@@ -89,7 +97,13 @@ def _maps(
         yield named("albedo", True), albedo(result, index), _typical(result, index, colours)
         shine = roughness(result, index)
         yield named("roughness", False), shine, float(material.principled.roughness)
-        yield named("scale", False, ending="exr"), result.maps.materials[index].scale, 1.0
+        own = result.maps.materials[index]
+        yield named("scale", False, ending="exr"), own.scale, 1.0
+        yield named("roughness_scale", False, ending="exr"), np.exp(own.gloss), 1.0
+        if (own.specular != 1).any():
+            level = float(material.principled.specular_ior_level)
+            yield named("specular", False), specular(result, index), level
+            yield named("specular_scale", False, ending="exr"), own.specular, 1.0
         if several:
             yield named("mask", False), result.maps.materials[index].share, 0.0
     if several:
@@ -128,7 +142,7 @@ def _blended(result: MapsResult) -> dict[str, NDArray[np.float32]]:
             elif what == "metallic":
                 total = total + own * np.float32(principled.metallic)
             else:
-                total = total + own * np.float32(principled.specular_ior_level)
+                total = total + own * specular(result, index)
         found[what] = np.asarray(total, np.float32)
     return found
 

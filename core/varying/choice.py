@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..statistics.student_t import robust_cost
 from .hierarchy import MIN_ERROR, NodeFields, edges_of_levels, near_black, robust_deviation, solve
-from .node_model import COUNT, NodeModel
+from .node_model import COUNT, TILT, NodeModel
 from .observations import Observations
 from .varying_surface import EVEN, VARIATIONS, MaterialVariation
 
@@ -18,19 +18,23 @@ FOLDS = 3  # groups of photos, each held out once
 MIN_PHOTOS = 3  # with fewer, one photo cannot be predicted from the others
 STANDARD_ERRORS = 2.0  # of the difference over photos by which a more varied kind must be better
 MAX_RMS_GROWTH = 1.02  # highlights, which the cost hardly sees, may hardly be predicted worse
-MIN_GAIN = 0.02  # relative decrease of the error that makes a surface uneven
+MIN_GAIN = 0.1  # relative decrease of the error of held-out photos that makes a surface uneven
+MIN_VARIATION = 0.02  # relative, explained by what varies: a smaller difference is hardly visible
+MIN_NORMAL_ERROR = float(np.radians(0.5))  # that remains with tilts, or of a very good scan
 CHUNK = 1 << 17
 
 
 @dataclass(frozen=True)
 class Nodes:
     """n nodes of one material. points, normals: (n, 3), scan frame; spacing: distance of
-    neighbouring nodes; mesh_edge: mean length of an edge of the mesh; both in scan units."""
+    neighbouring nodes; mesh_edge: mean length of an edge of the mesh; both in scan units;
+    normal_error: standard deviation of the error of the normals, radians along each tangent."""
 
     points: NDArray[np.float64]
     normals: NDArray[np.float32]
     spacing: float
     mesh_edge: float
+    normal_error: float = MIN_NORMAL_ERROR
 
     def solve(
         self, model: NodeModel, seen: Observations, kind: str
@@ -39,7 +43,8 @@ class Nodes:
         free = np.zeros(COUNT, bool)
         free[list(VARIATIONS[kind])] = True
         edges = edges_of_levels(self.points, self.spacing)
-        return solve(model, seen, self.points, self.normals, edges, free, self.mesh_edge)
+        error = MIN_NORMAL_ERROR if free[TILT].any() else self.normal_error
+        return solve(model, seen, self.points, self.normals, edges, free, self.mesh_edge, error)
 
 
 def choose(
@@ -49,8 +54,8 @@ def choose(
     done.
 
     The simplest kind is kept unless a more varied one predicts held-out photos better, by
-    STANDARD_ERRORS of the difference over photos, without a larger RMS error of the radiance. With
-    fewer than MIN_PHOTOS it is the first.
+    STANDARD_ERRORS of the difference over photos, without a larger RMS error of the radiance; for
+    an even material also by MIN_GAIN and MIN_VARIATION. With fewer than MIN_PHOTOS it is the first.
     """
     photos = np.unique(seen.photo)
     if len(photos) < MIN_PHOTOS:
@@ -85,9 +90,11 @@ def choose(
     for kind in kinds[1:]:
         gain = np.array(costs[chosen]) - np.array(costs[kind])
         sure = gain.mean() > STANDARD_ERRORS * gain.std(ddof=1) / np.sqrt(len(gain))
-        least = MIN_GAIN if chosen == EVEN else 0.0
         sure &= np.mean(rms[kind]) < MAX_RMS_GROWTH * np.mean(rms[chosen])
-        if sure and np.mean(typical[kind]) < (1 - least) * np.mean(typical[chosen]):
+        before, after = np.mean(typical[chosen]), np.mean(typical[kind])
+        if chosen == EVEN:
+            sure &= after < (1 - MIN_GAIN) * before and before**2 - after**2 > MIN_VARIATION**2
+        if sure and after < before:
             chosen = kind
     return MaterialVariation(chosen, _means(costs), _means(typical))
 

@@ -7,15 +7,20 @@ surroundings only as far as Σ_l, the covariance over the surface, allows; one t
 follows them. Σ_l, with the correlations of the parameters, is estimated from the photos (empirical
 Bayes by expectation–maximisation, Efron and Morris 1973).
 
-At each level one Gauss–Newton step is made for all cells at once, on the logarithm of the radiance,
-with Student-t errors. The pixels of one cell in one photo have errors in common (of the normals, of
-the material), so that they count as no more than MAX_PIXELS_PER_PHOTO.
+The levels are estimated in turn, from coarse to fine, SWEEPS times: where a single photo shows the
+surface, the first estimate of a coarse level is too small, because all finer variation still counts
+as noise. At each level one Gauss–Newton step is made for all cells at once, on the logarithm of the
+radiance, with Student-t errors. Their variance is that of the photos and the model, the same
+everywhere, and that of the mesh's normals: where light or view are grazing, or in a highlight, a
+small error of the normal changes the radiance much. The pixels of one cell in one photo have errors
+in common (of the normals, of the material), so that they count as no more than
+MAX_PIXELS_PER_PHOTO.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +32,14 @@ from .observations import Observations
 
 Array = NDArray[np.floating]
 
+SWEEPS = 2  # over the levels
+PIXELS_PER_CELL = 20.0  # nodes of a cell whose observations are used: four times those that count
 COARSEST = 24  # cells along the object's longest side at the first level
 MAX_PIXELS_PER_PHOTO = 5.0  # of a cell that count as independent
 CHANNEL_SHARE = 0.5  # three channels of a pixel count as one and a half: their errors are alike
 MIN_ERROR, MAX_ERROR = 0.01, 0.5  # of the logarithm of the radiance, that no parameter explains
 BLACK_SHARE = 0.03  # of the median radiance, added before the logarithm
+BISECTIONS = 12  # of the error of the logarithm: to 0.1 %
 EM_ROUNDS = 20
 EM_CELLS = 4_000  # that Σ is estimated from
 FIRST_DEVIATION = np.array([0.4, 0.4, 0.4, 0.4, 0.3, 0.16, 0.16, 0.16])
@@ -80,65 +88,90 @@ def solve(
     edges: list[float],
     free: NDArray[np.bool_],
     mesh_edge: float,
+    normal_error: float,
 ) -> Iterator[tuple[float, NodeFields]]:
     """Estimate the parameters of n nodes; yields (fraction done, fields so far) after each level.
 
     seen: observations of nodes 0 … n − 1. points, normals: (n, 3), scan frame. edges: of the cells
     of each level, scan units. free: (8,) parameters that may differ from 0. mesh_edge: mean length
-    of an edge of the mesh, scan units.
+    of an edge of the mesh, scan units. normal_error: standard deviation, radians along each
+    tangent, of the error of the normals that no tilt corrects.
     """
     normal = np.asarray(normals, np.float32)
     theta = np.zeros((len(points), COUNT), np.float32)
     which = np.flatnonzero(free)
     black = near_black(seen)
-    levels: list[_Level] = []
-    start = FIRST_DEVIATION[which]
-    error = _remaining_error(model, seen, normal, theta, black)
-    for number, edge in enumerate(edges):
-        cells = Cells.group(points, edge)
-        step = _Step.of(model, seen, normal, theta, cells, which, black, error)
-        tilt = MAX_TILT * min(1.0, mesh_edge / edge)
-        change, spread, sigma = step.posterior(np.diag(start**2), tilt)
-        change = np.clip(change, -MAX_STEP[which], MAX_STEP[which])
-        both = cells.interpolated(np.concatenate([change, spread], axis=1), points)
-        theta[:, which] += both[:, : len(which)]
+    noise = _Noise.of(model, seen, normal, theta, black, normal_error)
+    levels = [
+        _Level.of(points, edge, FIRST_DEVIATION[which] * LEVEL_RATIO**number)
+        for number, edge in enumerate(edges)
+    ]
+    total = SWEEPS * len(levels)
+    for step in range(total):
+        number = step % len(levels)
+        level = levels[number]
+        part = level.subset(seen)
+        equations = _Equations.of(model, part, normal, theta, level.cells, which, black, noise)
+        tilt = MAX_TILT * min(1.0, mesh_edge / level.cells.edge)
+        found, spread, sigma = equations.around(level.change).posterior(level.sigma, tilt)
+        found = np.clip(found, -MAX_STEP[which], MAX_STEP[which])
+        theta[:, which] += level.cells.interpolated(found - level.change, points)
         np.clip(theta, -LIMITS, LIMITS, out=theta)
-        levels.append(_Level(both[:, len(which) :].copy(), np.diag(sigma), error))
-        error = _remaining_error(model, seen, normal, theta, black)
-        start = LEVEL_RATIO * start
+        levels[number] = replace(level, change=found, sigma=sigma, spread=spread, error=noise.error)
+        noise = _Noise.of(model, seen, normal, theta, black, normal_error)
         variance, deviation = np.zeros_like(theta), np.zeros((len(levels), COUNT))
-        if number + 1 == len(edges):
-            variance[:, which] = _summed_variance(levels, error)
-        deviation[:, which] = [np.sqrt(level.prior) for level in levels]
-        yield (number + 1) / len(edges), NodeFields(theta, variance, deviation, error)
+        if step + 1 == total:
+            variance[:, which] = _summed_variance(levels, points, noise.error)
+        deviation[:, which] = [np.sqrt(np.diag(one.sigma)) for one in levels]
+        yield (step + 1) / total, NodeFields(theta, variance, deviation, noise.error)
 
 
 @dataclass(frozen=True)
 class _Level:
-    """posterior: (n, k) variances at the nodes; prior: (k,) variances; error: of the logarithm of
-    the radiance that they assume."""
+    """One field of the sum. change: (c, k) its values in the cells; spread: (c, k) their variances;
+    sigma: (k, k) covariance over the surface; error: of the logarithm of the radiance that spread
+    assumes."""
 
-    posterior: NDArray[np.float32]
-    prior: Array
+    cells: Cells
+    change: Array
+    spread: Array
+    sigma: Array
     error: float
 
+    @classmethod
+    def of(cls, points: NDArray[np.float64], edge: float, deviation: Array) -> _Level:
+        """A field that is 0, with a first guess of its standard deviations (k,)."""
+        cells = Cells.group(points, edge)
+        empty = np.zeros((cells.count, len(deviation)))
+        return cls(cells, empty, empty, np.diag(deviation**2), MAX_ERROR)
 
-def _summed_variance(levels: list[_Level], error: float) -> NDArray[np.float32]:
+    def subset(self, seen: Observations) -> Observations:
+        """A random part of the observations with enough pixels in each cell."""
+        share = PIXELS_PER_CELL * self.cells.count / max(len(self.cells.of), 1)
+        if share >= 1:
+            return seen
+        kept = np.random.default_rng(0).random(len(seen), np.float32) < share
+        return seen.select(np.flatnonzero(kept))
+
+
+def _summed_variance(
+    levels: list[_Level], points: NDArray[np.float64], error: float
+) -> NDArray[np.float32]:
     """(n, k) variances of the sum of all levels.
 
-    error: that remains at the end. A coarse level assumes a larger one, because the finer variation
-    is still part of it; the information of its data is scaled to the one that remains."""
-    found = np.zeros_like(levels[0].posterior)
+    error: that remains at the end. A level that assumes a larger one counted finer variation as
+    noise; the information of its data is scaled to the one that remains."""
+    found = np.zeros((len(points), levels[0].spread.shape[1]), np.float32)
     for level in levels:
-        prior = level.prior.astype(np.float32)
-        data = np.maximum(1 / np.maximum(level.posterior, 1e-12) - 1 / prior, 0)
-        data *= np.float32((level.error / error) ** 2)
-        found += 1 / (1 / prior + data)
+        prior = np.diag(level.sigma)
+        data = np.maximum(1 / np.maximum(level.spread, 1e-12) - 1 / prior, 0)
+        data *= (level.error / error) ** 2
+        found += level.cells.interpolated(1 / (1 / prior + data), points)
     return np.asarray(MODEL_ERROR_RATIO**2 * found + INTERPOLATION_ERROR**2, np.float32)
 
 
 @dataclass(frozen=True)
-class _Step:
+class _Equations:
     """Normal equations (c, k, k) and right-hand sides (c, k) of c cells; tied: the free parameters
     that are components of the tilt."""
 
@@ -156,9 +189,10 @@ class _Step:
         cells: Cells,
         which: NDArray[np.intp],
         black: float,
-        error: float,
-    ) -> _Step:
+        noise: _Noise,
+    ) -> _Equations:
         k, free = len(which), np.isin(np.arange(COUNT), which)
+        free[TILT] = True  # for the effect of errors of the normals
         matrix, right = np.zeros((k, k, cells.count)), np.zeros((k, cells.count))
         cell = cells.of[seen.node]
         photos = int(seen.photo.max(initial=0)) + 1
@@ -169,10 +203,12 @@ class _Step:
             predicted, slope = model.derivatives(some.shading, normal[node], theta[node], free)
             predicted += np.float32(black)
             residual = np.log(np.maximum(some.radiance, 0) + black) - np.log(predicted)
-            slope = slope[:, :, which] / predicted[:, :, None]
+            slope /= predicted[:, :, None]
+            variance = noise.variance(slope)
+            slope = slope[:, :, which]
             alike = together[at.astype(np.int64) * photos + some.photo]
-            weight = weights_of_squares(np.square(residual).mean(axis=1) / error**2)
-            weight *= np.minimum(1.0, MAX_PIXELS_PER_PHOTO / alike) * CHANNEL_SHARE / error**2
+            weight = weights_of_squares(np.square(residual).mean(axis=1) / variance)
+            weight *= np.minimum(1.0, MAX_PIXELS_PER_PHOTO / alike) * CHANNEL_SHARE / variance
             weighted = slope * weight[:, None, None].astype(np.float32)
             each = np.einsum("mci,mc->im", weighted, residual)
             product = np.einsum("mci,mcj->ijm", weighted, slope)
@@ -184,6 +220,12 @@ class _Step:
             matrix[i, :i] = matrix[:i, i]
         tied = (which >= TILT.start) & (which < TILT.stop)
         return cls(np.moveaxis(matrix, 2, 0), right.T, tied)
+
+    def around(self, change: Array) -> _Equations:
+        """The equations of the whole field instead of its increment. change: (c, k) its present
+        values, which the residuals no longer contain."""
+        moved = np.einsum("cij,cj->ci", self.normal, change)
+        return replace(self, right=self.right + moved)
 
     def posterior(self, sigma: Array, max_tilt: float) -> tuple[Array, Array, Array]:
         """(mean (c, k), variance (c, k) of the cells, Σ (k, k)), Σ estimated from ``sigma`` on.
@@ -220,21 +262,49 @@ class _Step:
         return np.einsum("rij,rj->ri", covariance, self.right[rows]), covariance
 
 
-def _remaining_error(
-    model: NodeModel,
-    seen: Observations,
-    normal: NDArray[np.float32],
-    theta: NDArray[np.float32],
-    black: float,
-) -> float:
-    """Robust standard deviation of the logarithm of the radiance, from a part of the
-    observations."""
-    some = seen.select(np.arange(0, len(seen), max(1, len(seen) // CHUNK)))
-    if not len(some):
-        return MAX_ERROR
-    predicted = model.radiance(some.shading, normal[some.node], theta[some.node])
-    residual = np.log(np.maximum(some.radiance, 0) + black) - np.log(predicted + black)
-    return float(np.clip(robust_deviation(residual), MIN_ERROR, MAX_ERROR))
+@dataclass(frozen=True)
+class _Noise:
+    """Errors of the logarithm of the radiance. error: standard deviation that is the same for all
+    observations; normal_error: of the normals, radians."""
+
+    error: float
+    normal_error: float
+
+    def variance(self, slope: NDArray[np.float32]) -> Array:
+        """(m,) variances. slope: (m, 3, 8) derivatives of the logarithm by the parameters."""
+        steep = np.square(slope[:, :, TILT]).sum(axis=2).mean(axis=1)
+        return self.error**2 + self.normal_error**2 * steep
+
+    @classmethod
+    def of(
+        cls,
+        model: NodeModel,
+        seen: Observations,
+        normal: NDArray[np.float32],
+        theta: NDArray[np.float32],
+        black: float,
+        normal_error: float,
+    ) -> _Noise:
+        """The error that a part of the observations shows: the one for which the median of the
+        absolute normalised residuals is that of a normal distribution."""
+        some = seen.select(np.arange(0, len(seen), max(1, len(seen) // CHUNK)))
+        if not len(some):
+            return cls(MAX_ERROR, normal_error)
+        node, free = some.node, np.zeros(COUNT, bool)
+        free[TILT] = True
+        predicted, slope = model.derivatives(some.shading, normal[node], theta[node], free)
+        predicted += np.float32(black)
+        residual = np.log(np.maximum(some.radiance, 0) + black) - np.log(predicted)
+        slope /= predicted[:, :, None]
+        low, high = MIN_ERROR, MAX_ERROR
+        for _ in range(BISECTIONS):
+            middle = cls(float(np.sqrt(low * high)), normal_error)
+            normalised = residual / np.sqrt(middle.variance(slope))[:, None]
+            if robust_deviation(normalised) > 1:
+                low = middle.error
+            else:
+                high = middle.error
+        return middle
 
 
 def near_black(seen: Observations) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..capture import Capture
+from ..errors import InputError
 from ..geometry import PixelRays, RayScene, bands, view_window
 from ..inputs import capture_data
 from ..inputs.material_pixels import material_pixels
@@ -27,6 +28,16 @@ class PixelLabels:
 
     shown: NDArray[np.uint8]
     trusted: NDArray[np.uint8]
+
+
+def check_material_count(capture: Capture) -> None:
+    """Raise InputError where a capture has more than MAX_MATERIALS."""
+    if len(capture.materials) > MAX_MATERIALS:
+        raise InputError(
+            f"found {len(capture.materials)} materials; expected at most {MAX_MATERIALS} for "
+            "maps and for materials that vary; combine some of them",
+            file=capture.file,
+        )
 
 
 def label_pixels(

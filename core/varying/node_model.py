@@ -5,7 +5,8 @@ and changed to
 
     ρ = exp(a) · body + exp(s − 2 g) · specular(θh'),   tan θh' = tan θh / exp(g)
 
-with the normal n + t, normalised. The eight parameters of a node are a (three channels: logarithm
+with the normal n + t, normalised. A material without a diffuse body (a metal) is scaled as a whole:
+ρ = exp(a − 2 g) · ρ(θh'). The eight parameters of a node are a (three channels: logarithm
 of the factor of the diffuse colour), s (the same of the specular part), g (of the roughness α, with
 the stretch invariance of GGX and Beckmann distributions, Heitz 2014, section 5.3) and t (a vector
 in the scan frame; only its part along the surface matters, and a vector, unlike two angles, can be
@@ -24,7 +25,7 @@ from ..angles import Angles, half_difference
 from ..angles.vectors import tangents
 from ..basis import PrincipalBRDF
 from ..basis.log_table import LogTable
-from .split import split_body
+from .split import EVERYTHING, split_body
 
 Array = NDArray[np.floating]
 
@@ -60,6 +61,11 @@ class NodeModel:
     def of(cls, brdf: PrincipalBRDF, scale: float = 1.0) -> NodeModel:
         """The model of a fitted material. One without a diffuse body is scaled as a whole."""
         return cls(brdf.log_table, split_body(brdf.evaluate).body.astype(np.float32), scale)
+
+    def reflectance(self, angles: Angles, parameters: Array) -> NDArray[np.float32]:
+        """(m, 3) ρ in 1/sr at angles to the tilted normals of points with parameters (m, 8)."""
+        body, specular = self._parts(angles, parameters)
+        return body + specular
 
     def radiance(self, seen: Shading, normal: Array, parameters: Array) -> NDArray[np.float32]:
         """(m, 3) radiance at points with smooth normals (m, 3)."""
@@ -104,8 +110,11 @@ class NodeModel:
         tangent = np.tan(np.minimum(angles.theta_h, MAX_THETA_H)) * np.exp(-gloss)
         stretched = np.arctan(tangent).astype(np.float32)
         rho = self.table.evaluate(Angles(stretched, angles.theta_d, angles.phi_d))
+        spread = np.exp(-2 * gloss)[:, None]  # a rougher surface spreads the same light
+        if self.body[0] >= EVERYTHING:
+            return rho * np.exp(parameters[:, DIFFUSE]) * spread, np.zeros_like(rho)
         body = np.minimum(rho, self.body)
-        factor = np.exp(parameters[:, SPECULAR] - 2 * gloss)[:, None]
+        factor = np.exp(parameters[:, SPECULAR])[:, None] * spread
         return body * np.exp(parameters[:, DIFFUSE]), (rho - body) * factor
 
 

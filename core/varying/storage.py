@@ -1,7 +1,8 @@
 """The file varying.npz of a result: how its materials vary over the surface.
 
 A NumPy archive with the arrays of VaryingSurface in half precision (parameters within ±3 keep an
-error below 0.1 %), the number of divisions of a face, and a checksum of the mesh.
+error below 0.1 %), the material of each face, the number of divisions of a face, and a checksum of
+the mesh.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from .surface_grid import MAX_DIVISIONS, SurfaceGrid
 from .varying_surface import VARIATIONS, MaterialVariation, VaryingSurface
 
 NAME = "varying.npz"
-FORMAT = 1
+FORMAT = 2
 MAX_NODES = 1 << 26
 MAX_OTHER_BYTES = 1 << 20  # of the archive's headers and of the list of materials
 
@@ -36,6 +37,7 @@ def write(path: Path, surface: VaryingSurface) -> None:
         "parameters": surface.parameters.astype(np.float16),
         "deviation": surface.deviation.astype(np.float16),
         "photos": surface.photos,
+        "face_material": surface.face_material,
     }
     with path.open("wb") as file:
         np.savez_compressed(file, **content)  # type: ignore[arg-type]
@@ -47,7 +49,7 @@ def read(path: Path, mesh: Mesh, materials: int) -> VaryingSurface:
     try:
         with zipfile.ZipFile(path) as archive:
             declared = sum(entry.file_size for entry in archive.infolist())
-        if declared > MAX_NODES * (4 * COUNT + 2) + MAX_OTHER_BYTES:
+        if declared > MAX_NODES * (4 * COUNT + 2) + len(mesh.faces) + MAX_OTHER_BYTES:
             raise InputError("is too large for a surface; the file is damaged", file=path)
         with np.load(path, allow_pickle=False) as stored:
             return _surface(stored, path, mesh, materials, declared)
@@ -80,20 +82,27 @@ def _surface(stored: Any, path: Path, mesh: Mesh, materials: int, declared: int)
         raise ValueError(f"{divisions} divisions of a face")
     grid = SurfaceGrid.of(mesh, divisions)
     n = len(grid)
-    if declared > n * (4 * COUNT + 2) + MAX_OTHER_BYTES:
+    if declared > n * (4 * COUNT + 2) + len(mesh.faces) + MAX_OTHER_BYTES:
         raise ValueError("more values than nodes")
     parameters, deviation = (
         np.nan_to_num(stored[key].astype(np.float32)) for key in ("parameters", "deviation")
     )
-    photos = stored["photos"]
+    photos, face_material = stored["photos"], stored["face_material"]
     kinds = tuple(
         MaterialVariation(str(entry["kind"]), dict(entry["cost"]), dict(entry["typical"]))
         for entry in json.loads(str(stored["materials"]))
     )
     if parameters.shape != (n, COUNT) or deviation.shape != (n, COUNT) or photos.shape != (n,):
         raise ValueError("arrays of other sizes than the mesh")
+    if face_material.shape != (len(mesh.faces),) or face_material.max(initial=0) >= materials:
+        raise ValueError("faces of other materials than those of the result")
     if len(kinds) != materials or any(kind.kind not in VARIATIONS for kind in kinds):
         raise ValueError("other materials than those of the result")
     return VaryingSurface(
-        grid, np.clip(parameters, -LIMITS, LIMITS), deviation, photos.astype(np.uint16), kinds
+        grid,
+        np.clip(parameters, -LIMITS, LIMITS),
+        deviation,
+        photos.astype(np.uint16),
+        face_material.astype(np.uint8),
+        kinds,
     )

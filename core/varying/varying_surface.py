@@ -39,13 +39,14 @@ class MaterialVariation:
 @dataclass(frozen=True)
 class VaryingSurface:
     """grid: of the nodes. parameters: (n, 8) float32; deviation: (n, 8) float32, their standard
-    errors; photos: (n,) uint16, number of photos that show the node lit. materials: in the order of
-    the capture."""
+    errors; photos: (n,) uint16, number of photos that show the node lit. face_material: (f,) uint8,
+    index of the material of each face of the mesh. materials: in the order of the capture."""
 
     grid: SurfaceGrid
     parameters: NDArray[np.float32]
     deviation: NDArray[np.float32]
     photos: NDArray[np.uint16]
+    face_material: NDArray[np.uint8]
     materials: tuple[MaterialVariation, ...]
 
     @property

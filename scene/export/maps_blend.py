@@ -7,7 +7,8 @@ the masks, so that face edges are not visible. Inputs are blended rather than sh
 exporter keeps a Mix Shader (glTF and USD have one surface per face), and within the few texels of a
 border both look alike.
 
-The OSL branch takes a colour, BODY_SCALE, and a level, BODY, if its shader has these inputs.
+The OSL branch takes the level of the diffuse body and the factors of FACTORS, if its shader has
+these inputs.
 """
 
 from __future__ import annotations
@@ -18,9 +19,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...core.appearance import osl_source
 from ...core.errors import PatinaError
 from ...core.jobs import Stage
-from ...core.maps.maps_job import MapsResult
+from ...core.maps.maps_result import MapsResult
 from ...core.maps.write import BLEND, MapFile
 from ..material import osl_files
 from ..material.material_nodes import fill_principled
@@ -30,8 +32,13 @@ from ..property_keys import MAP_KIND, MEASURED_NAME
 from ..scan.meshes import UV_LAYER
 from .blend_file import save, write_blend
 
-BODY, BODY_SCALE = "body", "body_scale"  # inputs of the OSL shader: D (1/sr) and its factor
 NORMAL = "Normal"  # input of the OSL shader and of the Principled
+FACTORS = {
+    "scale": osl_source.BODY_SCALE,
+    "specular_scale": osl_source.SPECULAR_SCALE,
+    "roughness_scale": osl_source.ROUGHNESS_SCALE,
+}
+"""Kind of map → input of the OSL shader."""
 SOCKETS = {
     "base_color": "Base Color",
     "roughness": "Roughness",
@@ -101,10 +108,10 @@ def apply_maps(
             continue
         own = {f.kind: f for f in files if f.material == (BLEND if multiple else fitted.name)}
         own |= {f.kind: f for f in files if f.kind == "normal"}
-        scale = next(f for f in files if f.material == fitted.name and f.kind == "scale")
+        factors = {f.kind: f for f in files if f.material == fitted.name and f.kind in FACTORS}
         for shader in _principled(material):
             fill_principled(shader, fitted.principled)
-        _assign_maps(material, own, scale, result.levels[index].split.body, folder)
+        _assign_maps(material, own, factors, result.levels[index].split.body, folder)
     return notes
 
 
@@ -115,7 +122,7 @@ def _principled(material: bpy.types.Material) -> list[bpy.types.Node]:
 def _assign_maps(
     material: bpy.types.Material,
     own: dict[str, MapFile],
-    scale: MapFile,
+    factors: dict[str, MapFile],
     body: np.ndarray,
     folder: Path,
 ) -> None:
@@ -143,17 +150,18 @@ def _assign_maps(
             tree.links.new(turn.outputs["Normal"], script.inputs[NORMAL])
     scripts = [
         n for n in osl_files.script_nodes(material)
-        if {BODY, BODY_SCALE} <= {s.identifier for s in n.inputs}
+        if {osl_source.BODY, *FACTORS.values()} <= {s.identifier for s in n.inputs}
     ]  # fmt: skip
-    if scripts:
-        node = _image_node(tree, scale, folder, place, (-640, 420))
+    for script in scripts:
+        body_socket = next(s for s in script.inputs if s.identifier == osl_source.BODY)
+        body_socket.default_value = tuple(float(v) for v in body)
+    for number, (kind, name) in enumerate(FACTORS.items() if scripts else ()):
+        if kind not in factors:
+            continue
+        node = _image_node(tree, factors[kind], folder, place, (-640, 1020 - 300 * number))
         for script in scripts:
             sockets = {s.identifier: s for s in script.inputs}
-            value = [float(v) for v in body]
-            sockets[BODY].default_value = (
-                value if len(sockets[BODY].default_value) == 3 else (*value, 1.0)
-            )
-            tree.links.new(node.outputs["Color"], sockets[BODY_SCALE])
+            tree.links.new(node.outputs["Color"], sockets[name])
 
 
 def _image_node(

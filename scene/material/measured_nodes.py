@@ -25,9 +25,11 @@ from .lobe_group import NAME as LOBE_STACK
 
 log = logging.getLogger(__name__)
 
-BODY, BODY_SCALE = "body", "body_scale"  # inputs of the OSL shader, linked where there are maps
-
-SAMPLING_INPUTS = (osl_source.SAMPLING, osl_source.ALPHAS, BODY)  # inputs that set_sampling writes
+SAMPLING_INPUTS = (
+    osl_source.SAMPLING,
+    osl_source.ALPHAS,
+    osl_source.BODY,
+)  # inputs that set_sampling writes
 
 
 def principled_node(material: bpy.types.Material) -> bpy.types.Node | None:
@@ -85,8 +87,8 @@ def set_sampling(
         sockets = {socket.identifier: socket for socket in node.inputs}
         sockets[osl_source.SAMPLING].default_value = path.resolve().as_posix()
         sockets[osl_source.ALPHAS].default_value = alphas
-        if sockets[BODY_SCALE].is_linked:
-            sockets[BODY].default_value = tuple(float(v) for v in body)
+        if sockets[osl_source.BODY_SCALE].is_linked:  # there are maps
+            sockets[osl_source.BODY].default_value = tuple(float(v) for v in body)
     material[osl_files.PROPERTIES[osl_source.SAMPLING]] = path.name
 
 

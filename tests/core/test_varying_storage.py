@@ -22,7 +22,8 @@ def surface() -> VaryingSurface:
     values = 0.05 * rng.normal(size=(2, len(grid), COUNT)).astype(np.float32)
     photos = rng.integers(0, 20, len(grid)).astype(np.uint16)
     kinds = (MaterialVariation("diffuse", {"even": 0.5}, {"even": 0.2}),)
-    return VaryingSurface(grid, values[0], np.abs(values[1]), photos, kinds)
+    faces = np.zeros(len(grid.mesh.faces), np.uint8)
+    return VaryingSurface(grid, values[0], np.abs(values[1]), photos, faces, kinds)
 
 
 def test_surface_is_read_back(surface, tmp_path):
@@ -31,6 +32,7 @@ def test_surface_is_read_back(surface, tmp_path):
     assert found.parameters == pytest.approx(surface.parameters, abs=1e-3)
     assert found.deviation == pytest.approx(surface.deviation, abs=1e-3)
     assert (found.photos == surface.photos).all()
+    assert (found.face_material == surface.face_material).all()
     assert found.materials == surface.materials
     face, weight = np.array([3, 5]), np.array([0.2, 0.3])
     assert found.at(face, weight, weight) == pytest.approx(
