@@ -7,14 +7,16 @@ surroundings only as far as Σ_l, the covariance over the surface, allows; one t
 follows them. Σ_l, with the correlations of the parameters, is estimated from the photos (empirical
 Bayes by expectation–maximisation, Efron and Morris 1973).
 
-The levels are estimated in turn, from coarse to fine, SWEEPS times: where a single photo shows the
-surface, the first estimate of a coarse level is too small, because all finer variation still counts
-as noise. At each level one Gauss–Newton step is made for all cells at once, on the logarithm of the
-radiance, with Student-t errors. Their variance is that of the photos and the model, the same
-everywhere, and that of the mesh's normals: where light or view are grazing, or in a highlight, a
-small error of the normal changes the radiance much. The pixels of one cell in one photo have errors
-in common (of the normals, of the material), so that they count as no more than
-MAX_PIXELS_PER_PHOTO.
+The levels are estimated in turn, from coarse to fine; then once more for the diffuse colour. Where
+a single photo shows the surface, the first estimate of a coarse level is too small, because all
+finer variation still counts as noise. The other parameters are estimated once: they explain errors
+of the model too, and held-out photos are predicted worse the further they follow these.
+
+At each level one Gauss–Newton step is made for all cells at once, on the logarithm of the radiance,
+with Student-t errors. Their variance is that of the photos and the model, the same everywhere, and
+that of the mesh's normals: where light or view are grazing, or in a highlight, a small error of the
+normal changes the radiance much. The pixels of one cell in one photo have errors in common (of the
+normals, of the material), so that they count as no more than MAX_PIXELS_PER_PHOTO.
 """
 
 from __future__ import annotations
@@ -27,12 +29,11 @@ from numpy.typing import NDArray
 
 from ..statistics.student_t import weights_of_squares
 from .cells import Cells
-from .node_model import COUNT, LIMITS, TILT, NodeModel
+from .node_model import COUNT, DIFFUSE, LIMITS, TILT, NodeModel
 from .observations import Observations
 
 Array = NDArray[np.floating]
 
-SWEEPS = 2  # over the levels
 PIXELS_PER_CELL = 20.0  # nodes of a cell whose observations are used: four times those that count
 COARSEST = 24  # cells along the object's longest side at the first level
 MAX_PIXELS_PER_PHOTO = 5.0  # of a cell that count as independent
@@ -106,44 +107,58 @@ def solve(
         _Level.of(points, edge, FIRST_DEVIATION[which] * LEVEL_RATIO**number)
         for number, edge in enumerate(edges)
     ]
-    total = SWEEPS * len(levels)
-    for step in range(total):
-        number = step % len(levels)
-        level = levels[number]
+    colour = np.flatnonzero(which < DIFFUSE.stop)
+    every = np.arange(len(which))
+    rounds = [(number, every) for number in range(len(levels))]
+    rounds += [(number, colour) for number in range(len(levels))]
+    for done, (number, some) in enumerate(rounds, 1):
+        level, own = levels[number], which[some]
         part = level.subset(seen)
-        equations = _Equations.of(model, part, normal, theta, level.cells, which, black, noise)
+        equations = _Equations.of(model, part, normal, theta, level.cells, own, black, noise)
         tilt = MAX_TILT * min(1.0, mesh_edge / level.cells.edge)
-        found, spread, sigma = equations.around(level.change).posterior(level.sigma, tilt)
-        found = np.clip(found, -MAX_STEP[which], MAX_STEP[which])
-        theta[:, which] += level.cells.interpolated(found - level.change, points)
+        before = level.change[:, some]
+        found, spread, sigma = equations.around(before).posterior(
+            level.sigma[np.ix_(some, some)], tilt
+        )
+        found = np.clip(found, -MAX_STEP[own], MAX_STEP[own])
+        theta[:, own] += level.cells.interpolated(found - before, points)
         np.clip(theta, -LIMITS, LIMITS, out=theta)
-        levels[number] = replace(level, change=found, sigma=sigma, spread=spread, error=noise.error)
+        levels[number] = level.with_estimate(some, found, spread, sigma, noise.error)
         noise = _Noise.of(model, seen, normal, theta, black, normal_error)
         variance, deviation = np.zeros_like(theta), np.zeros((len(levels), COUNT))
-        if step + 1 == total:
+        if done == len(rounds):
             variance[:, which] = _summed_variance(levels, points, noise.error)
         deviation[:, which] = [np.sqrt(np.diag(one.sigma)) for one in levels]
-        yield (step + 1) / total, NodeFields(theta, variance, deviation, noise.error)
+        yield done / len(rounds), NodeFields(theta, variance, deviation, noise.error)
 
 
 @dataclass(frozen=True)
 class _Level:
     """One field of the sum. change: (c, k) its values in the cells; spread: (c, k) their variances;
-    sigma: (k, k) covariance over the surface; error: of the logarithm of the radiance that spread
-    assumes."""
+    sigma: (k, k) covariance over the surface; error: (k,) of the logarithm of the radiance that
+    spread assumes."""
 
     cells: Cells
     change: Array
     spread: Array
     sigma: Array
-    error: float
+    error: Array
 
     @classmethod
     def of(cls, points: NDArray[np.float64], edge: float, deviation: Array) -> _Level:
         """A field that is 0, with a first guess of its standard deviations (k,)."""
         cells = Cells.group(points, edge)
         empty = np.zeros((cells.count, len(deviation)))
-        return cls(cells, empty, empty, np.diag(deviation**2), MAX_ERROR)
+        return cls(cells, empty, empty, np.diag(deviation**2), np.full(len(deviation), MAX_ERROR))
+
+    def with_estimate(
+        self, some: NDArray[np.intp], change: Array, spread: Array, sigma: Array, error: float
+    ) -> _Level:
+        """The field with new values of the parameters ``some``."""
+        new = [a.copy() for a in (self.change, self.spread, self.sigma, self.error)]
+        new[0][:, some], new[1][:, some] = change, spread
+        new[2][np.ix_(some, some)], new[3][some] = sigma, error
+        return _Level(self.cells, *new)
 
     def subset(self, seen: Observations) -> Observations:
         """A random part of the observations with enough pixels in each cell."""
