@@ -11,6 +11,7 @@ from pathlib import Path
 from ..core.brdf import merl_file
 from ..core.capture import read_capture
 from ..core.concurrency.job import Step, peak_memory
+from ..core.fit.fit_quality import FitQuality
 from ..core.fit.measured_result import MeasuredResult
 from ..core.jobs import CaptureResult, FitJob, Stage, finished
 from ..core.jobs.varying_job import MODES, VaryingJob
@@ -18,16 +19,13 @@ from ..core.output_folder import check_out, staged_folder
 from ..core.report import result_json, write_report
 from ..core.report.figures import reach
 from ..core.varying import storage
+from ..core.varying.varying_surface import EVEN
 from . import capture_arguments
 from .needs_blender import has_blender
 from .progress import Progress
 from .solve import check_threads
 
 NO_SCENE = "scene.blend was not written, because it needs Blender. All other files are complete."
-NOT_VARYING = (
-    "The materials in scene.blend are even. The variation over the surface is in varying.npz, and "
-    "`predict` uses it."
-)
 HELP = "fit every material of a capture and write the results"
 
 
@@ -90,7 +88,6 @@ def write_results(
     if result.varying is not None:
         with timed(stages, storage.NAME, progress, 0.99):
             storage.write(folder / storage.NAME, result.varying)
-        notes = (*notes, *((NOT_VARYING,) if has_blender() else ()))
     result_json.write(folder / "result.json", result, stages, notes)
 
 
@@ -105,10 +102,20 @@ def timed(stages: list[Stage], name: str, progress: Progress, fraction: float) -
 
 def print_summary(out: Path, result: CaptureResult) -> None:
     """Print a summary of a fit: errors, warnings, notes, refined lights and files."""
+    kinds = () if result.varying is None else result.varying.materials
+    varying = {
+        m.name: k.typical.get(k.kind)
+        for m, k in zip(result.materials, kinds, strict=False)
+        if k.kind != EVEN
+    }
     for material in result.materials:
         held = material.held_out
         rms = "" if held is None else f", relative RMS {100 * held.error:.0f} %"
-        print(f"{material.name}: {material.samples:,} samples. {material.quality.sentence}{rms}")
+        quality = material.quality.sentence + rms
+        typical = varying.get(material.name)
+        if typical is not None:
+            quality = f"{FitQuality(typical).sentence}, one BRDF: {material.quality.sentence}"
+        print(f"{material.name}: {material.samples:,} samples. {quality}")
         if isinstance(material.fit, MeasuredResult):
             print(f"  90 % interval: {reach(material.spread)}")
         for warning in material.warnings:

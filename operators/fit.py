@@ -10,6 +10,7 @@ import bpy
 from ..core.capture import read_capture
 from ..core.counted import counted
 from ..core.jobs import CaptureResult, FitJob
+from ..core.jobs.varying_job import VaryingJob
 from ..core.samples import Margins
 from ..scene.material.file_cache import own_basis, trim_cache
 from ..scene.material.prepared_materials import PreparedJob
@@ -90,7 +91,8 @@ class PATINA_OT_fit(Stepped, bpy.types.Operator):
         return can_fit(cls, context)
 
     def _start(self, context: bpy.types.Context) -> None:
-        self._job = PreparedJob(fit_job(self, context.scene))
+        fit, varying = fit_job(self, context.scene), context.scene.patina.varying
+        self._job = PreparedJob(fit if varying == "never" else VaryingJob(fit, varying))
         self._inputs = inputs_now(context.scene)
         self._scene = context.scene.name  # by name: a reference does not survive undo
 

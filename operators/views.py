@@ -8,7 +8,7 @@ from ..core.errors import PatinaError
 from ..scene.material.measured_materials import measured_of
 from ..scene.photos.photo_list import looked_at as photo_of
 from ..scene.session.image_editor import show_image
-from ..scene.session.scene_properties import capture_path
+from ..scene.session.scene_properties import capture_path, stored_result
 from ..scene.views.photo_comparison import look_job, show_photo_view
 from ..scene.views.view_properties import looked_at, show_chart
 from .fit import fit_job
@@ -101,6 +101,13 @@ class PATINA_OT_look_at_photo(Stepped, bpy.types.Operator):
         image = show_photo_view(context, self._job.view, self.kind, exposure)
         scene.patina_views.shown = self.kind
         show_image(context, image)
+        stored = stored_result(capture_path(scene)) or {}
+        if stored.get("varying") and self._job.known is None:
+            self.report(
+                {"WARNING"},
+                "The materials vary over the surface, but the prediction shows them as even: the "
+                "variation is kept in memory only until Blender is closed. Fit again to see it.",
+            )
 
 
 CLASSES = (PATINA_OT_show_chart, PATINA_OT_look_at_photo)

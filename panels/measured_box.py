@@ -9,6 +9,7 @@ import bpy
 
 from ..core.fit.fit_quality import FitQuality, Rating
 from ..core.report.figures import either_side
+from ..core.varying.varying_surface import EVEN
 from .wrapped import IN_BOX, wrapped
 
 SPHERE = 5.0  # scale of the preview icon, in line heights
@@ -25,10 +26,12 @@ def draw_measured(
 
     result: the content of result.json; materials: name in it → Blender material.
     """
+    varying = (result or {}).get("varying")
+    kinds = {entry["name"]: entry["varies"] for entry in (varying or {}).get("materials", [])}
     for material in (result or {}).get("materials", []):
         box = layout.box()
         box.label(text=material["name"], icon="MATERIAL")
-        quality = FitQuality.of_result(material)
+        quality = FitQuality.of_result(material, varying)
         icon = "ERROR" if quality.rating is Rating.POOR else "BLANK1"
         wrapped(box, quality.sentence, icon, IN_BOX)
         if material["name"] in materials:
@@ -38,6 +41,8 @@ def draw_measured(
             interval = f"90 % interval of the BRDF: {median} (median over directions)"
             wrapped(box, interval, "BLANK1", IN_BOX)
         box.label(text=f"{material['samples']['used']:,} samples", icon="BLANK1")
+        if kinds.get(material["name"], EVEN) != EVEN:
+            wrapped(box, f"Varies over the surface: {kinds[material['name']]}", "BLANK1", IN_BOX)
         for warning in material["warnings"]:
             wrapped(box, warning, "ERROR", IN_BOX)
             if LIGHT_MAY_BE_WRONG in warning:

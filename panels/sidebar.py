@@ -74,6 +74,8 @@ class PATINA_PT_fit(StagePanel, bpy.types.Panel):
 
     def draw_more(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         capture = capture_path(context.scene)
+        if capture:
+            layout.prop(context.scene.patina, "varying")
         draw_measured(layout, stored_result(capture), measured_of(capture))
 
 

@@ -28,8 +28,16 @@ class FitQuality:
     typical: float | None
 
     @classmethod
-    def of_result(cls, material: Mapping[str, Any]) -> FitQuality:
-        """Of a material of result.json, also of one that an earlier version wrote."""
+    def of_result(
+        cls, material: Mapping[str, Any], varying: Mapping[str, Any] | None = None
+    ) -> FitQuality:
+        """Of a material of result.json, also of one that an earlier version wrote. varying: the
+        entry of that name in result.json; photos of a material that varies are predicted with its
+        variation."""
+        for entry in (varying or {}).get("materials", []):
+            kind, typical = entry["varies"], entry["held_out_typical"]
+            if entry["name"] == material["name"] and kind != "even" and kind in typical:
+                return cls(typical[kind])
         held = material.get("held_out")
         return cls(held["typical"] if held else None)
 

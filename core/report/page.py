@@ -68,6 +68,7 @@ def _photo_rows(folder: Path, result: CaptureResult, body: list[str]) -> Iterato
                 [(m.name, m.fit.brdf, m.scale) for m in result.materials],
                 place,
                 photo_view.chosen_pixels([m.fit for m in result.materials], place),
+                result.varying,
             )
         )
         found_criteria.update(view.shares)

@@ -66,7 +66,17 @@ class LookJob(Job):
                 start = 0.7
         used = self._used(capture_data.camera_of(capture, scan, self.place).width)
         self.view = yield from relayed(
-            look_at_photo(capture, scan, rays, photos, lights, self.fitted, self.place, used),
+            look_at_photo(
+                capture,
+                scan,
+                rays,
+                photos,
+                lights,
+                self.fitted,
+                self.place,
+                used,
+                None if known is None else known.varying,
+            ),
             lambda done: Step(
                 "comparing the photo with its prediction", start + (1 - start) * done
             ),

@@ -24,6 +24,8 @@ from ..predict.compose import predict_photo
 from ..samples import Criterion
 from ..samples.take import deciding_criteria, halo, light_surface
 from ..scan import Camera, Scan
+from ..varying.node_model import NodeModel
+from ..varying.varying_surface import VaryingSurface, predict_varying
 from . import display
 
 MARGIN = 12  # pixels around the object
@@ -133,12 +135,14 @@ def look_at_photo(
     brdfs: Sequence[Fitted],
     place: int,
     used: NDArray[np.integer] | None = None,
+    varying: VaryingSurface | None = None,
 ) -> Generator[float, None, PhotoView]:
     """Predict one photo and classify its pixels, band by band; yields the fraction done. Raises
     InputError for masks or photos that cannot be read.
 
     brdfs: of some or all materials of the capture, of any fit. used: (k,) flat indices in the
-    photo of the pixels that a fit uses (see chosen_pixels).
+    photo of the pixels that a fit uses (see chosen_pixels). varying: how these materials vary over
+    the surface, None if they are even.
     """
     camera = capture_data.camera_of(capture, scan, place)
     masks = capture_data.photo_masks(capture, place)
@@ -150,6 +154,8 @@ def look_at_photo(
     index_of = {material.name: index for index, material in enumerate(capture.materials)}
     windows = list(bands(camera, halo(margins), rays.cover.columns(camera), BAND_PIXELS))
     canvas = _Canvas.around(windows, camera)
+    known = [one for one in brdfs if one[0] in index_of]
+    models = [NodeModel.of(brdf, scale) for _, brdf, scale in known if varying is not None]
     for done, window in enumerate(windows):
         yield (1 + done) / (2 + len(windows))
         view = view_window(rays, lines, window)
@@ -169,8 +175,13 @@ def look_at_photo(
             material[pixels] = index
         own = np.full_like(material, -1)
         own[view.wanted] = material[view.wanted]
-        parts = [(own == index_of[n], brdf, scale) for n, brdf, scale in brdfs if n in index_of]
-        predicted = predict_photo(view, lighting, parts)
+        pixels_of = [own == index_of[name] for name, _, _ in known]
+        if varying is None:
+            parts = [(p, one[1], one[2]) for p, one in zip(pixels_of, known, strict=True)]
+            predicted = predict_photo(view, lighting, parts)
+        else:
+            nodes = list(zip(pixels_of, models, strict=True))
+            predicted = predict_varying(view, lighting, varying, nodes)
         target = canvas.places(view, camera)
         canvas.criteria.reshape(-1)[target] = criteria[view.wanted]
         canvas.material.reshape(-1)[target] = material[view.wanted]

@@ -19,7 +19,11 @@ from ..property_keys import LOBE_GROUP_LAYOUT
 
 NAME = "Patina Lobe Stack"
 LOBE_NAME = "Patina Lobe"
-LAYOUT = 1  # version of the group's nodes
+LAYOUT = 2  # version of the group's nodes
+# inputs for maps: factors of the diffuse colours, of the lobes' reflectances, of the lobes' α
+DIFFUSE_SCALE, SPECULAR_SCALE, ROUGHNESS_SCALE = (
+    "Diffuse Scale", "Specular Scale", "Roughness Scale",
+)  # fmt: skip
 COLOURS = ("", " Mid", " Edge")  # facing the viewer, midway, at the silhouette
 
 
@@ -78,6 +82,9 @@ def _make_stack() -> bpy.types.NodeTree:
     for name in COLOURS:
         _color(group, f"Diffuse Color{name}", 0.5)
     _fraction(group, "Diffuse Roughness", 0.0)
+    for name in (DIFFUSE_SCALE, SPECULAR_SCALE):
+        _color(group, name, 1.0)
+    _socket(group, ROUGHNESS_SCALE, "NodeSocketFloat").default_value = 1.0
     for place in range(1, MAX_LOBES + 1):
         for name in COLOURS:
             _color(group, f"Lobe {place} F0{name}", 0.0)
@@ -86,7 +93,11 @@ def _make_stack() -> bpy.types.NodeTree:
     _normal(group)
     wiring = _Wiring(group)
     normal = wiring.normal()
-    colours = [wiring.given(f"Diffuse Color{name}") for name in COLOURS]
+    paint, shine = wiring.given(DIFFUSE_SCALE), wiring.given(SPECULAR_SCALE)
+    wider = wiring.math("SQRT", wiring.given(ROUGHNESS_SCALE))  # roughness is the root of α
+    colours = [
+        wiring.vector("MULTIPLY", wiring.given(f"Diffuse Color{name}"), paint) for name in COLOURS
+    ]
     below = wiring.node(
         "ShaderNodeBsdfDiffuse",
         Color=_blended(wiring, wiring.cosine(normal), colours),
@@ -95,8 +106,11 @@ def _make_stack() -> bpy.types.NodeTree:
     ).outputs[0]
     for place in range(MAX_LOBES, 0, -1):
         lobe = wiring.node("ShaderNodeGroup", tree=_existing(LOBE_NAME) or _make_lobe())
-        for name in ("F0", "F0 Mid", "F0 Edge", "F90", "Roughness"):
-            wiring.link(wiring.given(f"Lobe {place} {name}"), lobe.inputs[name])
+        for name in ("F0", "F0 Mid", "F0 Edge", "F90"):
+            scaled = wiring.vector("MULTIPLY", wiring.given(f"Lobe {place} {name}"), shine)
+            wiring.link(scaled, lobe.inputs[name])
+        rough = wiring.math("MULTIPLY", wiring.given(f"Lobe {place} Roughness"), wider, clamp=True)
+        wiring.link(rough, lobe.inputs["Roughness"])
         wiring.link(normal, lobe.inputs["Normal"])
         wiring.link(below, lobe.inputs["Below"])
         below = lobe.outputs["BSDF"]

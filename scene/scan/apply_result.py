@@ -21,6 +21,8 @@ from ..material.preview import set_preview
 from ..property_keys import CAPTURE, MEASURED_DATE, MEASURED_NAME, NO_OSL_REASON
 from ..session.scene_properties import store_result
 from . import meshes
+from .apply_maps import remove_unused_maps
+from .apply_variation import apply_variation_steps
 from .face_slots import remove_placeholders
 
 NUMBER_SUFFIX = re.compile(r"\.\d{3}$")  # Blender appends it to make names unique
@@ -93,6 +95,8 @@ def apply_result_steps(
             f"{mesh.name} no longer has the faces of the scan; all faces got the first material."
         )
     yield
+    remove_unused_maps()
+    notes += yield from apply_variation_steps(scene, result)
     remove_placeholders(capture)
     for material in made:  # the name is free now; other names were set by the user
         name = material[MEASURED_NAME]

@@ -44,6 +44,16 @@ class PatinaScene(bpy.types.PropertyGroup):
         description="Fit one material for each material slot of the scanned mesh, instead of the "
         "materials of the capture file",
     )
+    varying: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Varying",
+        description="Whether a fit estimates how colour, gloss and normals vary over the surface",
+        items=(
+            ("auto", "Automatic", "Where photos that were held out are predicted better with it"),
+            ("always", "Always", "For all materials, without a comparison with held-out photos"),
+            ("never", "Never", "Every material has one BRDF over its whole surface"),
+        ),
+        default="auto",
+    )
     causes: bpy.props.CollectionProperty(type=PatinaCause)  # type: ignore[valid-type]
 
 

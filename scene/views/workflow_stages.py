@@ -135,7 +135,7 @@ def _fit(result: dict | None, changes: tuple[str, ...]) -> Stage:  # type: ignor
     poor = [
         material["name"]
         for material in materials
-        if FitQuality.of_result(material).rating is Rating.POOR
+        if FitQuality.of_result(material, result.get("varying")).rating is Rating.POOR
     ]
     doubts = _outdated(changes) + ((f"Poor fit: {listed(poor)}",) if poor else ())
     return Stage(

@@ -63,6 +63,26 @@ def test_node_group_matches_cycles_rendering(node, case, light, tmp_path):
     cycles_sphere.assert_matches_model(image, stack, light, 2.0)
 
 
+def test_inputs_for_maps_scale_the_stack(node, tmp_path):
+    light = np.array([0.6, 0.2, 0.77]) / np.linalg.norm([0.6, 0.2, 0.77])
+    paint, shine, rougher = np.array([0.5, 1.2, 0.8]), np.array([0.6, 0.9, 0.4]), 1.5
+    lobe = Lobe(shine * GLASS.f0, shine * GLASS.f90, GLASS.roughness * np.sqrt(rougher))
+    fill_lobe_stack(node, CASES["glossy"])
+    factors = {"Diffuse Scale": (*paint, 1.0), "Specular Scale": (*shine, 1.0),
+               "Roughness Scale": rougher}  # fmt: skip
+    before = {}
+    for name, value in factors.items():
+        before[name] = node.inputs[name].default_value
+        before[name] = before[name] if name == "Roughness Scale" else tuple(before[name])
+        node.inputs[name].default_value = value
+    lamp = cycles_sphere.sun(light, 2.0)
+    image = cycles_sphere.render(tmp_path)
+    bpy.data.objects.remove(lamp)
+    for name, value in before.items():
+        node.inputs[name].default_value = value
+    cycles_sphere.assert_matches_model(image, LobeStack(paint * BROWN, 0.0, (lobe,)), light, 2.0)
+
+
 def test_node_group_is_created_once(node):
     tree = bpy.data.materials.new("second").node_tree
     if tree is None:

@@ -1,0 +1,87 @@
+"""Materials that vary: Fit shows them as maps packed in the .blend, and removes them again."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from support import extension
+from test_workflow import folder, make_capture_module
+
+FACTORS = {"scale", "roughness scale", "specular scale"}
+DIFFUSE = np.array([0.16, 0.05, 0.04])  # 1/sr, of the material that make_capture uses
+
+
+def bands(normal: np.ndarray, light: np.ndarray, view: np.ndarray) -> np.ndarray:
+    """A coated sphere with stripes across its x axis."""
+    stripes = 0.6 * np.sign(np.sin(9 * normal[..., :1]))
+    return make_capture_module().blinn(normal, light, view) + DIFFUSE * stripes
+
+
+def imported(name: str, **more: object) -> None:
+    path = make_capture_module().make_capture(folder() / name, photos=6, **more)
+    assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
+
+
+def images(material: bpy.types.Material) -> dict[str, bpy.types.Image]:
+    """Label of its node → image."""
+    return {n.label: n.image for n in material.node_tree.nodes if n.type == "TEX_IMAGE"}
+
+
+def pixels(image: bpy.types.Image) -> np.ndarray:
+    return np.array(image.pixels[:]).reshape(*reversed(image.size), 4)[..., :3]
+
+
+def test_painted_sphere_gets_maps_and_even_fit_removes_them() -> None:
+    imported("bands", brdf=bands)
+    settings = bpy.context.scene.patina
+    assert settings.varying == "auto"
+    assert bpy.ops.patina.fit() == {"FINISHED"}
+    material = bpy.data.materials["surface"]
+    found = images(material)
+    assert {"scale", "roughness scale", "base color"} <= found.keys()
+    assert all(image.packed_file is not None for image in found.values())
+    scale = pixels(found["scale"])
+    low, high = np.percentile(scale, (20, 80))
+    assert high > 2 * low, "the stripes differ by a factor of four"
+    lobes = extension("scene.material.measured_nodes").lobe_node(material)
+    assert lobes.inputs["Diffuse Scale"].is_linked
+    principled = extension("scene.material.measured_nodes").principled_node(material)
+    assert principled.inputs["Base Color"].is_linked
+    for script in extension("scene.material.osl_files").script_nodes(material):
+        linked = {s.identifier for s in script.inputs if s.is_linked}
+        assert {"body_scale", "roughness_scale"} <= linked
+    mesh = settings.mesh.data
+    uv = np.empty(2 * len(mesh.loops), np.float32)
+    mesh.uv_layers.active.uv.foreach_get("vector", uv)
+    assert np.ptp(uv) > 0.5
+    bpy.context.scene.patina_photos.active = 1
+    assert bpy.ops.patina.look_at_photo(kind="comparison") == {"FINISHED"}
+    view = extension("scene.views.photo_comparison")._last.value
+    assert view.typical < 0.1, "the prediction has the stripes"
+    blend = str(folder() / "bands.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=blend)
+    bpy.ops.wm.open_mainfile(filepath=blend)
+    again = pixels(images(bpy.data.materials["surface"])["scale"])
+    np.testing.assert_allclose(again, scale, atol=1e-6)
+    bpy.context.scene.patina.varying = "never"
+    assert bpy.ops.patina.fit() == {"FINISHED"}
+    assert not images(bpy.data.materials["surface"])
+    maps = [i for i in bpy.data.images if "patina_map" in i]
+    assert not maps, "packed maps of the earlier fit are removed"
+
+
+def test_even_sphere_has_no_maps() -> None:
+    imported("even")
+    assert bpy.ops.patina.fit() == {"FINISHED"}
+    assert not images(bpy.data.materials["surface"])
+
+
+def test_maps_are_undone_with_the_fit() -> None:
+    imported("bands", brdf=bands)
+    bpy.ops.ed.undo_push(message="imported")
+    bpy.context.scene.patina.varying = "always"
+    assert bpy.ops.patina.fit() == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="fitted")
+    assert images(bpy.data.materials["surface"])
+    bpy.ops.ed.undo()
+    assert "surface" not in bpy.data.materials or not images(bpy.data.materials["surface"])
