@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -28,6 +29,8 @@ PLAIN: dict[str, Callable[[Path, Sequence[Subject]], list[Loss]]] = {
 
 BLENDER = ("blend", "gltf", "usd")  # written by scene/export/export_formats.py
 FORMATS = (*BLENDER, *PLAIN)
+WITH_MAPS = ("gltf", "usd")  # that take the maps of the result's scene.blend
+VARIATION = "the variation over the surface; the command `maps` writes it as images"
 
 BlenderWriter = Callable[[str, Path, Path, FittedResult, Sequence[Subject]], list[Loss]]
 """(format, folder to write into, folder that the files will be moved to, result, materials)."""
@@ -62,8 +65,16 @@ def export_materials(
                 raise InputError(f"the format {name} needs Blender", key="formats")
             else:
                 losses += by_blender(name, folder, out, result, subjects)
+        losses = [_without_variation(loss, result) for loss in losses]
         lines = write_losses(folder, losses, ", ".join(s.name for s in subjects))
     return losses, lines
+
+
+def _without_variation(loss: Loss, result: FittedResult) -> Loss:
+    """The losses with that of the variation over the surface, in formats without maps."""
+    if loss.format in WITH_MAPS or loss.material not in result.varying_names:
+        return loss
+    return replace(loss, dropped=(*loss.dropped, VARIATION))
 
 
 def _selected_materials(result: FittedResult, names: Sequence[str] | None) -> list[FittedMaterial]:

@@ -50,8 +50,8 @@ class FittedResult:
     """A result folder. file: its result.json; program: version of Patina that wrote it; capture:
     path of the capture file at the time of the fit; scene: the folder's scene.blend, None where
     there is none. effects: causes that the materials take into account, with their parameters by
-    name. varying: the folder's file of the variation over the surface, None where the materials are
-    even."""
+    name. varying: the folder's file of the variation over the surface, None where there is none;
+    varying_names: the materials that vary."""
 
     file: Path
     program: str
@@ -61,6 +61,7 @@ class FittedResult:
     scene: Path | None
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     varying: Path | None = None
+    varying_names: tuple[str, ...] = ()
 
     def materials_of(self, names: Sequence[str], capture: str) -> tuple[FittedMaterial, ...]:
         """The materials with these names of a capture, in their order. Raises InputError if one is

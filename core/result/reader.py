@@ -66,6 +66,7 @@ def read_result(path: Path, cache: Path | None = None) -> FittedResult:
         scene=scene if scene.is_file() else None,
         effects=_effects(record),
         varying=_varying(record, file.parent),
+        varying_names=_varying_names(record),
     )
 
 
@@ -185,6 +186,8 @@ def _varying(record: Record, folder: Path) -> Path | None:
     if record.values.get("varying") is None:
         return None
     entry = record.record("varying")
+    if entry.values.get("file") is None:  # exported without it
+        return None
     name = entry.text("file")
     found = folder / name
     if name in ("", ".", "..") or FORBIDDEN & set(name) or not found.is_file():
@@ -193,6 +196,17 @@ def _varying(record: Record, folder: Path) -> Path | None:
             "file",
         )
     return found
+
+
+def _varying_names(record: Record) -> tuple[str, ...]:
+    """The materials that vary over the surface."""
+    if record.values.get("varying") is None:
+        return ()
+    listed = record.record("varying").values.get("materials", [])
+    if not isinstance(listed, list):
+        return ()
+    entries = [one for one in listed[:MAX_MATERIALS] if isinstance(one, dict)]
+    return tuple(str(one.get("name")) for one in entries if one.get("varies") != "even")
 
 
 def _sentences(entry: Record) -> tuple[str, ...]:

@@ -24,6 +24,7 @@ from ...core.output_folder import check_out, staged_folder
 from ...core.report import write_report
 from ...core.report.result_json import write_json
 from ...core.result import read_result
+from ...core.varying import storage
 from ..material.trait_update import finish_updates
 from ..session.background_blender import in_background
 from ..session.last_fit import kept_fit
@@ -74,7 +75,7 @@ class ExportJob(Job):
         with tempfile.TemporaryDirectory(prefix="patina-", ignore_cleanup_errors=True) as folder:
             result = Path(folder)
             present = yield from present_result(self.found, self.capture)
-            write_json(result / "result.json", present)
+            write_json(result / "result.json", self._with_variation(present, result))
             if set(exported) & set(BLENDER):
                 yield Step("copying the scene", 0.0)
                 finish_updates()  # the copy must show the present traits
@@ -94,6 +95,17 @@ class ExportJob(Job):
             lists = {key: tuple(loss[key]) for key in ("files", "dropped", "notes")}
             self.losses.append(Loss(**{**loss, **lists}))
 
+    def _with_variation(self, content: dict[str, Any], folder: Path) -> dict[str, Any]:
+        """The content of result.json for a folder that gets the file of the variation too, if the
+        fit is still in memory; else it states that there is no such file."""
+        entry = content.get("varying")
+        if not entry:
+            return content
+        if self.fit is None or self.fit.varying is None:
+            return {**content, "varying": {**entry, "file": None}}
+        storage.write(folder / storage.NAME, self.fit.varying)
+        return content
+
     def _own_files(self) -> Generator[Step, None, None]:
         """Write result.json, diagnosis.json and the report, as requested."""
         records: dict[str, dict[str, Any] | None] = {}
@@ -105,7 +117,7 @@ class ExportJob(Job):
         with staged_folder(self.out) as folder:
             for name, content in records.items():
                 if content is not None:
-                    write_json(folder / name, content)
+                    write_json(folder / name, self._with_variation(content, folder))
                     self.files.append(name)
             if report and self.fit is not None:
                 for fraction in write_report(folder / "report", self.fit):

@@ -49,7 +49,12 @@ def present_result(found: dict[str, Any], capture: str) -> Generator[Step, None,
         if movable(material) and state(material):
             now.update((yield from _changed(material, now["name"])))
         entries.append(now)
-    return {**found, "materials": entries}
+    names = {a["name"]: b["name"] for a, b in zip(found["materials"], entries, strict=True)}
+    varying = found.get("varying")
+    if varying:
+        listed = [{**one, "name": names[one["name"]]} for one in varying["materials"]]
+        varying = {**varying, "materials": listed}
+    return {**found, "materials": entries, "varying": varying}
 
 
 def _changed(material: bpy.types.Material, name: str) -> Generator[Step, None, dict[str, Any]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import bpy
 import numpy as np
 from support import extension
@@ -31,6 +33,21 @@ def pixels(image: bpy.types.Image) -> np.ndarray:
     return np.array(image.pixels[:]).reshape(*reversed(image.size), 4)[..., :3]
 
 
+def exported_files_have_the_variation() -> None:
+    """glTF has maps; tables state that they lose the variation; the record has its file."""
+    out = folder()
+    formats = {"gltf", "npz", "record"}
+    settings = {"directory": str(out), "folder": "a", "formats": formats}
+    assert bpy.ops.patina.export(**settings) == {"FINISHED"}
+    assert (out / "a" / "varying.npz").is_file()
+    losses = json.loads((out / "a" / "losses.json").read_text())["losses"]
+    lost = {loss["format"]: any("variation" in one for one in loss["dropped"]) for loss in losses}
+    assert lost == {"gltf": False, "npz": True}
+    data = (out / "a" / "scan.glb").read_bytes()
+    header = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    assert "baseColorTexture" in header["materials"][0]["pbrMetallicRoughness"]
+
+
 def test_painted_sphere_gets_maps_and_even_fit_removes_them() -> None:
     imported("bands", brdf=bands)
     settings = bpy.context.scene.patina
@@ -58,6 +75,7 @@ def test_painted_sphere_gets_maps_and_even_fit_removes_them() -> None:
     assert bpy.ops.patina.look_at_photo(kind="comparison") == {"FINISHED"}
     view = extension("scene.views.photo_comparison")._last.value
     assert view.typical < 0.1, "the prediction has the stripes"
+    exported_files_have_the_variation()
     blend = str(folder() / "bands.blend")
     bpy.ops.wm.save_as_mainfile(filepath=blend)
     bpy.ops.wm.open_mainfile(filepath=blend)
