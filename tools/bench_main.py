@@ -19,6 +19,7 @@ BENCHES = (
     "find_light",
     "real",
     "varying",
+    "renders",
     "solve",
     "noise",
     "viewport",
@@ -27,7 +28,7 @@ BENCHES = (
     "traits",
     "steps",
 )
-WITHOUT_DATA = ("speed", "traits", "steps")  # need no reference data
+WITHOUT_DATA = ("renders", "speed", "traits", "steps")  # need no reference data
 
 
 def main() -> int:

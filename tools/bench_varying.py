@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from . import real_captures
 from .bench_real import HELD_OUT
+from .experiments.bunnies import BUNNIES
 
 if TYPE_CHECKING:
     from patina.core.capture import Capture
@@ -44,6 +45,9 @@ def run(data: Path) -> None:
         for label, path, truth in _diligent(data, folder):
             places = range(len(_read(path).photos))
             _held_out(label, path, [[k for k in places if k % 2]], truth)
+        print("\nThe three simulated bunnies, each of one even material:\n")
+        for label in BUNNIES.values():
+            _even(label, data / "scans" / label / "scan.capture.toml")
         print("\nEach photo predicted from others (bronze: 4 left out at a time; planes: 1):\n")
         _header()
         count = len(_read(bronze).photos)
@@ -51,6 +55,26 @@ def run(data: Path) -> None:
         for label in ("yellow_box", "card_blue"):
             path = real_captures.plane(data, folder, label)
             _held_out(label, path, [[k] for k in range(len(_read(path).photos))])
+
+
+def _even(label: str, path: Path) -> None:
+    """Print what a fit says of an even material, and how far it changes it."""
+    from patina.core.jobs import FitJob, finished
+    from patina.core.jobs.varying_job import VaryingJob
+
+    job = FitJob(_read(path), portable=False)
+    since = time.perf_counter()
+    job.drain()
+    between = time.perf_counter()
+    more = VaryingJob(job)
+    more.drain()
+    before, after = (finished(one.result).materials[0].fit.brdf for one in (job, more))
+    change = float(np.abs(before.coefficients - after.coefficients).max())
+    print(
+        f"{label}: {finished(more.result).notes[-1]} Largest change of a coefficient: {change:g}. "
+        f"{between - since:.0f} s, and {time.perf_counter() - between:.0f} s for this.",
+        flush=True,
+    )
 
 
 def _diligent(data: Path, folder: Path) -> list[tuple[str, Path, Path]]:

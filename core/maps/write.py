@@ -37,10 +37,13 @@ class MapFile:
     colour: bool
 
 
-def write_maps(folder: Path, result: MapsResult, kind: Format) -> list[MapFile]:
-    """Write all maps of a result and maps.json into ``folder``."""
+def write_maps(
+    folder: Path, result: MapsResult, kind: Format, colours: Format | None = None
+) -> list[MapFile]:
+    """Write all maps of a result and maps.json into ``folder``. kind: their file format; colours:
+    that of colours, if it is another one."""
     files = []
-    for map_file, values, fill in _maps(result, kind):
+    for map_file, values, fill in _maps(result, kind, colours or kind):
         _write(folder / map_file.file, result, values, fill, map_file.colour)
         files.append(map_file)
     _write_json(folder / "maps.json", result, files)
@@ -82,15 +85,16 @@ def _rougher(maps: MaterialMaps, fitted: float) -> NDArray[np.float32]:
 
 
 def _maps(
-    result: MapsResult, kind: Format
+    result: MapsResult, kind: Format, colours_as: Format
 ) -> Iterator[tuple[MapFile, NDArray[np.float32], NDArray[np.floating] | float]]:
     """(file, values (n,) or (n, 3), fill value outside the faces) of each map."""
     several = len(result.materials) > 1
     for index, material in enumerate(result.materials):
         name = material.name
 
-        def named(what: str, colour: bool, name: str = name, ending: str = kind) -> MapFile:
-            return MapFile(name, what, f"{name}_{what}.{ending}", colour)
+        def named(what: str, colour: bool, name: str = name, ending: str = "") -> MapFile:
+            suffix = ending or (colours_as if colour else kind)
+            return MapFile(name, what, f"{name}_{what}.{suffix}", colour)
 
         colours = base_color(result, index)
         yield named("base_color", True), colours, _typical(result, index, colours)
@@ -108,7 +112,9 @@ def _maps(
             yield named("mask", False), result.maps.materials[index].share, 0.0
     if several:
         for what, values in _blended(result).items():
-            file = MapFile(BLEND, what, f"{BLEND}_{what}.{kind}", what == "base_color")
+            colour = what == "base_color"
+            suffix = colours_as if colour else kind
+            file = MapFile(BLEND, what, f"{BLEND}_{what}.{suffix}", colour)
             yield file, values, values.mean(axis=0)
     if result.normal is not None:
         flat = np.array([0.5, 0.5, 1.0], np.float32)

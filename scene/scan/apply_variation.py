@@ -51,7 +51,8 @@ def apply_variation_steps(
         return [f"The materials vary over the surface, but are shown as even, because {error}"]
     with tempfile.TemporaryDirectory(prefix="patina_maps_") as name:
         folder = Path(name)
-        files = yield from in_background(lambda: write_maps(folder, maps, "exr"), None)
+        # colours in sRGB: Blender's glTF exporter writes linear ones as if they were in sRGB
+        files = yield from in_background(lambda: write_maps(folder, maps, "exr", "png"), None)
         before = set(bpy.data.images)
         notes = apply_maps(scene, maps, folder, files)
         for image in set(bpy.data.images) - before:

@@ -257,7 +257,7 @@ def test_written_images_match_estimates(result, tmp_path):
 
     files = write_maps(tmp_path, result, "exr")
     assert {f.kind for f in files} == {
-        "base_color", "roughness", "albedo", "scale", "coverage", "uncertainty"
+        "base_color", "roughness", "albedo", "scale", "roughness_scale", "coverage", "uncertainty"
     }  # fmt: skip
     image = np.array(oiio.ImageBuf(str(tmp_path / "surface_base_color.exr")).get_pixels(oiio.FLOAT))
     there = image.reshape(-1, 3)[result.texels.place]
