@@ -17,7 +17,13 @@ from ..core.report.diagnosis_json import describe
 from ..scene.material.prepared_materials import PreparedJob
 from ..scene.session.last_diagnosis import keep_check, kept_check
 from ..scene.session.running_job import set_running
-from ..scene.session.scene_properties import DIAGNOSIS, RESULT, capture_path, store_result
+from ..scene.session.scene_properties import (
+    DIAGNOSIS,
+    RESULT,
+    capture_path,
+    store_result,
+    stored_result,
+)
 from ..scene.views.evidence import paint_evidence
 from ..scene.views.evidence_overlay import toggle_evidence
 from ..scene.views.outdated import inputs_now, record_inputs
@@ -40,6 +46,7 @@ the causes, and fit again with these causes included in the model"""
 
     def _start(self, context: bpy.types.Context) -> None:
         keep_check(None)  # the samples of two checks would need too much memory
+        self._varied = _varies(context.scene)
         self._job = PreparedJob(CheckJob(fit_job(self, context.scene)))
         self._inputs = inputs_now(context.scene)
         self._scene = context.scene.name
@@ -82,6 +89,8 @@ the causes, and fit again with these causes included in the model"""
             self.report({"WARNING"}, f"{cause_label(trial.effect.cause)}: {found.sentence(trial)}")
         if not found.causes:
             self.report({"INFO"}, "No known cause found.")
+        if self._varied:
+            self.report({"WARNING"}, "Check fits even materials. Fit again to see how they vary.")
 
 
 class PATINA_OT_refit(Stepped, bpy.types.Operator):
@@ -120,6 +129,11 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
         store_result(str(after.capture.file), description, DIAGNOSIS)
         for kind in (RESULT, DIAGNOSIS):
             record_inputs(scene, kind, self._inputs)
+
+
+def _varies(scene: bpy.types.Scene) -> bool:
+    """Whether a material of the last fit varies over the surface."""
+    return bool((stored_result(capture_path(scene)) or {}).get("varying"))
 
 
 def _show(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> Iterator[None]:
