@@ -20,7 +20,8 @@ def bands(normal: np.ndarray, light: np.ndarray, view: np.ndarray) -> np.ndarray
 
 
 def imported(name: str, **more: object) -> None:
-    path = make_capture_module().make_capture(folder() / name, photos=6, **more)
+    fit = "[fit]\nheld_out = false"
+    path = make_capture_module().make_capture(folder() / name, photos=6, extra=fit, **more)
     assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
 
 

@@ -89,7 +89,7 @@ def test_sun_on_changed_material(made, specular, roughness, tmp_path):
 def test_changed_material_under_environment_image(made, specular, roughness, tmp_path):
     """The sampling of half vectors follows the roughness, and its weights stay unbiased."""
     brdf = projected(made.evaluate, 60)
-    sphere = cycles_sphere.new_scene(size=32, samples=1024, osl=True)
+    sphere = cycles_sphere.new_scene(size=32, samples=512, osl=True)
     sky = world(WORLDS["forest"])
     node = changed(brdf, np.ones(3), specular, roughness)
     assign(node, brdf, sphere)
