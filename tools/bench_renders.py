@@ -135,9 +135,9 @@ def _use_glb(path: Path) -> None:
 
 
 def _shown(values: NDArray[np.float32], white: float) -> NDArray[np.float32]:
-    linear = np.clip(values / white, 0, 1)
-    low, high = 12.92 * linear, 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
-    return np.where(linear <= 0.0031308, low, high).astype(np.float32)
+    from patina.core.photo.transfer import srgb_encoded
+
+    return srgb_encoded(np.clip(values / white, 0, 1)).astype(np.float32)
 
 
 def _psnr(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..files import write_text_atomic
 from ..photo import write_png
 from ..photo.image import write_exr
+from ..photo.transfer import srgb_encoded
 from .dilate import dilated, margin_of
 from .maps_result import MapsResult
 from .settle import MaterialMaps
@@ -165,18 +166,11 @@ def _write(
     (image,), reached = dilated([texels.image(values)], known, margin_of(texels.size))
     image[~reached] = fill
     if path.suffix == ".png":
-        shown = _srgb(image) if colour else image
+        shown = srgb_encoded(image) if colour else image
         write_png(path, np.round(255 * np.clip(shown, 0, 1)).astype(np.uint8))
     else:
         rgb = image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2)
         write_exr(path, rgb, half=True)
-
-
-def _srgb(linear: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Linear values 0 … 1 by the transfer curve of IEC 61966-2-1."""
-    low = 12.92 * linear
-    high = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
-    return np.where(linear <= 0.0031308, low, high).astype(np.float32)
 
 
 def _write_json(path: Path, result: MapsResult, files: list[MapFile]) -> None:

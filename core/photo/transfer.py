@@ -13,6 +13,13 @@ EXPECTED = 'expected "auto", "srgb", "linear", "bt709", or "gamma:2.2"'
 MAX_POINTS = 1 << 16
 
 
+def srgb_encoded(linear: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Linear values 0 … 1 by the transfer curve of IEC 61966-2-1, in their own precision."""
+    low = 12.92 * linear
+    high = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
+    return np.where(linear <= 0.0031308, low, high).astype(linear.dtype)
+
+
 @dataclass(frozen=True)
 class Parametric:
     """Linear Y of encoded X: (aX + b)^g + e for X ≥ d, else cX + f (ICC.1:2022, 10.18, type 4)."""

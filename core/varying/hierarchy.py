@@ -214,12 +214,8 @@ class _Equations:
         together = np.bincount(cell.astype(np.int64) * photos + seen.photo)
         for part in _chunks(len(seen)):
             some, at = seen.select(part), cell[part]
-            node = some.node
-            predicted, slope = model.derivatives(some.shading, normal[node], theta[node], free)
-            predicted += np.float32(black)
-            residual = np.log(np.maximum(some.radiance, 0) + black) - np.log(predicted)
-            slope /= predicted[:, :, None]
-            variance = noise.variance(slope)
+            residual, slope = _log_residuals(model, some, normal, theta, black, free)
+            variance = noise.variance(_steepness(slope))
             slope = slope[:, :, which]
             alike = together[at.astype(np.int64) * photos + some.photo]
             weight = weights_of_squares(np.square(residual).mean(axis=1) / variance)
@@ -285,9 +281,8 @@ class _Noise:
     error: float
     normal_error: float
 
-    def variance(self, slope: NDArray[np.float32]) -> Array:
-        """(m,) variances. slope: (m, 3, 8) derivatives of the logarithm by the parameters."""
-        steep = np.square(slope[:, :, TILT]).sum(axis=2).mean(axis=1)
+    def variance(self, steep: Array) -> Array:
+        """(m,) variances of observations whose steepness is (m,)."""
         return self.error**2 + self.normal_error**2 * steep
 
     @classmethod
@@ -305,21 +300,44 @@ class _Noise:
         some = seen.select(np.arange(0, len(seen), max(1, len(seen) // CHUNK)))
         if not len(some):
             return cls(MAX_ERROR, normal_error)
-        node, free = some.node, np.zeros(COUNT, bool)
+        free = np.zeros(COUNT, bool)
         free[TILT] = True
-        predicted, slope = model.derivatives(some.shading, normal[node], theta[node], free)
-        predicted += np.float32(black)
-        residual = np.log(np.maximum(some.radiance, 0) + black) - np.log(predicted)
-        slope /= predicted[:, :, None]
+        residual, slope = _log_residuals(model, some, normal, theta, black, free)
+        steep = _steepness(slope)
         low, high = MIN_ERROR, MAX_ERROR
         for _ in range(BISECTIONS):
             middle = cls(float(np.sqrt(low * high)), normal_error)
-            normalised = residual / np.sqrt(middle.variance(slope))[:, None]
+            normalised = residual / np.sqrt(middle.variance(steep))[:, None]
             if robust_deviation(normalised) > 1:
                 low = middle.error
             else:
                 high = middle.error
         return middle
+
+
+def _log_residuals(
+    model: NodeModel,
+    seen: Observations,
+    normal: NDArray[np.float32],
+    theta: NDArray[np.float32],
+    black: float,
+    free: NDArray[np.bool_],
+) -> tuple[Array, NDArray[np.float32]]:
+    """(measured minus predicted logarithm of the radiance (m, 3), derivatives (m, 3, 8) of the
+    prediction by the parameters). free: (8,) parameters whose derivatives are computed."""
+    node = seen.node
+    predicted, slope = model.derivatives(seen.shading, normal[node], theta[node], free)
+    predicted += np.float32(black)
+    residual = np.log(np.maximum(seen.radiance, 0) + black) - np.log(predicted)
+    slope /= predicted[:, :, None]
+    return residual, slope
+
+
+def _steepness(slope: NDArray[np.float32]) -> Array:
+    """(m,) squared change of the logarithm for a tilt of the normal of one radian, the mean of the
+    channels. slope: (m, 3, 8) derivatives by the parameters."""
+    found: Array = np.square(slope[:, :, TILT]).sum(axis=2).mean(axis=1)
+    return found
 
 
 def near_black(seen: Observations) -> float:

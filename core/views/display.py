@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..photo.transfer import srgb_encoded
+
 UNKNOWN = np.array([58, 60, 64], np.uint8)  # dark grey: no value
 # signed differences: blue too dark, light grey no difference, red too bright (the diverging colour
 # map of Moreland)
@@ -16,8 +18,7 @@ TOO_BRIGHT = np.array([180, 4, 38], np.float32)
 def srgb(linear: NDArray[np.floating]) -> NDArray[np.uint8]:
     """Linear values, clipped to 0..1, by the transfer curve of IEC 61966-2-1; NaN gives 0."""
     x = np.clip(np.nan_to_num(linear), 0.0, 1.0)
-    encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1 / 2.4) - 0.055)
-    return (encoded * 255.0 + 0.5).astype(np.uint8)
+    return (srgb_encoded(x) * 255.0 + 0.5).astype(np.uint8)
 
 
 def white_level(radiance: NDArray[np.floating], percentile: float = 99.0) -> float:

@@ -21,10 +21,15 @@ from patina.scene.export import relight  # noqa: E402
 from patina.scene.material import material_nodes  # noqa: E402
 from tests.projected import projected  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
-from tests.wheel.world_light import VIEW, assign_material, lambert, reflected, world  # noqa: E402
+from tests.wheel.world_light import (  # noqa: E402
+    VIEW,
+    assert_matches_quadrature,
+    assign_material,
+    lambert,
+    world,
+)
 
 WORLDS = relight.shipped_worlds()
-PIXELS = 24  # that are compared, in every environment
 
 if material_nodes.osl_missing():
     pytest.skip(f"{material_nodes.osl_missing()}", allow_module_level=True)
@@ -47,21 +52,7 @@ def test_sphere_under_environment_image(made, name, tmp_path):
     sky = world(WORLDS[name])
     node = assign_material(brdf, sphere)
     assert {s.identifier: s for s in node.inputs}["world"].default_value != ""
-    images = []
-    for seed in (1, 2):
-        bpy.context.scene.cycles.seed = seed
-        images.append(cycles_sphere.render(tmp_path))
-    normal, inside = cycles_sphere.normals()
-    rows = np.argwhere(inside & (normal @ VIEW > 0.2))
-    rows = rows[np.random.default_rng(3).choice(len(rows), PIXELS, replace=False)]
-    expected = np.array([reflected(brdf, sky, normal[y, x]) for y, x in rows])
-    found = np.array([[image[y, x] for y, x in rows] for image in images])
-    kept = inside & (normal @ VIEW > 0.2)
-    every = (images[0] - images[1])[kept]
-    noise = np.sqrt(np.mean(every**2) / 2)  # of one image
-    error = found.mean(axis=0) - expected
-    assert abs(error.mean()) < 0.003 * expected.mean() + 3 * noise / np.sqrt(6 * PIXELS)
-    assert np.sqrt(np.mean(error**2)) < 2.0 * noise / np.sqrt(2) + 0.003 * expected.mean()
+    assert_matches_quadrature(brdf, sky, tmp_path)
 
 
 def test_white_furnace(tmp_path):
