@@ -15,6 +15,7 @@ from .observations import Observations
 from .varying_surface import EVEN, VARIATIONS, MaterialVariation
 
 FOLDS = 3  # groups of photos, each held out once
+MAX_SINGLE_PHOTOS = 6  # up to so many, each photo is a group: two are too many to leave out
 MIN_PHOTOS = 3  # with fewer, one photo cannot be predicted from the others
 STANDARD_ERRORS = 2.0  # of the difference over photos by which a more varied kind must be better
 MAX_RMS_GROWTH = 1.02  # highlights, which the cost hardly sees, may hardly be predicted worse
@@ -55,7 +56,8 @@ def choose(
 
     The simplest kind is kept unless a more varied one predicts held-out photos better, by
     STANDARD_ERRORS of the difference over photos, without a larger RMS error of the radiance; for
-    an even material also by MIN_GAIN and MIN_VARIATION. With fewer than MIN_PHOTOS it is the first.
+    an even material also by MIN_GAIN and MIN_VARIATION. Only nodes count that a fitted photo shows
+    too: of others, the photos say nothing. With fewer than MIN_PHOTOS it is the first.
     """
     photos = np.unique(seen.photo)
     if len(photos) < MIN_PHOTOS:
@@ -67,11 +69,15 @@ def choose(
     costs: dict[str, list[float]] = {kind: [] for kind in kinds}
     typical: dict[str, list[float]] = {kind: [] for kind in kinds}
     rms: dict[str, list[float]] = {kind: [] for kind in kinds}
-    folds = [photos[k::FOLDS] for k in range(min(FOLDS, len(photos)))]
+    count = len(photos) if len(photos) <= MAX_SINGLE_PHOTOS else FOLDS
+    folds = [photos[k::count] for k in range(count)]
     done, total = 0, len(folds) * len(kinds)
     for fold in folds:
         out = np.isin(seen.photo, fold)
-        fitted, held = seen.select(~out), seen.select(out)
+        fitted = seen.select(~out)
+        shown = np.zeros(len(nodes.points), bool)
+        shown[fitted.node] = True
+        held = seen.select(out & shown[seen.node])
         for kind in kinds:
             theta = zero
             if VARIATIONS[kind] and len(fitted):
@@ -80,6 +86,8 @@ def choose(
             residual, relative, difference = _errors(model, held, nodes, theta, black)
             for photo in fold:
                 own = held.photo == photo
+                if not own.any():
+                    continue
                 costs[kind].append(float(robust_cost(residual[own] / error).mean()))
                 typical[kind].append(float(np.median(relative[own])))
                 square = np.square(difference[own]).mean()
@@ -87,6 +95,8 @@ def choose(
             done += 1
             yield done / total
     chosen = kinds[0]
+    if len(costs[chosen]) < MIN_PHOTOS:
+        return MaterialVariation(chosen)
     for kind in kinds[1:]:
         gain = np.array(costs[chosen]) - np.array(costs[kind])
         sure = gain.mean() > STANDARD_ERRORS * gain.std(ddof=1) / np.sqrt(len(gain))

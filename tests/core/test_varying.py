@@ -92,6 +92,17 @@ def test_surface_that_varies_is_distinguished_from_an_even_one(model):
         assert found.kind.startswith(expected), found
 
 
+def test_variation_is_found_where_each_photo_shows_another_part(model):
+    """What no fitted photo shows is predicted alike with and without variation, and says nothing
+    about it."""
+    made = scene(6, 5)
+    strip = (made.points[:, 0] - made.points[:, 0].min()) // 0.3 % 3  # each in two photos
+    own = strip[made.seen.node] == made.seen.photo // 2
+    found = drained(choose(model, made.seen.select(own), nodes_of(made), ["even", "diffuse"]))
+    assert found.kind == "diffuse"
+    assert found.typical["diffuse"] < 0.6 * found.typical["even"]
+
+
 def test_nodes_without_photos_take_the_values_around_them(model):
     made = scene(6, 6)
     hole = np.abs(made.points[:, :2]).max(axis=1) < 0.06
