@@ -80,9 +80,10 @@ class VaryingJob(Job):
         seen, nodes = coarse.of_material(index, material, CHOICE_NODES)
         if not len(seen):
             return material, MaterialVariation(EVEN)
-        model = _model(material)
+        before, model = material, _model(material)
         if self.mode == "auto":
-            kind = yield from _choice(model, seen, nodes, (EVEN, DIFFUSE), start, 0.25 * share)
+            candidates = [(EVEN, model), (DIFFUSE, model)]
+            kind = yield from _choice(candidates, seen, nodes, False, start, 0.25 * share)
             if kind.kind == EVEN:
                 return material, kind
         part = 0.25 * share / REFITS
@@ -91,13 +92,10 @@ class VaryingJob(Job):
             material = yield from self._without_variation(index, material, seen, nodes, at, part)
         if self.mode == "always":
             return material, MaterialVariation(EVERYTHING)
-        rest = yield from _choice(
-            _model(material), seen, nodes, (DIFFUSE, *FURTHER), start + 0.5 * share, 0.5 * share
-        )
-        even = {EVEN: kind.cost[EVEN]}, {EVEN: kind.typical[EVEN]}
-        return material, MaterialVariation(
-            rest.kind, {**even[0], **rest.cost}, {**even[1], **rest.typical}
-        )
+        again = _model(material)
+        candidates = [(EVEN, model), *((one, again) for one in (DIFFUSE, *FURTHER))]
+        found = yield from _choice(candidates, seen, nodes, True, start + 0.5 * share, 0.5 * share)
+        return (before if found.kind == EVEN else material), found
 
     def _without_variation(
         self,
@@ -158,16 +156,16 @@ class VaryingJob(Job):
 
 
 def _choice(
-    model: NodeModel,
+    candidates: list[tuple[str, NodeModel]],
     seen: Observations,
     nodes: Nodes,
-    kinds: tuple[str, ...],
+    highlights: bool,
     start: float,
     share: float,
 ) -> Generator[Step, None, MaterialVariation]:
     return (
         yield from relayed(
-            steps_in_background(choose(model, seen, nodes, kinds)),
+            steps_in_background(choose(candidates, seen, nodes, highlights)),
             lambda done: Step("predicting held-out photos", start + share * done),
         )
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,8 @@ FOLDS = 3  # groups of photos, each held out once
 MAX_SINGLE_PHOTOS = 6  # up to so many, each photo is a group: two are too many to leave out
 MIN_PHOTOS = 3  # with fewer, one photo cannot be predicted from the others
 STANDARD_ERRORS = 2.0  # of the difference over photos by which a more varied kind must be better
-MAX_RMS_GROWTH = 1.02  # highlights, which the cost hardly sees, may hardly be predicted worse
 MIN_GAIN = 0.1  # relative decrease of the error of held-out photos that makes a surface uneven
-MIN_VARIATION = 0.02  # relative, explained by what varies: a smaller difference is hardly visible
+MIN_VARIATION = 0.03  # relative, explained by what varies: about one step of L*, hardly visible
 MIN_NORMAL_ERROR = float(np.radians(0.5))  # that remains with tilts, or of a very good scan
 CHUNK = 1 << 17
 
@@ -49,68 +48,101 @@ class Nodes:
 
 
 def choose(
-    model: NodeModel, seen: Observations, nodes: Nodes, kinds: Sequence[str]
+    candidates: Sequence[tuple[str, NodeModel]],
+    seen: Observations,
+    nodes: Nodes,
+    highlights: bool = True,
 ) -> Generator[float, None, MaterialVariation]:
-    """Choose one of ``kinds``, simplest first, by cross-validation over photos; yields the fraction
-    done.
+    """Choose what varies by cross-validation over photos; yields the fraction done.
 
-    The simplest kind is kept unless a more varied one predicts held-out photos better, by
-    STANDARD_ERRORS of the difference over photos, without a larger RMS error of the radiance; for
-    an even material also by MIN_GAIN and MIN_VARIATION. Only nodes count that a fitted photo shows
+    candidates: (kind, model with which it is estimated), simplest first. The simplest is kept
+    unless a more varied one predicts held-out photos better: by STANDARD_ERRORS of the difference
+    over photos; with ``highlights`` by a factor that is larger than that by which the RMS error of
+    the radiance grows, which is mostly that of highlights; and for an even material by MIN_GAIN and
+    MIN_VARIATION. The error is the mean absolute one of the logarithm (the median does not show a
+    second material on less than half of the surface). Only nodes count that a fitted photo shows
     too: of others, the photos say nothing. With fewer than MIN_PHOTOS it is the first.
     """
     photos = np.unique(seen.photo)
+    first = candidates[0][0]
     if len(photos) < MIN_PHOTOS:
-        return MaterialVariation(kinds[0])
+        return MaterialVariation(first)
     black = near_black(seen)
     zero = np.zeros((len(nodes.points), COUNT), np.float32)
-    residual, _, _ = _errors(model, seen, nodes, zero, black)
+    residual, _, _ = _errors(candidates[0][1], seen, nodes, zero, black)
     error = max(robust_deviation(residual), MIN_ERROR)
-    costs: dict[str, list[float]] = {kind: [] for kind in kinds}
-    typical: dict[str, list[float]] = {kind: [] for kind in kinds}
-    rms: dict[str, list[float]] = {kind: [] for kind in kinds}
+    found = {kind: _HeldOut() for kind, _ in candidates}
     count = len(photos) if len(photos) <= MAX_SINGLE_PHOTOS else FOLDS
     folds = [photos[k::count] for k in range(count)]
-    done, total = 0, len(folds) * len(kinds)
+    done, total = 0, len(folds) * len(candidates)
     for fold in folds:
         out = np.isin(seen.photo, fold)
         fitted = seen.select(~out)
         shown = np.zeros(len(nodes.points), bool)
         shown[fitted.node] = True
         held = seen.select(out & shown[seen.node])
-        for kind in kinds:
+        for kind, model in candidates:
             theta = zero
             if VARIATIONS[kind] and len(fitted):
                 for _, fields in nodes.solve(model, fitted, kind):
                     theta = fields.parameters
-            residual, relative, difference = _errors(model, held, nodes, theta, black)
+            errors = _errors(model, held, nodes, theta, black)
             for photo in fold:
                 own = held.photo == photo
-                if not own.any():
-                    continue
-                costs[kind].append(float(robust_cost(residual[own] / error).mean()))
-                typical[kind].append(float(np.median(relative[own])))
-                square = np.square(difference[own]).mean()
-                rms[kind].append(float(np.sqrt(square / np.square(held.radiance[own]).mean())))
+                if own.any():
+                    found[kind].add(held.radiance[own], error, *(e[own] for e in errors))
             done += 1
             yield done / total
-    chosen = kinds[0]
-    if len(costs[chosen]) < MIN_PHOTOS:
-        return MaterialVariation(chosen)
-    for kind in kinds[1:]:
-        gain = np.array(costs[chosen]) - np.array(costs[kind])
-        sure = gain.mean() > STANDARD_ERRORS * gain.std(ddof=1) / np.sqrt(len(gain))
-        sure &= np.mean(rms[kind]) < MAX_RMS_GROWTH * np.mean(rms[chosen])
-        before, after = np.mean(typical[chosen]), np.mean(typical[kind])
-        if chosen == EVEN:
-            sure &= after < (1 - MIN_GAIN) * before and before**2 - after**2 > MIN_VARIATION**2
-        if sure and after < before:
+    if len(found[first].cost) < MIN_PHOTOS:
+        return MaterialVariation(first)
+    chosen = first
+    for kind, _ in candidates[1:]:
+        if found[kind].better(found[chosen], chosen == EVEN, highlights):
             chosen = kind
-    return MaterialVariation(chosen, _means(costs), _means(typical))
+    return MaterialVariation(
+        chosen,
+        {kind: float(np.mean(one.cost)) for kind, one in found.items()},
+        {kind: float(np.mean(one.typical)) for kind, one in found.items()},
+    )
 
 
-def _means(values: dict[str, list[float]]) -> dict[str, float]:
-    return {kind: float(np.mean(found)) for kind, found in values.items()}
+@dataclass(frozen=True)
+class _HeldOut:
+    """Errors of held-out photos, one number each. cost: nats a pixel; typical: median relative
+    error; absolute: mean absolute error of the logarithm; rms: relative RMS."""
+
+    cost: list[float] = field(default_factory=list)
+    typical: list[float] = field(default_factory=list)
+    absolute: list[float] = field(default_factory=list)
+    rms: list[float] = field(default_factory=list)
+
+    def add(
+        self,
+        radiance: NDArray[np.floating],
+        error: float,
+        log: NDArray[np.floating],
+        relative: NDArray[np.floating],
+        difference: NDArray[np.floating],
+    ) -> None:
+        """Append the errors of one photo; error: standard deviation of the logarithm."""
+        self.cost.append(float(robust_cost(log / error).mean()))
+        self.typical.append(float(np.median(relative)))
+        self.absolute.append(float(np.abs(log).mean()))
+        square = np.square(difference).mean() / np.square(radiance).mean()
+        self.rms.append(float(np.sqrt(square)) + MIN_ERROR)
+
+    def better(self, simpler: _HeldOut, even: bool, highlights: bool) -> bool:
+        """Whether these errors justify more variation than those of a simpler kind; see choose."""
+        gain = np.array(simpler.cost) - np.array(self.cost)
+        if gain.mean() <= STANDARD_ERRORS * gain.std(ddof=1) / np.sqrt(len(gain)):
+            return False
+        before, after = float(np.mean(simpler.absolute)), float(np.mean(self.absolute))
+        growth = float(np.exp(np.mean(np.log(self.rms)) - np.mean(np.log(simpler.rms))))
+        if highlights and growth * after > before:
+            return False
+        if even and before**2 - after**2 <= MIN_VARIATION**2:
+            return False
+        return after < (1 - MIN_GAIN if even else 1) * before
 
 
 def _errors(
@@ -130,5 +162,5 @@ def _errors(
         measured = np.maximum(some.radiance, 0)
         log[part] = np.log(measured + black) - np.log(predicted + black)
         error[part] = predicted - measured
-        relative[part] = np.abs(error[part]) / np.maximum(measured, black)
+        relative[part] = np.abs(predicted - measured) / np.maximum(measured, black)
     return log, relative, error

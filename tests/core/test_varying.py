@@ -88,7 +88,7 @@ def test_photo_that_was_not_seen_is_predicted_better(model):
 def test_surface_that_varies_is_distinguished_from_an_even_one(model):
     for vary, expected in ((True, "diffuse"), (False, "even")):
         made = scene(6, 5, vary=vary)
-        found = drained(choose(model, made.seen, nodes_of(made), list(VARIATIONS)))
+        found = drained(choose([(kind, model) for kind in VARIATIONS], made.seen, nodes_of(made)))
         assert found.kind.startswith(expected), found
 
 
@@ -98,7 +98,11 @@ def test_variation_is_found_where_each_photo_shows_another_part(model):
     made = scene(6, 5)
     strip = (made.points[:, 0] - made.points[:, 0].min()) // 0.3 % 3  # each in two photos
     own = strip[made.seen.node] == made.seen.photo // 2
-    found = drained(choose(model, made.seen.select(own), nodes_of(made), ["even", "diffuse"]))
+    found = drained(
+        choose(
+            [(kind, model) for kind in ("even", "diffuse")], made.seen.select(own), nodes_of(made)
+        )
+    )
     assert found.kind == "diffuse"
     assert found.typical["diffuse"] < 0.6 * found.typical["even"]
 
