@@ -19,6 +19,7 @@ BENCHES = (
     "find_light",
     "real",
     "varying",
+    "objects",
     "renders",
     "solve",
     "noise",
