@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,8 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from patina.core.capture import Capture
     from patina.core.jobs import CaptureResult
     from patina.core.jobs.surface_observations import SurfaceObservations
+    from patina.core.varying.observations import Observations
+    from patina.core.varying.varying_surface import VaryingSurface
+
+    from .objects.finish import Finish
 
 Array = NDArray[np.floating]
 
@@ -51,7 +55,7 @@ def run(_: Path) -> None:
 
 
 def compare(path: Path, count: int) -> None:
-    """Print the table of a fit to the first photos but the HELD_OUT first ones, ``count`` many."""
+    """Print the table of fits to ``count`` photos, which predict the HELD_OUT first ones."""
     import patina
     from patina.core.concurrency.steps import drained
     from patina.core.jobs import FitJob, finished
@@ -71,35 +75,32 @@ def compare(path: Path, count: int) -> None:
     more.drain()
     seconds = time.perf_counter() - since
     varied = finished(more.result)
-    surface = drained(observe_surface(_of_all(even, path), NODES, 0.0, 1.0))
+    surface = drained(observe_surface(_of_all(even, capture), NODES, 0.0, 1.0))
     known = surface.seen.photo >= HELD_OUT
     known &= surface.seen.photo < HELD_OUT + count
     seen = surface.seen.select(np.flatnonzero(known))
     held = surface.seen.select(np.flatnonzero(surface.seen.photo < HELD_OUT))
     normals = surface.grid.normals(np.arange(len(surface.grid)))
     rows = [_ours("even", even, surface, held, even_seconds)]
-    ways: dict[str, Callable] = {
-        "Lambert and GGX": plain.lambert_ggx, "basis weights": plain.basis_weights,
-    }  # fmt: skip
+    ways = {"Lambert and GGX": plain.lambert_ggx, "basis weights": plain.basis_weights}
     for name, fit in ways.items():
         since = time.perf_counter()
-        predict = fit(seen, normals)
-        predicted = predict(held)
-        rows.append(Row(name, predicted, predict.albedo, time.perf_counter() - since))
+        found = fit(seen, normals)
+        predicted = found.predict(held)
+        rows.append(Row(name, predicted, found.albedo, time.perf_counter() - since))
     rows.append(_ours("Patina, varying", varied, surface, held, seconds))
     print(f"\n{count} photos, {HELD_OUT} others predicted. {varied.notes[-1]}\n")
-    _print(rows, surface, seen, held)
+    truth = _truth(surface)
+    _print(rows, truth, seen, held)
     if varied.varying is not None:
-        _print_intervals(varied, surface, rows[-1])
+        _print_intervals(varied.varying, surface, truth, rows[-1])
 
 
-def _of_all(fitted: CaptureResult, path: Path) -> CaptureResult:
+def _of_all(fitted: CaptureResult, capture: Capture) -> CaptureResult:
     """The fit, with all photos of the capture to be read."""
-    import patina
     from patina.core.inputs.lights import find_lights
     from patina.core.inputs.photos import LitPhotos
 
-    capture = patina.load_capture(path)
     photos = LitPhotos.open(capture)
     lights = find_lights(capture, fitted.scan, photos)
     return replace(fitted, capture=capture, photos=photos, lights=lights)
@@ -114,7 +115,11 @@ def _parameters(fitted: CaptureResult, surface: SurfaceObservations) -> Array:
 
 
 def _ours(
-    name: str, fitted: CaptureResult, surface: SurfaceObservations, held, seconds: float
+    name: str,
+    fitted: CaptureResult,
+    surface: SurfaceObservations,
+    held: Observations,
+    seconds: float,
 ) -> Row:
     from patina.core.varying.node_model import DIFFUSE, NodeModel
 
@@ -133,14 +138,14 @@ def _ours(
     return Row(name, predicted, albedo, seconds)
 
 
-def _print(rows: list[Row], surface: SurfaceObservations, seen, held) -> None:
-    truth = _truth(surface)
+def _print(rows: list[Row], truth: Finish, seen: Observations, held: Observations) -> None:
+    """The table of held-out errors, over all pixels and by material, and of the colours."""
     from patina.core.photo.transfer import srgb_encoded
 
     white = float(np.percentile(held.radiance, WHITE))
     measured = np.maximum(held.radiance, 0)
     black = 0.03 * float(np.median(measured))
-    shown = np.bincount(seen.node, minlength=len(surface.grid))
+    shown = np.bincount(seen.node, minlength=len(truth.kind))
     known = shown[held.node] > 0
     judged = (shown >= MIN_PHOTOS) & (truth.metallic < 0.05)
     print("| method | typical | relative RMS | encoded RMSE | " + " | ".join(KINDS)
@@ -167,15 +172,13 @@ def colour_error(found: Array, true: Array, judged: NDArray[np.bool_]) -> float:
     return float(np.median(np.abs(np.expm1(ratio - np.median(ratio, axis=0)))))
 
 
-def _print_intervals(fitted: CaptureResult, surface: SurfaceObservations, row: Row) -> None:
+def _print_intervals(
+    varying: VaryingSurface, surface: SurfaceObservations, truth: Finish, row: Row
+) -> None:
     """The share of colours that the 90 % intervals contain."""
     from patina.core.varying.node_model import DIFFUSE
-    from patina.core.varying.varying_surface import VaryingSurface
 
-    varying = fitted.varying
-    assert isinstance(varying, VaryingSurface)
     deviation = replace(varying, parameters=varying.deviation).at(*surface.grid.places)
-    truth = _truth(surface)
     judged = (varying.photos[varying.grid.at(*surface.grid.places)[0][:, 0]] >= MIN_PHOTOS) & (
         truth.metallic < 0.05
     )
@@ -185,7 +188,7 @@ def _print_intervals(fitted: CaptureResult, surface: SurfaceObservations, row: R
     print(f"\n90 % intervals of the diffuse colour contain {100 * inside.mean():.0f} % of it.")
 
 
-def _truth(surface: SurfaceObservations):
+def _truth(surface: SurfaceObservations) -> Finish:
     """The finish at the point of the true mesh nearest to each node."""
     from scipy.spatial import cKDTree
 

@@ -64,12 +64,12 @@ def choose(
     too: of others, the photos say nothing. With fewer than MIN_PHOTOS it is the first.
     """
     photos = np.unique(seen.photo)
-    first = candidates[0][0]
+    first, even = candidates[0]
     if len(photos) < MIN_PHOTOS:
         return MaterialVariation(first)
     black = near_black(seen)
     zero = np.zeros((len(nodes.points), COUNT), np.float32)
-    residual, _, _ = _errors(candidates[0][1], seen, nodes, zero, black)
+    residual, _, _ = _errors(even, seen, nodes, zero, black)
     error = max(robust_deviation(residual), MIN_ERROR)
     found = {kind: _HeldOut() for kind, _ in candidates}
     count = len(photos) if len(photos) <= MAX_SINGLE_PHOTOS else FOLDS
@@ -162,5 +162,5 @@ def _errors(
         measured = np.maximum(some.radiance, 0)
         log[part] = np.log(measured + black) - np.log(predicted + black)
         error[part] = predicted - measured
-        relative[part] = np.abs(predicted - measured) / np.maximum(measured, black)
+        relative[part] = np.abs(error[part]) / np.maximum(measured, black)
     return log, relative, error

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO as oiio
 import pycolmap
 from numpy.typing import NDArray
 
+from patina.core.photo.image import write_exr
 from patina.core.scan import Camera as ScanCamera
-from patina.core.scan import Mesh
 
 from ..demo_render import Camera, Studio
 from ..demo_shape import Surface, vertex_normals
@@ -25,6 +24,7 @@ from .finish import finish_of
 
 SCAN = "OpenMVS"  # the stereo tool of the mesh
 SIZE = (600, 420)  # of the photos, pixels
+SCAN_WIDTH = 1000  # of the scan's photos, pixels
 SAMPLES = 16  # rays a pixel
 IRRADIANCE = float(np.pi)
 POSE_ERROR = 0.3  # pixels of the scan's photos, by which the cameras of the capture are turned
@@ -73,14 +73,14 @@ def photograph(folder: Path, count: int) -> Path:
         level = float(np.median(pixels[pixels > 0]))
         pixels *= 1 + NOISE * rng.normal(size=pixels.shape)
         pixels += NOISE * level * rng.normal(size=pixels.shape)
-        _write_exr(folder / f"{place:03d}.exr", pixels)
+        write_exr(folder / f"{place:03d}.exr", pixels, half=True)
     return _write_capture(folder, taken)
 
 
 def _studio() -> Studio:
     import bpy
 
-    mesh: Mesh = true_bunny()
+    mesh = true_bunny()
     studio = Studio(SAMPLES)
     normals = vertex_normals(mesh.vertices, mesh.faces)
     studio.show(Surface(mesh.vertices, mesh.faces, normals), np.zeros(len(mesh.vertices)))
@@ -116,12 +116,6 @@ def _pinhole(camera: ScanCamera) -> Camera:
     return Camera(pose.rotation, pose.translation, focal, (x, y), (camera.width, camera.height))
 
 
-def _write_exr(path: Path, pixels: NDArray[np.floating]) -> None:
-    image = oiio.ImageBuf(oiio.ImageSpec(*pixels.shape[1::-1], 3, "half"))
-    image.set_pixels(oiio.ROI(), np.ascontiguousarray(pixels, np.float32))
-    image.write(str(path))
-
-
 def _write_capture(folder: Path, taken: list[Shot]) -> Path:
     """Cameras in COLMAP's format, each photo with its own, and the capture file."""
     rng = np.random.default_rng(5)
@@ -131,7 +125,7 @@ def _write_capture(folder: Path, taken: list[Shot]) -> Path:
     photos = []
     for place, shot in enumerate(taken):
         pinhole, name = _pinhole(shot.camera), f"view_{place:03d}.jpg"
-        wrong = rng.normal(size=3) * POSE_ERROR / pinhole.focal / (1000 / SIZE[0])
+        wrong = rng.normal(size=3) * POSE_ERROR / pinhole.focal / (SCAN_WIDTH / SIZE[0])
         turn = pycolmap.Rotation3d(wrong)
         pose = pycolmap.Rigid3d(
             turn * pycolmap.Rotation3d(pinhole.rotation), turn * pinhole.translation

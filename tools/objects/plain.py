@@ -11,6 +11,7 @@ uses, without its estimate of normals.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,6 @@ from patina.core.angles import half_difference
 from patina.core.varying.observations import Observations
 
 Array = NDArray[np.floating]
-Predict = Callable[[Observations], Array]
-"""Observations → (m, 3) radiance."""
 
 LOBES = 4  # as in the museum's run of Kintsugi 3D Builder
 BINS = 24  # of a lobe's table, over the square root of θh
@@ -29,6 +28,14 @@ ROUNDS = 12
 SWEEPS = 30  # of coordinate descent
 SUM_WEIGHT = 0.1  # of the condition that the weights of a node sum to 1
 SOME_NODES = 20_000  # that the lobe common to all nodes is fitted to
+
+
+@dataclass(frozen=True)
+class PlainFit:
+    """predict: observations → (m, 3) radiance. albedo: (n, 3) Lambertian colour of the nodes."""
+
+    predict: Callable[[Observations], Array]
+    albedo: Array
 
 
 class _Geometry:
@@ -48,11 +55,11 @@ class _Geometry:
         self.cosines = cosine, view
 
 
-def lambert_ggx(seen: Observations, normals: Array) -> Predict:
+def lambert_ggx(seen: Observations, normals: Array) -> PlainFit:
     """Fit to observations of n nodes with normals (n, 3), by least squares of the radiance."""
     count = len(normals)
     some = seen.select(np.flatnonzero(seen.node % max(1, count // SOME_NODES) == 0))
-    weight = 1 / (some.radiance.mean(axis=1) + np.median(some.radiance))
+    weight = _weight(some)
 
     def lobe(at: _Geometry, parameters: Array) -> Array:
         alpha, level = np.exp(parameters)
@@ -63,13 +70,8 @@ def lambert_ggx(seen: Observations, normals: Array) -> Predict:
         return found
 
     def colour(s: Observations, at: _Geometry, specular: Array, w: Array) -> Array:
-        white = at.light / np.pi
-        up = np.stack([np.bincount(s.node, c, count) for c in
-                       ((s.radiance - specular) * white * w[:, None] ** 2).T], axis=1)  # fmt: skip
-        down = np.stack([np.bincount(s.node, c, count) for c in
-                         (white**2 * w[:, None] ** 2).T], axis=1)  # fmt: skip
-        mean = up.sum(axis=0) / down.sum(axis=0)
-        return np.maximum(np.where(down > 0, up / np.maximum(down, 1e-20), mean), 0)
+        white = at.light / np.pi * w[:, None]
+        return np.maximum(_colour(s.node, (s.radiance - specular) * w[:, None], white, count), 0)
 
     inner = _Geometry(some, normals)
 
@@ -83,22 +85,20 @@ def lambert_ggx(seen: Observations, normals: Array) -> Predict:
               for a in (0.1, 0.3)]  # fmt: skip
     best = min(starts, key=lambda found: found.fun).x
     every = _Geometry(seen, normals)
-    w = 1 / (seen.radiance.mean(axis=1) + np.median(seen.radiance))
-    albedo = colour(seen, every, lobe(every, best), w)
+    albedo = colour(seen, every, lobe(every, best), _weight(seen))
 
     def predict(other: Observations) -> Array:
         at = _Geometry(other, normals)
         return albedo[other.node] / np.pi * at.light + lobe(at, best)
 
-    predict.albedo = albedo  # type: ignore[attr-defined]
-    return predict
+    return PlainFit(predict, albedo)
 
 
-def basis_weights(seen: Observations, normals: Array, lobes: int = LOBES) -> Predict:
+def basis_weights(seen: Observations, normals: Array, lobes: int = LOBES) -> PlainFit:
     """Fit to observations of n nodes with normals (n, 3), relative to their radiance."""
     count = len(normals)
     at = _Geometry(seen, normals)
-    w = (1 / (seen.radiance.mean(axis=1) + np.median(seen.radiance))).astype(np.float32)
+    w = _weight(seen).astype(np.float32)
     white = (at.light / np.pi * w[:, None]).astype(np.float32)
     target = (seen.radiance * w[:, None]).astype(np.float32)
     specular = (at.cook_torrance[:, None] * at.light * w[:, None]).astype(np.float32)
@@ -109,18 +109,33 @@ def basis_weights(seen: Observations, normals: Array, lobes: int = LOBES) -> Pre
         albedo, weights = state[:, :3], state[:, 3:]
         rest = target - albedo[seen.node] * white
         tables = _tables(step, specular, rest, weights[seen.node])
-        values = np.einsum("mb,kbc->mkc", step, np.cumsum(tables[:, ::-1], axis=1)[:, ::-1])
+        values = np.einsum("mb,kbc->mkc", step, tables)
         state = _weights(seen.node, white, specular, values, target, state)
 
     def predict(other: Observations) -> Array:
         here = _Geometry(other, normals)
         of = state[other.node]
-        table = np.cumsum(tables[:, ::-1], axis=1)[:, ::-1]
-        d = np.einsum("mb,kbc,mk->mc", _steps(here.theta_h), table, of[:, 3:])
+        d = np.einsum("mb,kbc,mk->mc", _steps(here.theta_h), tables, of[:, 3:])
         return (of[:, :3] / np.pi + d * here.cook_torrance[:, None]) * here.light
 
-    predict.albedo = state[:, :3]  # type: ignore[attr-defined]
-    return predict
+    return PlainFit(predict, state[:, :3])
+
+
+def _weight(seen: Observations) -> Array:
+    """(m,) weights of observations: about the inverse of their radiance."""
+    found: Array = 1 / (seen.radiance.mean(axis=1) + np.median(seen.radiance))
+    return found
+
+
+def _colour(node: NDArray[np.integer], target: Array, white: Array, count: int) -> Array:
+    """(n, 3) factors of ``white`` (m, 3) that fit ``target`` (m, 3) at each node by least squares;
+    where nothing was observed, those of the whole surface."""
+    up, down = (
+        np.stack([np.bincount(node, channel, count) for channel in values.T], axis=1)
+        for values in (target * white, white**2)
+    )
+    mean = up.sum(axis=0) / down.sum(axis=0)
+    return np.where(down > 0, up / np.maximum(down, 1e-20), mean)
 
 
 def _steps(theta_h: Array) -> NDArray[np.float32]:
@@ -139,10 +154,7 @@ def _start(
     """(n, 3 + lobes): colours by least squares, and a lobe for each group of similar colours."""
     from scipy.cluster.vq import kmeans2
 
-    up = np.stack([np.bincount(seen.node, c, count) for c in (target * white).T], axis=1)
-    down = np.stack([np.bincount(seen.node, c, count) for c in (white**2).T], axis=1)
-    mean = up.sum(axis=0) / down.sum(axis=0)
-    albedo = np.where(down > 0, up / np.maximum(down, 1e-20), mean)
+    albedo = _colour(seen.node, target, white, count)
     _, group = kmeans2(albedo[::7], lobes, minit="++", seed=0)
     centres = np.stack([albedo[::7][group == k].mean(axis=0) for k in range(lobes)])
     nearest = np.argmin(np.square(albedo[:, None] - centres[None]).sum(axis=2), axis=1)
@@ -151,10 +163,10 @@ def _start(
 
 
 def _tables(step: Array, specular: Array, rest: Array, weights: Array) -> Array:
-    """(lobes, BINS, 3) decreases of the tables from each entry to the next: monotone lobes."""
+    """(lobes, BINS, 3) tables of lobes that decrease with θh."""
     lobes = weights.shape[1]
     below = np.cumsum(np.eye(BINS), axis=1)  # entry b is the sum of the decreases from b on
-    out = np.zeros((lobes, BINS, 3))
+    decrease = np.zeros((lobes, BINS, 3))
     for channel in range(3):
         rows = step * specular[:, channel, None]
         normal, right = np.zeros((lobes, BINS, lobes, BINS)), np.zeros((lobes, BINS))
@@ -168,8 +180,8 @@ def _tables(step: Array, specular: Array, rest: Array, weights: Array) -> Array:
         a[np.diag_indices_from(a)] += 1e-6 * np.trace(a) / len(a)
         factor = np.linalg.cholesky(a)
         b = np.linalg.solve(factor, turn.T @ right.ravel())
-        out[:, :, channel] = nnls(factor.T, b)[0].reshape(lobes, BINS)
-    return out
+        decrease[:, :, channel] = nnls(factor.T, b)[0].reshape(lobes, BINS)
+    return np.cumsum(decrease[:, ::-1], axis=1)[:, ::-1]
 
 
 def _weights(
