@@ -17,6 +17,7 @@ from ..geometry import RayScene
 from ..inputs import capture_data
 from ..inputs.lights import Lights, find_lights, refined
 from ..inputs.photos import LitPhotos
+from ..inputs.separated_materials import separated_scan, with_separated
 from ..result import FittedResult
 from ..scan import Scan
 from ..varying import storage
@@ -95,6 +96,9 @@ def scene_of_result(
     face_material = np.zeros(len(scan.mesh.faces), np.int32)
     if varying is not None:
         face_material = varying.face_material.astype(np.int32)
+        if result.separated_from is not None:
+            capture = with_separated(capture, [m.name for m in stored])
+            scan = separated_scan(scan, face_material)
     elif len(capture.materials) > 1:
         taken = yield from relayed(
             take_samples(capture, scan, rays, photos, lights, threads=threads),

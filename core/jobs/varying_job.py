@@ -18,6 +18,7 @@ from ..varying.node_model import COUNT, NodeModel
 from ..varying.observations import Observations
 from ..varying.varying_surface import EVEN, VARIATIONS, MaterialVariation, VaryingSurface
 from .fit_job import CaptureResult, FitJob, MaterialResult, with_portable
+from .separate_materials import separate_materials
 from .surface_observations import SurfaceObservations, observe_surface, pixel_size
 
 MODES = ("auto", "never", "always")
@@ -28,13 +29,15 @@ MAX_OBSERVATIONS = 40_000_000  # nodes times photos, 60 bytes each
 NODES_PER_PIXEL = 4.0  # at most: half a pixel apart, photos are interpolated without loss
 CHOICE_NODES = 30_000  # of a material, that choice and refits use
 REFITS = 2  # of the BRDF, without the variation found so far
-FITTED, OBSERVED, CHOSEN = 0.3, 0.35, 0.75
-"""Fractions of the time after which the fit is done, photos are read, and kinds are chosen."""
+FITTED, OBSERVED, SEPARATED, CHOSEN = 0.25, 0.3, 0.45, 0.75
+"""Fractions of the time after which the fit is done, photos are read, materials are separated, and
+what varies is chosen."""
 
 
 class VaryingJob(Job):
     """Sets ``result``: the fit of ``fit`` with the variation of its materials, and with their BRDFs
     fitted again without it. It is the fit as it was where held-out photos find all materials even.
+    A single material is separated into several where these predict held-out photos better.
 
     fit: that has not run, or that has finished. mode: "auto", or "always" for all that can vary.
     nodes: of the grid on the mesh.
@@ -47,27 +50,38 @@ class VaryingJob(Job):
         self.result: CaptureResult | None = None
 
     def run(self) -> Iterator[Step]:
-        """Fit, choose what varies on a coarse grid, then estimate it on a fine one."""
+        """Fit, separate materials and choose what varies on a coarse grid, then estimate it on a
+        fine one."""
         check_material_count(self.fit.capture)
         if self.fit.result is None:
             for step in self.fit.run():
                 yield Step(step.stage, FITTED * step.fraction)
         before = finished(self.fit.result)
         coarse = yield from observe_surface(before, CHOICE_NODES, FITTED, OBSERVED - FITTED)
+        parts = yield from separate_materials(
+            self.fit, coarse, CHOICE_NODES, OBSERVED, SEPARATED - OBSERVED
+        )
+        if parts is not None:
+            self.fit, coarse = parts.fit, parts.surface
+            before = finished(self.fit.result)
         materials, kinds = list(before.materials), list[MaterialVariation]()
-        share = (CHOSEN - OBSERVED) / len(materials)
+        share = (CHOSEN - SEPARATED) / len(materials)
         for index in range(len(materials)):
-            material, kind = yield from self._chosen(index, coarse, OBSERVED + index * share, share)
+            start = SEPARATED + index * share
+            material, kind = yield from self._chosen(index, coarse, start, share)
             materials[index] = material
             kinds.append(kind)
         surface = None
-        if any(kind.kind != EVEN for kind in kinds):
+        if parts is not None or any(kind.kind != EVEN for kind in kinds):
             surface = yield from self._surface(before, materials, kinds)
+        notes = [_sentence(m.name, k) for m, k in zip(materials, kinds, strict=True)]
+        if parts is not None and surface is not None:
+            surface = replace(surface, separated_from=parts.separated_from)
+            notes.insert(0, parts.note)
         if self.portable:
             for index, material in enumerate(materials):
                 start = CHOSEN if surface is None else 0.95
                 materials[index] = yield from with_portable(material, start, self.fit.threads)
-        notes = tuple(_sentence(m.name, k) for m, k in zip(materials, kinds, strict=True))
         self.result = replace(
             before, materials=tuple(materials), varying=surface, notes=(*before.notes, *notes)
         )

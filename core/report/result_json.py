@@ -87,6 +87,7 @@ def _varying(result: CaptureResult) -> dict[str, Any] | None:
         "file": storage.NAME,
         "nodes": len(surface.grid),
         "spacing": surface.grid.spacing,
+        "separated_from": surface.separated_from,
         "materials": [
             {
                 "name": material.name,

@@ -51,7 +51,8 @@ class FittedResult:
     path of the capture file at the time of the fit; scene: the folder's scene.blend, None where
     there is none. effects: causes that the materials take into account, with their parameters by
     name. varying: the folder's file of the variation over the surface, None where there is none;
-    varying_names: the materials that vary."""
+    varying_names: the materials that vary; separated_from: the material of the capture whose parts
+    the materials are, None where they are those of the capture."""
 
     file: Path
     program: str
@@ -62,10 +63,13 @@ class FittedResult:
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     varying: Path | None = None
     varying_names: tuple[str, ...] = ()
+    separated_from: str | None = None
 
     def materials_of(self, names: Sequence[str], capture: str) -> tuple[FittedMaterial, ...]:
-        """The materials with these names of a capture, in their order. Raises InputError if one is
-        missing."""
+        """The materials with these names of a capture, in their order, or the parts that its only
+        material was separated into. Raises InputError if one is missing."""
+        if self.separated_from is not None and list(names) == [self.separated_from]:
+            return self.materials
         there = {material.name: material for material in self.materials}
         for name in names:
             if name not in there:

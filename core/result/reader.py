@@ -67,6 +67,7 @@ def read_result(path: Path, cache: Path | None = None) -> FittedResult:
         effects=_effects(record),
         varying=_varying(record, file.parent),
         varying_names=_varying_names(record),
+        separated_from=_separated_from(record),
     )
 
 
@@ -207,6 +208,14 @@ def _varying_names(record: Record) -> tuple[str, ...]:
         return ()
     entries = [one for one in listed[:MAX_MATERIALS] if isinstance(one, dict)]
     return tuple(str(one.get("name")) for one in entries if one.get("varies") != "even")
+
+
+def _separated_from(record: Record) -> str | None:
+    """The material of the capture that the result's materials are parts of."""
+    if record.values.get("varying") is None:
+        return None
+    found = record.record("varying").values.get("separated_from")
+    return found if isinstance(found, str) else None
 
 
 def _sentences(entry: Record) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from .varying_surface import EVEN, VARIATIONS, MaterialVariation
 FOLDS = 3  # groups of photos, each held out once
 MAX_SINGLE_PHOTOS = 6  # up to so many, each photo is a group: two are too many to leave out
 MIN_PHOTOS = 3  # with fewer, one photo cannot be predicted from the others
-STANDARD_ERRORS = 2.0  # of the difference over photos by which a more varied kind must be better
+STANDARD_ERRORS = 2.0  # over photos, of the gain by which a more varied kind must be better
 MIN_GAIN = 0.1  # relative decrease of the error of held-out photos that makes a surface uneven
 MIN_VARIATION = 0.03  # relative, explained by what varies: about one step of L*, hardly visible
 MIN_NORMAL_ERROR = float(np.radians(0.5))  # that remains with tilts, or of a very good scan
@@ -35,6 +35,10 @@ class Nodes:
     spacing: float
     mesh_edge: float
     normal_error: float = MIN_NORMAL_ERROR
+
+    def select(self, rows: NDArray[np.intp]) -> Nodes:
+        """Some of the nodes."""
+        return replace(self, points=self.points[rows], normals=self.normals[rows])
 
     def solve(
         self, model: NodeModel, seen: Observations, kind: str
@@ -56,12 +60,12 @@ def choose(
     """Choose what varies by cross-validation over photos; yields the fraction done.
 
     candidates: (kind, model with which it is estimated), simplest first. The simplest is kept
-    unless a more varied one predicts held-out photos better: by STANDARD_ERRORS of the difference
-    over photos; with ``highlights`` by a factor that is larger than that by which the RMS error of
-    the radiance grows, which is mostly that of highlights; and for an even material by MIN_GAIN and
-    MIN_VARIATION. The error is the mean absolute one of the logarithm (the median does not show a
-    second material on less than half of the surface). Only nodes count that a fitted photo shows
-    too: of others, the photos say nothing. With fewer than MIN_PHOTOS it is the first.
+    unless a more varied one predicts held-out photos better: by STANDARD_ERRORS over photos of the
+    logarithm of the cost; with ``highlights`` by a factor that is larger than that by which the RMS
+    error of the radiance grows, which is mostly that of highlights; and for an even material by
+    MIN_GAIN and MIN_VARIATION. The error is the mean absolute one of the logarithm (the median does
+    not show a second material on less than half of the surface). Only nodes count that a fitted
+    photo shows too: of others, the photos say nothing. With fewer than MIN_PHOTOS it is the first.
     """
     photos = np.unique(seen.photo)
     first, even = candidates[0]
@@ -69,11 +73,10 @@ def choose(
         return MaterialVariation(first)
     black = near_black(seen)
     zero = np.zeros((len(nodes.points), COUNT), np.float32)
-    residual, _, _ = _errors(even, seen, nodes, zero, black)
+    residual, _, _ = log_errors(even, seen, nodes, zero, black)
     error = max(robust_deviation(residual), MIN_ERROR)
-    found = {kind: _HeldOut() for kind, _ in candidates}
-    count = len(photos) if len(photos) <= MAX_SINGLE_PHOTOS else FOLDS
-    folds = [photos[k::count] for k in range(count)]
+    found = {kind: HeldOut() for kind, _ in candidates}
+    folds = folds_of(seen.photo)
     done, total = 0, len(folds) * len(candidates)
     for fold in folds:
         out = np.isin(seen.photo, fold)
@@ -86,11 +89,7 @@ def choose(
             if VARIATIONS[kind] and len(fitted):
                 for _, fields in nodes.solve(model, fitted, kind):
                     theta = fields.parameters
-            errors = _errors(model, held, nodes, theta, black)
-            for photo in fold:
-                own = held.photo == photo
-                if own.any():
-                    found[kind].add(held.radiance[own], error, *(e[own] for e in errors))
+            found[kind].add_photos(held, error, log_errors(model, held, nodes, theta, black))
             done += 1
             yield done / total
     if len(found[first].cost) < MIN_PHOTOS:
@@ -106,8 +105,15 @@ def choose(
     )
 
 
+def folds_of(photo: NDArray[np.integer]) -> list[NDArray[np.integer]]:
+    """The photos of observations (m,) in groups, each to be held out once."""
+    photos = np.unique(photo)
+    count = len(photos) if len(photos) <= MAX_SINGLE_PHOTOS else FOLDS
+    return [photos[k::count] for k in range(count)]
+
+
 @dataclass(frozen=True)
-class _HeldOut:
+class HeldOut:
     """Errors of held-out photos, one number each. cost: nats a pixel; typical: median relative
     error; absolute: mean absolute error of the logarithm; rms: relative RMS."""
 
@@ -116,7 +122,15 @@ class _HeldOut:
     absolute: list[float] = field(default_factory=list)
     rms: list[float] = field(default_factory=list)
 
-    def add(
+    def add_photos(
+        self, held: Observations, error: float, errors: tuple[NDArray[np.floating], ...]
+    ) -> None:
+        """Append the errors of each photo of held-out observations, as of ``log_errors``."""
+        for photo in np.unique(held.photo):
+            own = held.photo == photo
+            self._add(held.radiance[own], error, *(e[own] for e in errors))
+
+    def _add(
         self,
         radiance: NDArray[np.floating],
         error: float,
@@ -131,9 +145,9 @@ class _HeldOut:
         square = np.square(difference).mean() / np.square(radiance).mean()
         self.rms.append(float(np.sqrt(square)) + MIN_ERROR)
 
-    def better(self, simpler: _HeldOut, even: bool, highlights: bool) -> bool:
+    def better(self, simpler: HeldOut, even: bool, highlights: bool) -> bool:
         """Whether these errors justify more variation than those of a simpler kind; see choose."""
-        gain = np.array(simpler.cost) - np.array(self.cost)
+        gain = np.log(simpler.cost) - np.log(self.cost)  # one photo with a large gain has no veto
         if gain.mean() <= STANDARD_ERRORS * gain.std(ddof=1) / np.sqrt(len(gain)):
             return False
         before, after = float(np.mean(simpler.absolute)), float(np.mean(self.absolute))
@@ -145,7 +159,7 @@ class _HeldOut:
         return after < (1 - MIN_GAIN if even else 1) * before
 
 
-def _errors(
+def log_errors(
     model: NodeModel,
     seen: Observations,
     nodes: Nodes,

@@ -62,6 +62,11 @@ class NodeModel:
         """The model of a fitted material. One without a diffuse body is scaled as a whole."""
         return cls(brdf.log_table, split_body(brdf.evaluate).body.astype(np.float32), scale)
 
+    @property
+    def has_body(self) -> bool:
+        """Whether there is a diffuse part; a metal is scaled as a whole."""
+        return bool(self.body[0] < EVERYTHING)
+
     def reflectance(self, angles: Angles, parameters: Array) -> NDArray[np.float32]:
         """(m, 3) ρ in 1/sr at angles to the tilted normals of points with parameters (m, 8)."""
         body, specular = self._parts(angles, parameters)
@@ -111,7 +116,7 @@ class NodeModel:
         stretched = np.arctan(tangent).astype(np.float32)
         rho = self.table.evaluate(Angles(stretched, angles.theta_d, angles.phi_d))
         spread = np.exp(-2 * gloss)[:, None]  # a rougher surface spreads the same light
-        if self.body[0] >= EVERYTHING:
+        if not self.has_body:
             return rho * np.exp(parameters[:, DIFFUSE]) * spread, np.zeros_like(rho)
         body = np.minimum(rho, self.body)
         factor = np.exp(parameters[:, SPECULAR])[:, None] * spread

@@ -40,7 +40,9 @@ class MaterialVariation:
 class VaryingSurface:
     """grid: of the nodes. parameters: (n, 8) float32; deviation: (n, 8) float32, their standard
     errors; photos: (n,) uint16, number of photos that show the node lit. face_material: (f,) uint8,
-    index of the material of each face of the mesh. materials: in the order of the capture."""
+    index of the material of each face of the mesh. materials: in the order of the capture.
+    separated_from: the material of the capture that they are parts of, None where they are those of
+    the capture; result.json has it."""
 
     grid: SurfaceGrid
     parameters: NDArray[np.float32]
@@ -48,6 +50,7 @@ class VaryingSurface:
     photos: NDArray[np.uint16]
     face_material: NDArray[np.uint8]
     materials: tuple[MaterialVariation, ...]
+    separated_from: str | None = None
 
     @property
     def varies(self) -> bool:
