@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,19 +23,20 @@ from ..varying.choice import MIN_PHOTOS
 from ..varying.node_model import NodeModel
 from ..varying.separation import (
     EVERYTHING,
+    divide,
+    division_improves,
     features,
-    group_at,
-    groups,
-    separate,
-    separation_improves,
+    second_at,
 )
-from .fit_job import CaptureResult, FitJob
+from .fit_job import CaptureResult, FitJob, MaterialResult
 from .surface_observations import SurfaceObservations
 
-SOLVED, FITTED = 0.2, 0.7  # fractions of the time after which kinds are found, and are fitted
+MAX_KINDS = 4  # of material on one object: more are seldom, and each takes as long as a fit
+SOLVED, FITTED = 0.2, 0.7  # fractions of a trial after which kinds are found, and are fitted
+FIRST = 0.6  # fraction of the time that the first trial takes
 MIN_FACES = 10_000
 """Of the mesh, so that its faces are about as small as the distance of the nodes that are
-grouped."""
+divided."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,16 @@ class SeparatedFit:
     note: str
 
 
+@dataclass(frozen=True)
+class _Trial:
+    """Two kinds that held-out photos prefer to one. second: (f,) faces of the second kind; errors:
+    typical errors of held-out photos with one kind, and with two."""
+
+    fit: FitJob
+    second: NDArray[np.bool_]
+    errors: tuple[float, float]
+
+
 def separate_materials(
     fit: FitJob, surface: SurfaceObservations, limit: int, start: float, share: float
 ) -> Generator[Step, None, SeparatedFit | None]:
@@ -59,11 +70,63 @@ def separate_materials(
     job that this takes.
     """
     before = finished(fit.result)
-    mesh, capture = before.scan.mesh, before.capture
-    if not can_separate(capture) or len(mesh.faces) < MIN_FACES:
-        return None
     material = before.materials[0]
-    seen, nodes = surface.of_material(0, material, limit)
+    if not can_separate(before.capture) or len(before.scan.mesh.faces) < MIN_FACES:
+        return None
+    labels = np.zeros(len(before.scan.mesh.faces), np.intp)
+    first = yield from _trial(fit, material, surface, labels, 0, limit, start, FIRST * share)
+    if first is None:
+        return None
+    labels[first.second] = 1
+    found = list(finished(first.fit.result).materials)
+    waiting, part = [0, 1], 0.1 * share
+    while waiting and len(found) < MAX_KINDS:
+        index = waiting.pop(0)
+        own = relabelled(surface, labels)
+        trial = yield from _trial(
+            fit, found[index], own, labels, index, limit, start + FIRST * share, part
+        )
+        if trial is not None:
+            labels[trial.second] = len(found)
+            found[index], other = finished(trial.fit.result).materials
+            found.append(other)
+            waiting += [index, len(found) - 1]
+    final = first.fit
+    if len(found) > 2:
+        final = _fit_of(fit, before, separated_names(material.name, len(found)), labels)
+        for one in final.run():
+            done = FIRST + 0.1 + (0.9 - FIRST) * one.fraction
+            yield Step(f"separate materials: {one.stage}", start + share * done)
+    one_error, two_error = first.errors
+    note = (
+        f"{material.name} was separated into {len(found)} materials. With two, held-out photos are "
+        f"predicted with a typical error of {100 * two_error:.1f} % instead of "
+        f"{100 * one_error:.1f} %."
+    )
+    return SeparatedFit(final, relabelled(surface, labels), material.name, note)
+
+
+def relabelled(surface: SurfaceObservations, labels: NDArray[np.intp]) -> SurfaceObservations:
+    """The observations with the separated materials. labels: (f,) material of each face."""
+    face = surface.grid.places[0]
+    material = np.where(face >= 0, labels[face], -1)
+    seen = replace(surface.seen, material=material[surface.seen.node].astype(np.uint8))
+    return SurfaceObservations(surface.grid, material, seen)
+
+
+def _trial(
+    fit: FitJob,
+    material: MaterialResult,
+    surface: SurfaceObservations,
+    labels: NDArray[np.intp],
+    index: int,
+    limit: int,
+    start: float,
+    share: float,
+) -> Generator[Step, None, _Trial | None]:
+    """Divide one material in two, and fit both; None where held-out photos do not prefer it.
+    labels: (f,) material of each face; index: of the one that is divided."""
+    seen, nodes = surface.of_material(index, material, limit)
     if len(np.unique(seen.photo)) < MIN_PHOTOS:
         return None
     model = NodeModel.of(material.fit.brdf, material.scale)
@@ -72,41 +135,36 @@ def separate_materials(
         lambda: list(nodes.solve(model, seen, EVERYTHING)), step
     )
     values = features(model, nodes.points, fields.parameters)
-    separations = separate(values)
-    if not separations:
+    shown = np.unique(seen.node)
+    division = divide(values[shown], min(limit, len(np.unique(surface.seen.node))))
+    if division is None:
         return None
-    group = groups(values, separations)
+    before = finished(fit.result)
+    mesh, own = before.scan.mesh, labels == index
     middle = mesh.vertices[mesh.faces].mean(axis=1)
-    labels = yield from in_background(lambda: group_at(middle, nodes.points, group), step)
-    names = separated_names(material.name, len(separations) + 1)
-    again = _fit_of(fit, before, names, labels)
+    second = own & second_at(middle, nodes.points, division.second(values))
+    both = np.where(own, second.astype(np.intp), -1)
+    again = _fit_of(fit, before, separated_names(material.name, 2), both)
     try:
         for one in again.run():
             done = SOLVED + (FITTED - SOLVED) * one.fraction
             yield Step(f"separate materials: {one.stage}", start + share * done)
     except PatinaError:  # too few samples of one kind
         return None
-    found = finished(again.result)
-    parts = [NodeModel.of(m.fit.brdf, m.scale) for m in found.materials]
-    accepted, one_error, several_error = yield from relayed(
-        steps_in_background(separation_improves(model, parts, separations, seen, nodes)),
+    parts = [NodeModel.of(m.fit.brdf, m.scale) for m in finished(again.result).materials]
+    accepted, *errors = yield from relayed(
+        steps_in_background(division_improves(model, parts, division, seen, nodes)),
         lambda done: Step(
             "predicting held-out photos", start + share * (FITTED + (1 - FITTED) * done)
         ),
     )
-    if not accepted:
-        return None
-    note = (
-        f"{material.name} was separated into {len(names)} materials. Held-out photos are predicted "
-        f"with a typical error of {100 * several_error:.1f} % instead of {100 * one_error:.1f} %."
-    )
-    return SeparatedFit(again, _relabelled(surface, labels), material.name, note)
+    return _Trial(again, second, (errors[0], errors[1])) if accepted else None
 
 
 def _fit_of(
-    fit: FitJob, before: CaptureResult, names: tuple[str, ...], labels: NDArray[np.intp]
+    fit: FitJob, before: CaptureResult, names: Sequence[str], labels: NDArray[np.intp]
 ) -> FitJob:
-    """The fit of the separated materials. labels: (f,) material of each face."""
+    """The fit of separated materials. labels: (f,) material of each face, −1 for none."""
     earlier = fit.prepare
 
     def prepare(scan: Scan) -> Scan:
@@ -114,11 +172,3 @@ def _fit_of(
 
     capture = with_separated(fit.capture, names)
     return FitJob(capture, before.basis, prepare, fit.threads, fit.keep, portable=False)
-
-
-def _relabelled(surface: SurfaceObservations, labels: NDArray[np.intp]) -> SurfaceObservations:
-    """The observations with the separated materials. labels: (f,) material of each face."""
-    face = surface.grid.places[0]
-    material = np.where(face >= 0, labels[face], -1)
-    seen = replace(surface.seen, material=material[surface.seen.node].astype(np.uint8))
-    return SurfaceObservations(surface.grid, material, seen)

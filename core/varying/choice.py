@@ -145,10 +145,13 @@ class HeldOut:
         square = np.square(difference).mean() / np.square(radiance).mean()
         self.rms.append(float(np.sqrt(square)) + MIN_ERROR)
 
-    def better(self, simpler: HeldOut, even: bool, highlights: bool) -> bool:
-        """Whether these errors justify more variation than those of a simpler kind; see choose."""
+    def better(
+        self, simpler: HeldOut, even: bool, highlights: bool, errors: float = STANDARD_ERRORS
+    ) -> bool:
+        """Whether these errors justify more variation than those of a simpler kind; see choose.
+        errors: standard errors by which the cost must be lower."""
         gain = np.log(simpler.cost) - np.log(self.cost)  # one photo with a large gain has no veto
-        if gain.mean() <= STANDARD_ERRORS * gain.std(ddof=1) / np.sqrt(len(gain)):
+        if gain.mean() <= errors * gain.std(ddof=1) / np.sqrt(len(gain)):
             return False
         before, after = float(np.mean(simpler.absolute)), float(np.mean(self.absolute))
         growth = float(np.exp(np.mean(np.log(self.rms)) - np.mean(np.log(simpler.rms))))

@@ -1,10 +1,10 @@
 """Kinds of material on one surface, separated without masks.
 
 One BRDF whose parts vary from node to node shows where the material changes: on a metal the
-specular part is large against the diffuse one, on varnish the roughness is small. A parameter whose
-values over the surface form two separate groups (Ashman, Bird and Zepf 1994: their means differ by
-more than twice their standard deviation, and with a gap between them) separates two kinds of material. Each kind is examined
-again in the same way.
+specular part is large against the diffuse one, on varnish the roughness is small. Such a parameter
+separates two kinds of material where its values over the surface form two groups: their means
+differ by more than twice their standard deviation (Ashman, Bird and Zepf 1994), and few values lie
+between them. Each kind is examined again with its own BRDF.
 """
 
 from __future__ import annotations
@@ -25,15 +25,17 @@ from .varying_surface import VARIATIONS
 
 Array = NDArray[np.floating]
 
-MAX_KINDS = 4
 MIN_DISTANCE = 2.0  # of the means of two groups, in their standard deviations (Ashman et al. 1994)
 MIN_DIFFERENCE = np.array([0.7, 0.2])
-"""Of the means of two groups: a factor of two of the ratio of specular and diffuse part, and a fifth
-of the roughness. Variation within one kind describes smaller differences."""
+"""Of the means of two groups: a factor of two of the ratio of specular and diffuse part, and a
+fifth of the roughness. Variation within one kind describes smaller differences."""
 MAX_VALLEY = 0.8
 """Of the frequency between two groups, as a part of that at the smaller one's peak."""
 VALLEY_BINS, VALLEY_SMOOTHING = 100, 2.5  # of the histogram, and standard deviation in bins
 VALLEY_RANGE = (0.1, 99.9)  # percentiles of the values
+STANDARD_ERRORS = 1.0
+"""Over photos, by which two kinds must predict held-out photos better (the one-standard-error rule
+of Breiman et al. 1984): that there are two, their groups show already."""
 MIN_SHARE = 0.05  # of the nodes in the smaller group
 NEIGHBOURS = 7  # nodes whose values are averaged: single ones are noisy
 MIXTURE_ROUNDS = 100  # of expectation–maximisation
@@ -42,14 +44,17 @@ EVERYTHING = tuple(VARIATIONS)[-1]
 
 
 @dataclass(frozen=True)
-class Separation:
-    """One division of a group in two. group: the number of the group that is divided; feature: the
-    column of ``features`` (0 ratio of specular and diffuse part, 1 roughness); threshold: nodes
-    above it form the new group."""
+class Division:
+    """Of a material in two kinds. feature: column of ``features``; threshold: nodes above it are of
+    the second kind."""
 
-    group: int
     feature: int
     threshold: float
+
+    def second(self, values: Array) -> NDArray[np.bool_]:
+        """(n,) whether nodes with ``features`` (n, 2) are of the second kind."""
+        above: NDArray[np.bool_] = values[:, self.feature] > self.threshold
+        return above
 
 
 def features(model: NodeModel, points: NDArray[np.float64], parameters: Array) -> Array:
@@ -65,53 +70,37 @@ def features(model: NodeModel, points: NDArray[np.float64], parameters: Array) -
     return averaged
 
 
-def separate(values: Array) -> list[Separation]:
-    """The divisions that nodes with ``features`` (n, 2) show, none for one kind of material."""
-    found = list[Separation]()
-    group = np.zeros(len(values), np.intp)
-    waiting = [0]
-    while waiting and len(found) < MAX_KINDS - 1:
-        number = waiting.pop(0)
-        own = np.flatnonzero(group == number)
-        for feature in range(values.shape[1]):
-            threshold = _threshold(values[own, feature], len(values), MIN_DIFFERENCE[feature])
-            if threshold is not None:
-                found.append(Separation(number, feature, threshold))
-                group[own[values[own, feature] > threshold]] = len(found)
-                waiting += [number, len(found)]
-                break
-    return found
+def divide(values: Array, count: int, by: Sequence[int] = (0, 1)) -> Division | None:
+    """The division that nodes with ``features`` (n, 2), which photos show, suggest; None for one
+    kind of material. count: of all such nodes of the surface; by: features to look at."""
+    for feature in by:
+        threshold = _threshold(values[:, feature], count, MIN_DIFFERENCE[feature])
+        if threshold is not None:
+            return Division(feature, threshold)
+    return None
 
 
-def groups(values: Array, separations: Sequence[Separation]) -> NDArray[np.intp]:
-    """(n,) group of each node with ``features`` (n, 2), from 0."""
-    found = np.zeros(len(values), np.intp)
-    for new, one in enumerate(separations, 1):
-        found[(found == one.group) & (values[:, one.feature] > one.threshold)] = new
-    return found
-
-
-def group_at(
-    places: NDArray[np.float64], points: NDArray[np.float64], group: NDArray[np.intp]
-) -> NDArray[np.intp]:
-    """(m,) most frequent group among the nodes at ``points`` (n, 3) nearest to places (m, 3)."""
+def second_at(
+    places: NDArray[np.float64], points: NDArray[np.float64], second: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """(m,) whether most nodes near places (m, 3) are of the second kind. points: (n, 3) of nodes;
+    second: (n,) their kinds."""
     near = cKDTree(points).query(places, k=min(NEIGHBOURS, len(points)))[1]
-    votes = group[near.reshape(len(places), -1)]
-    counts = np.stack([(votes == k).sum(axis=1) for k in range(int(group.max(initial=0)) + 1)])
-    return np.argmax(counts, axis=0)
+    most: NDArray[np.bool_] = second[near.reshape(len(places), -1)].mean(axis=1) > 0.5
+    return most
 
 
-def separation_improves(
+def division_improves(
     whole: NodeModel,
     parts: Sequence[NodeModel],
-    separations: Sequence[Separation],
+    division: Division,
     seen: Observations,
     nodes: Nodes,
 ) -> Generator[float, None, tuple[bool, float, float]]:
-    """Whether separate BRDFs predict held-out photos better than one; yields the fraction done.
+    """Whether two BRDFs predict held-out photos better than one; yields the fraction done.
 
-    whole: model of all nodes, parts: of each group. All parameters vary in both. The nodes are
-    grouped again from the photos that are fitted. Returns (accepted, typical error with one BRDF,
+    whole: model of all nodes, parts: of each kind. All parameters vary in both. The nodes are
+    divided again by the photos that are fitted. Returns (accepted, typical error with one BRDF,
     with several).
     """
     black = near_black(seen)
@@ -127,21 +116,21 @@ def separation_improves(
         held = seen.select(out & shown[seen.node])
         theta = _solved(whole, fitted, nodes)
         one.add_photos(held, error, log_errors(whole, held, nodes, theta, black))
-        group = groups(features(whole, nodes.points, theta), separations)
+        values = features(whole, nodes.points, theta)
+        again = divide(values[shown], np.count_nonzero(shown), (division.feature,)) or division
+        second = again.second(values)
         yield (done + 0.5) / len(folds)
         errors = tuple(np.zeros((len(held), 3), np.float32) for _ in range(3))
         for number, model in enumerate(parts):
-            rows = np.flatnonzero(group == number)
-            some, at = _at(fitted, rows, len(group)), np.flatnonzero(group[held.node] == number)
-            own = _at(held, rows, len(group))
-            theta = _solved(model, some, nodes.select(rows))
-            for into, found in zip(
-                errors, log_errors(model, own, nodes.select(rows), theta, black), strict=True
-            ):
-                into[at] = found
+            rows = np.flatnonzero(second == number)
+            own, some = nodes.select(rows), _at(fitted, rows, len(second))
+            theta, at = _solved(model, some, own), np.flatnonzero(second[held.node] == number)
+            found = log_errors(model, _at(held, rows, len(second)), own, theta, black)
+            for into, part in zip(errors, found, strict=True):
+                into[at] = part
         several.add_photos(held, error, errors)
         yield (done + 1) / len(folds)
-    accepted = bool(one.cost) and several.better(one, even=False, highlights=True)
+    accepted = bool(one.cost) and several.better(one, False, True, STANDARD_ERRORS)
     typical = [float(np.mean(e.typical)) if e.typical else np.nan for e in (one, several)]
     return accepted, typical[0], typical[1]
 
