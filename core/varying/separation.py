@@ -33,9 +33,6 @@ MAX_VALLEY = 0.8
 """Of the frequency between two groups, as a part of that at the smaller one's peak."""
 VALLEY_BINS, VALLEY_SMOOTHING = 100, 2.5  # of the histogram, and standard deviation in bins
 VALLEY_RANGE = (0.1, 99.9)  # percentiles of the values
-STANDARD_ERRORS = 1.0
-"""Over photos, by which two kinds must predict held-out photos better (the one-standard-error rule
-of Breiman et al. 1984): that there are two, their groups show already."""
 MIN_SHARE = 0.05  # of the nodes in the smaller group
 NEIGHBOURS = 7  # nodes whose values are averaged: single ones are noisy
 MIXTURE_ROUNDS = 100  # of expectation–maximisation
@@ -100,8 +97,10 @@ def division_improves(
     """Whether two BRDFs predict held-out photos better than one; yields the fraction done.
 
     whole: model of all nodes, parts: of each kind. All parameters vary in both. The nodes are
-    divided again by the photos that are fitted. Returns (accepted, typical error with one BRDF,
-    with several).
+    divided again by the photos that are fitted. Two must be better by as much as makes a surface
+    uneven (choice.py), but not by standard errors: that there are two, their groups show already,
+    and where few photos show the surface, those that remain divide it less well. Returns (accepted,
+    typical error with one BRDF, with two).
     """
     black = near_black(seen)
     zero = np.zeros((len(nodes.points), COUNT), np.float32)
@@ -130,7 +129,7 @@ def division_improves(
                 into[at] = part
         several.add_photos(held, error, errors)
         yield (done + 1) / len(folds)
-    accepted = bool(one.cost) and several.better(one, False, True, STANDARD_ERRORS)
+    accepted = bool(one.cost) and several.better(one, True, True, 0.0)
     typical = [float(np.mean(e.typical)) if e.typical else np.nan for e in (one, several)]
     return accepted, typical[0], typical[1]
 

@@ -19,9 +19,18 @@ def bands(normal: np.ndarray, light: np.ndarray, view: np.ndarray) -> np.ndarray
     return make_capture_module().blinn(normal, light, view) + DIFFUSE * stripes
 
 
-def imported(name: str, **more: object) -> None:
+def half_metal(normal: np.ndarray, light: np.ndarray, view: np.ndarray) -> np.ndarray:
+    """A Blinn–Phong metal on the upper half, a matt red paint on the lower."""
+    half = light + view
+    half = half / np.linalg.norm(half, axis=-1, keepdims=True)
+    lobe = np.clip(np.sum(normal * half, axis=-1), 0, 1)[..., None] ** 40
+    metal = lobe * np.array([1.9, 1.5, 1.1]) + 0.004
+    return np.where(normal[..., 2:] > 0, metal, DIFFUSE + 0.02 * lobe)
+
+
+def imported(name: str, photos: int = 6, **more: object) -> None:
     fit = "[fit]\nheld_out = false"
-    path = make_capture_module().make_capture(folder() / name, photos=6, extra=fit, **more)
+    path = make_capture_module().make_capture(folder() / name, photos=photos, extra=fit, **more)
     assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
 
 
@@ -104,3 +113,28 @@ def test_maps_are_undone_with_the_fit() -> None:
     assert images(bpy.data.materials["surface"])
     bpy.ops.ed.undo()
     assert "surface" not in bpy.data.materials or not images(bpy.data.materials["surface"])
+
+
+def test_metal_and_paint_become_two_materials() -> None:
+    imported("halves", 8, brdf=half_metal)
+    assert bpy.ops.patina.fit() == {"FINISHED"}
+    scene = bpy.context.scene
+    mesh = scene.patina.mesh.data
+    assert [m.name for m in mesh.materials] == ["surface_1", "surface_2"]
+    assert "surface" not in bpy.data.materials
+    count = len(mesh.polygons)
+    slot, centre = np.empty(count, np.int32), np.empty(3 * count, np.float32)
+    mesh.polygons.foreach_get("material_index", slot)
+    mesh.polygons.foreach_get("center", centre)
+    up = centre.reshape(-1, 3)[:, 2] - make_capture_module().CENTRE[2]
+    seen = np.abs(up) < 0.6  # the cameras stand around the sphere
+    assert np.mean((slot == 1) == (up > 0), where=seen) > 0.9
+    result = extension("scene.session.scene_properties").stored_result(scene.patina.capture)
+    assert result["varying"]["separated_from"] == "surface"
+    scene.patina_photos.active = 1
+    assert bpy.ops.patina.look_at_photo(kind="comparison") == {"FINISHED"}
+    out = folder()
+    settings = {"directory": str(out), "folder": "a", "formats": {"gltf", "record"}}
+    assert bpy.ops.patina.export(**settings) == {"FINISHED"}
+    header = (out / "a" / "result.json").read_text("utf-8")
+    assert "surface_2" in header

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from patina.commands import command_line
+from patina.commands.fit import write_results
+from patina.commands.progress import Progress
 from patina.core.capture import read_capture
 from patina.core.jobs import FitJob, finished
 from patina.core.jobs.select_photos import select_photos
@@ -81,7 +83,7 @@ def halves(tmp_path_factory):
     """(file of a capture of 17 photos, the job of a fit of the first 16)."""
     path = made.make_capture(tmp_path_factory.mktemp("halves"), photos=17, brdf=half_metal)
     capture = select_photos(read_capture(path), range(16))
-    job = VaryingJob(FitJob(capture, portable=False), nodes=NODES)
+    job = VaryingJob(FitJob(capture), nodes=NODES)
     job.drain()
     return path, job
 
@@ -111,9 +113,10 @@ def test_metal_and_paint_are_separated(halves):
 @pytest.mark.slow
 def test_separated_materials_are_written_and_used_again(halves, tmp_path, monkeypatch):
     monkeypatch.setattr("patina.commands.fit.has_blender", lambda: False)
-    path, _ = halves
+    path, job = halves
     out, predicted = tmp_path / "out", tmp_path / "predicted"
-    assert command_line.main(["fit", str(path), "--out", str(out), "--varying", "auto"]) == 0
+    out.mkdir()
+    write_results(out, out, finished(job.result), job.stages, Progress())
     assert (out / "surface_1.binary").is_file() and (out / "surface_2.binary").is_file()
     stored = read_result(out)
     assert stored.separated_from == "surface"
