@@ -28,7 +28,7 @@ from ..inputs import capture_data
 from ..inputs.lights import Lights, find_lights, refined
 from ..inputs.photos import LitPhotos
 from ..samples import MeasuredPoints, SampleSink, SampleTable
-from ..samples.level import at_typical_level
+from ..samples.level import multiplied, typical_factor
 from ..scan import Scan
 from ..varying.varying_surface import VaryingSurface
 from .applied_effects import AppliedEffect
@@ -196,8 +196,14 @@ class FitJob(Job):
         self._times = FitTimes.of(len(capture.photos), pixels, counts, self.portable)
         results = []
         known = lights.known and capture.fit.absolute
+        scale = 1.0
         for index in range(len(capture.materials)):
-            results.append((yield from self._fit_material(index, taken, basis, known)))
+            name = capture.materials[index].name
+            self._check_samples(index, taken.kept[name].table(), taken.marked[name], known)
+        if not known:
+            scale = typical_factor((kept.table() for kept in taken.kept.values()), basis)
+        for index in range(len(capture.materials)):
+            results.append((yield from self._fit_material(index, taken, basis, (known, scale))))
         yield Step("assigning materials to the mesh", 1 - ASSIGNING / self._times.total)
         self.result = CaptureResult(
             capture=capture,
@@ -241,23 +247,16 @@ class FitJob(Job):
         return ()
 
     def _fit_material(
-        self, index: int, taken: PhotoSamples, basis: Basis, known: bool
+        self, index: int, taken: PhotoSamples, basis: Basis, unit: tuple[bool, float]
     ) -> Generator[Step, None, MaterialResult]:
-        capture = self.capture
-        name = capture.materials[index].name
+        name = self.capture.materials[index].name
         start, share = self._times.material(index)
         yield Step(f"fitting {name}", start)
-        table = taken.kept.pop(name).table()
-        self._check_samples(index, table, taken.marked[name], known)
-        scale = 1.0
-        if not known:
-            table, scale = at_typical_level(table, basis)
+        table = multiplied(taken.kept.pop(name).table(), unit[1])
         if self.keep:
             self.samples[name] = table
         counts = taken.counts[name]
-        return (
-            yield from self._material(index, table, basis, (known, scale), counts, start, share)
-        )
+        return (yield from self._material(index, table, basis, unit, counts, start, share))
 
     def fit_again(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -18,11 +19,26 @@ def at_typical_level(table: SampleTable, basis: Basis) -> tuple[SampleTable, flo
     unknown the samples are first scaled so that their median ρ·cosMap is that of the basis' mean
     material at the same angles. The fit then does not depend on the unit of the photos.
     """
-    some = table.select(np.arange(0, len(table), max(1, len(table) // 20_000)))
-    centre, _ = basis.rows(some.angles, 0)
-    typical = median(np.exp(centre) - mapping.EPSILON, some.weight)
-    measured = median(some.rho.mean(axis=1) * mapping.cos_map(some.angles), some.weight)
-    factor = typical / measured
-    return replace(
-        table, rho=table.rho * np.float32(factor), irradiance=table.irradiance / np.float32(factor)
-    ), factor
+    factor = typical_factor([table], basis)
+    return multiplied(table, factor), factor
+
+
+def typical_factor(tables: Iterable[SampleTable], basis: Basis) -> float:
+    """One factor for the samples of several materials under the same light, so that a dark one
+    stays darker than a bright one: the geometric mean of those of each, weighted by the numbers of
+    samples."""
+    logs, counts = [], []
+    for table in tables:
+        some = table.select(np.arange(0, len(table), max(1, len(table) // 20_000)))
+        centre, _ = basis.rows(some.angles, 0)
+        typical = median(np.exp(centre) - mapping.EPSILON, some.weight)
+        measured = median(some.rho.mean(axis=1) * mapping.cos_map(some.angles), some.weight)
+        logs.append(np.log(typical / measured))
+        counts.append(len(table))
+    return float(np.exp(np.average(logs, weights=counts)))
+
+
+def multiplied(table: SampleTable, factor: float) -> SampleTable:
+    """The table with ρ multiplied by a factor, and irradiance divided by it."""
+    rho, irradiance = table.rho * np.float32(factor), table.irradiance / np.float32(factor)
+    return replace(table, rho=rho, irradiance=irradiance)
