@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +16,11 @@ SEPARATED = "patina_separated"  # face attribute: index of the material of each 
 
 
 def can_separate(capture: Capture) -> bool:
-    """Whether the capture has one material for the whole mesh: those that masks or faces locate are
-    kept as they are."""
+    """Whether the capture has one material, that no faces locate, and masks, if any, locate in all
+    photos."""
     only = capture.materials[0]
-    located = only.by_mesh or capture.named_by_masks(only.name)
-    return len(capture.materials) == 1 and not located
+    masked = [only.name in photo.masks for photo in capture.photos]
+    return len(capture.materials) == 1 and not only.by_mesh and all(masked) == any(masked)
 
 
 def separated_names(name: str, count: int) -> tuple[str, ...]:
@@ -28,9 +29,20 @@ def separated_names(name: str, count: int) -> tuple[str, ...]:
 
 
 def with_separated(capture: Capture, names: Sequence[str]) -> Capture:
-    """The capture with materials of these names, which the faces of ``separated_scan`` locate."""
+    """The capture with materials of these names, which the faces of ``separated_scan`` locate, and
+    in each photo the mask of the only material before, if there was one."""
+    only = capture.materials[0].name
     materials = tuple(MaterialEntry(name, faces=SEPARATED) for name in names)
-    return replace(capture, materials=materials)
+    photos = tuple(
+        replace(photo, masks=_masks(photo.masks, only, names)) for photo in capture.photos
+    )
+    return replace(capture, materials=materials, photos=photos)
+
+
+def _masks(masks: dict[str, Path], only: str, names: Sequence[str]) -> dict[str, Path]:
+    """The masks of a photo, that of the material ``only`` for all ``names``."""
+    others = {name: file for name, file in masks.items() if name != only}
+    return {**others, **({name: masks[only] for name in names} if only in masks else {})}
 
 
 def separated_scan(scan: Scan, face_material: NDArray[np.integer]) -> Scan:

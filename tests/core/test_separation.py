@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,11 @@ from patina.commands import command_line
 from patina.commands.fit import write_results
 from patina.commands.progress import Progress
 from patina.core.capture import read_capture
+from patina.core.inputs.separated_materials import (
+    can_separate,
+    separated_names,
+    with_separated,
+)
 from patina.core.jobs import FitJob, finished
 from patina.core.jobs.select_photos import select_photos
 from patina.core.jobs.varying_job import VaryingJob
@@ -124,3 +130,18 @@ def test_separated_materials_are_written_and_used_again(halves, tmp_path, monkey
     assert command_line.main(["predict", str(path), str(out), "--out", str(predicted)]) == 0
     errors = json.loads((predicted / "errors.json").read_text("utf-8"))
     assert errors["fitted"]["typical"] < 0.1
+
+
+def test_mask_of_the_only_material_becomes_that_of_all_parts(tmp_path):
+    capture = read_capture(made.make_capture(tmp_path, photos=3))
+    assert can_separate(capture)
+    mask, out = tmp_path / "mask.png", tmp_path / "out.png"
+    masked = [replace(p, masks={"surface": mask, "exclude": out}) for p in capture.photos]
+    everywhere = replace(capture, photos=tuple(masked))
+    assert can_separate(everywhere)
+    parts = with_separated(everywhere, separated_names("surface", 2))
+    assert [m.name for m in parts.materials] == ["surface_1", "surface_2"]
+    for photo in parts.photos:
+        assert photo.masks == {"exclude": out, "surface_1": mask, "surface_2": mask}
+    assert not can_separate(replace(capture, photos=(masked[0], *capture.photos[1:])))
+    assert not can_separate(parts)
