@@ -81,14 +81,14 @@ def compare(path: Path, count: int) -> None:
     seen = surface.seen.select(np.flatnonzero(known))
     held = surface.seen.select(np.flatnonzero(surface.seen.photo < HELD_OUT))
     normals = surface.grid.normals(np.arange(len(surface.grid)))
-    rows = [_ours("even", even, surface, held, even_seconds)]
+    rows = [ours("even", even, surface, held, even_seconds)]
     ways = {"Lambert and GGX": plain.lambert_ggx, "basis weights": plain.basis_weights}
     for name, fit in ways.items():
         since = time.perf_counter()
         found = fit(seen, normals)
         predicted = found.predict(held)
         rows.append(Row(name, predicted, found.albedo, time.perf_counter() - since))
-    rows.append(_ours("Patina, varying", varied, surface, held, seconds))
+    rows.append(ours("Patina, varying", varied, surface, held, seconds))
     print(f"\n{count} photos, {HELD_OUT} others predicted. {varied.notes[-1]}\n")
     truth = _truth(surface)
     _print(rows, truth, seen, held)
@@ -97,7 +97,7 @@ def compare(path: Path, count: int) -> None:
 
 
 def _of_all(fitted: CaptureResult, capture: Capture) -> CaptureResult:
-    """The fit, with all photos of the capture to be read."""
+    """The fit, with all photos of a capture to be read."""
     from patina.core.inputs.lights import find_lights
     from patina.core.inputs.photos import LitPhotos
 
@@ -114,13 +114,14 @@ def _parameters(fitted: CaptureResult, surface: SurfaceObservations) -> Array:
     return fitted.varying.at(*surface.grid.places)
 
 
-def _ours(
+def ours(
     name: str,
     fitted: CaptureResult,
     surface: SurfaceObservations,
     held: Observations,
     seconds: float,
 ) -> Row:
+    """The row of a fit. surface: all nodes; held: the observations to predict."""
     from patina.core.varying.node_model import DIFFUSE, NodeModel
 
     theta = _parameters(fitted, surface)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from patina.core.capture import Capture
     from patina.core.jobs import CaptureResult
     from patina.core.jobs.photo_prediction import PhotoPrediction
+    from patina.core.predict.errors import PhotoErrors
 
 START_ERROR = 2.0  # degrees, median error of the normals of the changed meshes
 GROUPS = 4  # of the bronze's 16 photos, each held out together
@@ -54,7 +55,7 @@ def run(data: Path) -> None:
         _held_out("bronze", bronze, [list(range(count))[k::GROUPS] for k in range(GROUPS)])
         for label in ("yellow_box", "card_blue"):
             path = real_captures.plane(data, folder, label)
-            _held_out(label, path, [[k] for k in range(len(_read(path).photos))])
+            _held_out(label, path, [[k] for k in range(len(_read(path).photos))], plain=True)
 
 
 def _even(label: str, path: Path) -> None:
@@ -125,9 +126,14 @@ class _Outcome:
 
 
 def _held_out(
-    label: str, path: Path, groups: Sequence[Sequence[int]], truth: Path | None = None
+    label: str,
+    path: Path,
+    groups: Sequence[Sequence[int]],
+    truth: Path | None = None,
+    plain: bool = False,
 ) -> None:
-    """Print a row for even materials and one for what held-out photos prefer."""
+    """Print a row for even materials and one for what held-out photos prefer; with ``plain`` two
+    more for a plain way, and for the latter at the same nodes."""
     import patina
     from patina.core.jobs import FitJob, finished
     from patina.core.jobs.varying_job import VaryingJob
@@ -135,6 +141,7 @@ def _held_out(
 
     capture = _read(path)
     rows: dict[str, list[_Outcome]] = {"even": [], "varying": []}
+    at_nodes: dict[str, list[PhotoErrors]] = {}
     for held in groups:
         kept = [k for k in range(len(capture.photos)) if k not in held]
         job = FitJob(patina.select_photos(capture, kept), portable=False)
@@ -151,6 +158,9 @@ def _held_out(
         rows["varying"].append(
             _Outcome(varied, _predicted(capture, varied, held), time.perf_counter() - since)
         )
+        if plain:
+            for way, errors in _errors_at_nodes(capture, varied, kept, held).items():
+                at_nodes.setdefault(way, []).extend(errors)
     for kind, outcomes in rows.items():
         errors = PhotoErrors.mean([p.errors for one in outcomes for p in one.predictions])
         cells = [
@@ -161,6 +171,46 @@ def _held_out(
         if truth is not None:
             cells += [f"{_relative_l1(outcomes):.4f}", *_normal_errors(outcomes[0], truth)]
         print("| " + " | ".join(cells) + " |", flush=True)
+    for way, found in at_nodes.items():
+        errors = PhotoErrors.mean(found)
+        cells = [label, way, f"{100 * errors.typical:.1f} %", f"{100 * errors.relative_rms:.1f} %",
+                 f"{errors.encoded_rmse:.4f}", ""]  # fmt: skip
+        print("| " + " | ".join(cells) + " |", flush=True)
+
+
+def _errors_at_nodes(
+    capture: Capture, varied: CaptureResult, kept: Sequence[int], held: Sequence[int]
+) -> dict[str, list[PhotoErrors]]:
+    """Errors of held-out photos at the nodes that they and fitted photos show: of a Lambertian
+    colour at each node with one GGX lobe for all, and of a fit with variation."""
+    from patina.core.concurrency.steps import drained
+    from patina.core.jobs.photo_prediction import prediction_inputs
+    from patina.core.jobs.surface_observations import observe_surface
+    from patina.core.photo.encoding import Encoding
+    from patina.core.predict.errors import PhotoErrors
+
+    from .bench_objects import NODES, ours
+    from .objects.plain import lambert_ggx
+
+    given = prediction_inputs(capture, varied)
+    every = replace(varied, capture=capture, photos=given.photos, lights=given.lights)
+    surface = drained(observe_surface(every, NODES, 0.0, 1.0))
+    seen = surface.seen.select(np.flatnonzero(np.isin(surface.seen.photo, kept)))
+    fit = lambert_ggx(seen, surface.grid.normals(np.arange(len(surface.grid))))
+    shown = np.bincount(seen.node, minlength=len(surface.grid)) > 0
+    ways = ("Lambert and GGX, at nodes", "vary, at nodes")
+    found: dict[str, list[PhotoErrors]] = {way: [] for way in ways}
+    for place in held:
+        own = (surface.seen.photo == place) & shown[surface.seen.node]
+        some = surface.seen.select(np.flatnonzero(own))
+        encoding = Encoding.of_file(capture.photos[place].file, every.photos.curve(place))
+        exposure = np.float32(every.photos.exposures[place][0])
+        measured = encoding.encode(some.radiance * exposure)
+        radiances = (fit.predict(some), ours("", varied, surface, some, 0.0).predicted)
+        for way, radiance in zip(ways, radiances, strict=True):
+            encoded = encoding.encode(np.maximum(radiance, 0).astype(np.float32) * exposure)
+            found[way].append(PhotoErrors.of(encoded, measured))
+    return found
 
 
 def _predicted(
