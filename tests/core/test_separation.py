@@ -29,8 +29,9 @@ NODES = 20_000
 AXIS = np.array([0.6, 0.0, 0.8])  # of the half that is metal
 
 
-def values(*columns):
-    return np.stack(columns, axis=1)
+def values(ratio, gloss):
+    """Features of nodes of which the specular part alone changes the ratio."""
+    return np.stack([ratio, gloss, ratio], axis=1)
 
 
 def test_one_kind_is_not_divided():
@@ -54,6 +55,13 @@ def test_a_few_nodes_are_no_kind():
     ratio = np.concatenate([np.zeros(4900), np.full(100, 5.0)])
     ratio += 0.1 * np.random.default_rng(3).normal(size=5000)
     assert divide(values(ratio, np.zeros(5000)), 5000) is None
+
+
+def test_two_colours_of_one_paint_are_no_kinds():
+    rng = np.random.default_rng(6)
+    colour = np.where(rng.random(5000) < 0.4, 1.0, -0.6) + 0.2 * rng.normal(size=5000)
+    none = 0.1 * rng.normal(size=(5000, 2))
+    assert divide(np.stack([-colour, *none.T], axis=1), 5000) is None
 
 
 def test_differences_that_cannot_be_seen_are_no_kinds():
