@@ -196,14 +196,20 @@ class FitJob(Job):
         self._times = FitTimes.of(len(capture.photos), pixels, counts, self.portable)
         results = []
         known = lights.known and capture.fit.absolute
-        scale = 1.0
-        for index in range(len(capture.materials)):
-            name = capture.materials[index].name
-            self._check_samples(index, taken.kept[name].table(), taken.marked[name], known)
-        if not known:
-            scale = typical_factor((kept.table() for kept in taken.kept.values()), basis)
-        for index in range(len(capture.materials)):
-            results.append((yield from self._fit_material(index, taken, basis, (known, scale))))
+        tables = [taken.kept.pop(material.name).table() for material in capture.materials]
+        for index, material in enumerate(capture.materials):
+            self._check_samples(index, tables[index], taken.marked[material.name], known)
+        unit = known, 1.0 if known else typical_factor(tables, basis)
+        for index, material in enumerate(capture.materials):
+            table = multiplied(tables.pop(0), unit[1])
+            if self.keep:
+                self.samples[material.name] = table
+            start, share = self._times.material(index)
+            yield Step(f"fitting {material.name}", start)
+            each = taken.counts[material.name]
+            results.append(
+                (yield from self._material(index, table, basis, unit, each, start, share))
+            )
         yield Step("assigning materials to the mesh", 1 - ASSIGNING / self._times.total)
         self.result = CaptureResult(
             capture=capture,
@@ -245,18 +251,6 @@ class FitJob(Job):
     def sinks(self, material: str) -> Sequence[SampleSink]:
         """The sinks that get all samples of a material, in addition to the reservoir."""
         return ()
-
-    def _fit_material(
-        self, index: int, taken: PhotoSamples, basis: Basis, unit: tuple[bool, float]
-    ) -> Generator[Step, None, MaterialResult]:
-        name = self.capture.materials[index].name
-        start, share = self._times.material(index)
-        yield Step(f"fitting {name}", start)
-        table = multiplied(taken.kept.pop(name).table(), unit[1])
-        if self.keep:
-            self.samples[name] = table
-        counts = taken.counts[name]
-        return (yield from self._material(index, table, basis, unit, counts, start, share))
 
     def fit_again(
         self,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +21,8 @@ from ..inputs.separated_materials import (
 from ..scan import Scan
 from ..varying.choice import MIN_PHOTOS
 from ..varying.node_model import NodeModel
-from ..varying.separation import (
-    EVERYTHING,
-    divide,
-    division_improves,
-    features,
-    second_at,
-)
+from ..varying.separation import divide, division_improves, features, second_at
+from ..varying.varying_surface import ALL_VARIATIONS
 from .fit_job import CaptureResult, FitJob, MaterialResult
 from .surface_observations import SurfaceObservations
 
@@ -82,7 +77,7 @@ def separate_materials(
     waiting, part = [0, 1], 0.1 * share
     while waiting and len(found) < MAX_KINDS:
         index = waiting.pop(0)
-        own = relabelled(surface, labels)
+        own = surface.with_materials(labels)
         trial = yield from _trial(
             fit, found[index], own, labels, index, limit, start + FIRST * share, part
         )
@@ -103,15 +98,7 @@ def separate_materials(
         f"predicted with a typical error of {100 * two_error:.1f} % instead of "
         f"{100 * one_error:.1f} %."
     )
-    return SeparatedFit(final, relabelled(surface, labels), material.name, note)
-
-
-def relabelled(surface: SurfaceObservations, labels: NDArray[np.intp]) -> SurfaceObservations:
-    """The observations with the separated materials. labels: (f,) material of each face."""
-    face = surface.grid.places[0]
-    material = np.where(face >= 0, labels[face], -1)
-    seen = replace(surface.seen, material=material[surface.seen.node].astype(np.uint8))
-    return SurfaceObservations(surface.grid, material, seen)
+    return SeparatedFit(final, surface.with_materials(labels), material.name, note)
 
 
 def _trial(
@@ -131,10 +118,8 @@ def _trial(
         return None
     model = NodeModel.of(material.fit.brdf, material.scale)
     step = Step("looking for kinds of material", start)
-    *_, (_, fields) = yield from in_background(
-        lambda: list(nodes.solve(model, seen, EVERYTHING)), step
-    )
-    values = features(model, nodes.points, fields.parameters)
+    parameters = yield from in_background(lambda: nodes.estimate(model, seen, ALL_VARIATIONS), step)
+    values = features(model, nodes.points, parameters)
     shown = np.unique(seen.node)
     division = divide(values[shown], min(limit, len(np.unique(surface.seen.node))))
     if division is None:

@@ -44,16 +44,19 @@ class SurfaceObservations:
         if limit is not None and len(rows) > limit:
             spacing *= np.sqrt(len(rows) / limit)
             rows = np.sort(np.random.default_rng(0).choice(rows, limit, replace=False))
-        number = np.full(len(grid), -1, np.int32)
-        number[rows] = np.arange(len(rows), dtype=np.int32)
-        keep = (self.seen.material == index) & (number[self.seen.node] >= 0)
-        own = self.seen.select(np.flatnonzero(keep))
+        own = self.seen.select(np.flatnonzero(self.seen.material == index))
         normals = grid.normals(rows).astype(np.float32)
         error = MIN_NORMAL_ERROR
         if isinstance(material.fit, MeasuredResult):
             error = float(np.clip(np.radians(material.fit.normal_deviation), error, MAX_TILT))
         nodes = Nodes(grid.points(rows), normals, spacing, grid.mesh_edge, error)
-        return replace(own, node=number[own.node]), nodes
+        return own.at_nodes(rows, len(grid)), nodes
+
+    def with_materials(self, face_material: NDArray[np.integer]) -> SurfaceObservations:
+        """The same with other materials, of the nodes too. face_material: (f,) index."""
+        material = _of_nodes(self.grid, face_material)
+        seen = replace(self.seen, material=material[self.seen.node].astype(np.uint8))
+        return SurfaceObservations(self.grid, material, seen)
 
     @property
     def photos(self) -> NDArray[np.uint16]:
@@ -74,8 +77,7 @@ def observe_surface(
     for place in range(count):
         step = Step("reading the surface in the photos", start + share * place / count)
         parts.append((yield from in_background(lambda p=place: _one(fitted, grid, p), step)))  # type: ignore[misc]
-    face = grid.places[0]
-    material = np.where(face >= 0, fitted.face_material[face], -1)
+    material = _of_nodes(grid, fitted.face_material)
     return SurfaceObservations(grid, material, Observations.joined(parts))
 
 
@@ -87,6 +89,12 @@ def pixel_size(fitted: CaptureResult) -> float:
         away = np.linalg.norm(fitted.rays.origin - camera.pose.centre)
         sizes.append(float(camera.footprint(np.array([away], np.float32))[0]))
     return float(np.median(sizes))
+
+
+def _of_nodes(grid: SurfaceGrid, face_material: NDArray[np.integer]) -> NDArray[np.integer]:
+    """(n,) material of each node, −1 for vertices without a face."""
+    face = grid.places[0]
+    return np.where(face >= 0, face_material[face], -1)
 
 
 def _one(fitted: CaptureResult, grid: SurfaceGrid, place: int) -> Observations:

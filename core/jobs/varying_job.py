@@ -16,14 +16,19 @@ from ..varying.hierarchy import NodeFields
 from ..varying.labels import check_material_count
 from ..varying.node_model import COUNT, NodeModel
 from ..varying.observations import Observations
-from ..varying.varying_surface import EVEN, VARIATIONS, MaterialVariation, VaryingSurface
+from ..varying.varying_surface import (
+    ALL_VARIATIONS,
+    EVEN,
+    VARIATIONS,
+    MaterialVariation,
+    VaryingSurface,
+)
 from .fit_job import CaptureResult, FitJob, MaterialResult, with_portable
 from .separate_materials import separate_materials
 from .surface_observations import SurfaceObservations, observe_surface, pixel_size
 
 MODES = ("auto", "never", "always")
 _, DIFFUSE, *FURTHER = VARIATIONS
-EVERYTHING = FURTHER[-1]
 MAX_NODES = 1_000_000  # of the grid: the texels that a mesh covers in a texture of 1400 × 1400
 MAX_OBSERVATIONS = 40_000_000  # nodes times photos, 60 bytes each
 NODES_PER_PIXEL = 4.0  # at most: half a pixel apart, photos are interpolated without loss
@@ -105,7 +110,7 @@ class VaryingJob(Job):
             at = start + 0.25 * share + number * part
             material = yield from self._without_variation(index, material, seen, nodes, at, part)
         if self.mode == "always":
-            return material, MaterialVariation(EVERYTHING)
+            return material, MaterialVariation(ALL_VARIATIONS)
         again = _model(material)
         candidates = [(EVEN, model), *((one, again) for one in (DIFFUSE, *FURTHER))]
         found = yield from _choice(candidates, seen, nodes, True, start + 0.5 * share, 0.5 * share)

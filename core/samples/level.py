@@ -40,5 +40,7 @@ def typical_factor(tables: Iterable[SampleTable], basis: Basis) -> float:
 
 def multiplied(table: SampleTable, factor: float) -> SampleTable:
     """The table with ρ multiplied by a factor, and irradiance divided by it."""
+    if factor == 1:
+        return table
     rho, irradiance = table.rho * np.float32(factor), table.irradiance / np.float32(factor)
     return replace(table, rho=rho, irradiance=irradiance)

@@ -50,6 +50,14 @@ class Nodes:
         error = MIN_NORMAL_ERROR if free[TILT].any() else self.normal_error
         return solve(model, seen, self.points, self.normals, edges, free, self.mesh_edge, error)
 
+    def estimate(self, model: NodeModel, seen: Observations, kind: str) -> NDArray[np.float32]:
+        """(n, 8) parameters of the nodes after the finest level, 0 where nothing can vary."""
+        theta = np.zeros((len(self.points), COUNT), np.float32)
+        if VARIATIONS[kind] and len(seen):
+            for _, fields in self.solve(model, seen, kind):
+                theta = fields.parameters
+        return theta
+
 
 def choose(
     candidates: Sequence[tuple[str, NodeModel]],
@@ -72,23 +80,14 @@ def choose(
     if len(photos) < MIN_PHOTOS:
         return MaterialVariation(first)
     black = near_black(seen)
-    zero = np.zeros((len(nodes.points), COUNT), np.float32)
-    residual, _, _ = log_errors(even, seen, nodes, zero, black)
-    error = max(robust_deviation(residual), MIN_ERROR)
+    error = error_without_variation(even, seen, nodes, black)
     found = {kind: HeldOut() for kind, _ in candidates}
     folds = folds_of(seen.photo)
     done, total = 0, len(folds) * len(candidates)
     for fold in folds:
-        out = np.isin(seen.photo, fold)
-        fitted = seen.select(~out)
-        shown = np.zeros(len(nodes.points), bool)
-        shown[fitted.node] = True
-        held = seen.select(out & shown[seen.node])
+        fitted, held, _ = divided_photos(seen, fold, nodes)
         for kind, model in candidates:
-            theta = zero
-            if VARIATIONS[kind] and len(fitted):
-                for _, fields in nodes.solve(model, fitted, kind):
-                    theta = fields.parameters
+            theta = nodes.estimate(model, fitted, kind)
             found[kind].add_photos(held, error, log_errors(model, held, nodes, theta, black))
             done += 1
             yield done / total
@@ -110,6 +109,27 @@ def folds_of(photo: NDArray[np.integer]) -> list[NDArray[np.integer]]:
     photos = np.unique(photo)
     count = len(photos) if len(photos) <= MAX_SINGLE_PHOTOS else FOLDS
     return [photos[k::count] for k in range(count)]
+
+
+def divided_photos(
+    seen: Observations, fold: NDArray[np.integer], nodes: Nodes
+) -> tuple[Observations, Observations, NDArray[np.bool_]]:
+    """(the observations in photos that are not in ``fold``, those in the photos of ``fold`` at
+    nodes that the others show too, (n,) these nodes)."""
+    out = np.isin(seen.photo, fold)
+    fitted = seen.select(~out)
+    shown = np.zeros(len(nodes.points), bool)
+    shown[fitted.node] = True
+    return fitted, seen.select(out & shown[seen.node]), shown
+
+
+def error_without_variation(
+    model: NodeModel, seen: Observations, nodes: Nodes, black: float
+) -> float:
+    """Standard deviation of the logarithm of the radiance from that of the even material."""
+    zero = np.zeros((len(nodes.points), COUNT), np.float32)
+    residual, _, _ = log_errors(model, seen, nodes, zero, black)
+    return max(robust_deviation(residual), MIN_ERROR)
 
 
 @dataclass(frozen=True)

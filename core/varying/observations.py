@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,13 @@ class Observations:
     def select(self, rows: NDArray | slice) -> Observations:
         """The observations ``rows``, an increasing subset."""
         return Observations(*(getattr(self, f.name)[rows] for f in fields(self)))
+
+    def at_nodes(self, rows: NDArray[np.intp], count: int) -> Observations:
+        """The observations of the nodes ``rows``, increasing, of ``count``, numbered from 0."""
+        number = np.full(count, -1, np.int32)
+        number[rows] = np.arange(len(rows), dtype=np.int32)
+        own = self.select(np.flatnonzero(number[self.node] >= 0))
+        return replace(own, node=number[own.node])
 
     @staticmethod
     def joined(parts: list[Observations]) -> Observations:

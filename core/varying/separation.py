@@ -10,21 +10,29 @@ between them. Each kind is examined again with its own BRDF.
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
-from .choice import HeldOut, Nodes, folds_of, log_errors
-from .hierarchy import MIN_ERROR, near_black, robust_deviation
-from .node_model import COUNT, DIFFUSE, GLOSS, SPECULAR, NodeModel
+from .choice import (
+    HeldOut,
+    Nodes,
+    divided_photos,
+    error_without_variation,
+    folds_of,
+    log_errors,
+)
+from .hierarchy import near_black
+from .node_model import DIFFUSE, GLOSS, SPECULAR, NodeModel
 from .observations import Observations
-from .varying_surface import VARIATIONS
+from .varying_surface import ALL_VARIATIONS
 
 Array = NDArray[np.floating]
 
+RATIO, ROUGHNESS, SPECULAR_PART = range(3)  # columns of ``features``
 MIN_DISTANCE = 2.0  # of the means of two groups, in their standard deviations (Ashman et al. 1994)
 MIN_DIFFERENCE = np.array([0.7, 0.2])
 """Of the means of two groups: a factor of two of the ratio of specular and diffuse part, and a
@@ -40,7 +48,6 @@ MIN_SHARE = 0.05  # of the nodes in the smaller group
 NEIGHBOURS = 7  # nodes whose values are averaged: single ones are noisy
 MIXTURE_ROUNDS = 100  # of expectation–maximisation
 START_PERCENTILES = (20, 80)  # of the values, where the two means start
-EVERYTHING = tuple(VARIATIONS)[-1]
 
 
 @dataclass(frozen=True)
@@ -70,8 +77,8 @@ def features(model: NodeModel, points: NDArray[np.float64], parameters: Array) -
     return averaged
 
 
-def divide(values: Array, count: int, by: Sequence[int] = (0, 1)) -> Division | None:
-    """The division that nodes with ``features`` (n, 2), which photos show, suggest; None for one
+def divide(values: Array, count: int, by: Sequence[int] = (RATIO, ROUGHNESS)) -> Division | None:
+    """The division that nodes with ``features`` (n, 3), which photos show, suggest; None for one
     kind of material. count: of all such nodes of the surface; by: features to look at."""
     for feature in by:
         threshold = _threshold(values[:, feature], count, MIN_DIFFERENCE[feature])
@@ -79,8 +86,8 @@ def divide(values: Array, count: int, by: Sequence[int] = (0, 1)) -> Division | 
             continue
         found = Division(feature, threshold)
         second = found.second(values)
-        specular = values[second, 2].mean() - values[~second, 2].mean()
-        if feature != 0 or abs(specular) >= MIN_SPECULAR_DIFFERENCE:
+        specular = values[second, SPECULAR_PART].mean() - values[~second, SPECULAR_PART].mean()
+        if feature != RATIO or abs(specular) >= MIN_SPECULAR_DIFFERENCE:
             return found
     return None
 
@@ -111,17 +118,12 @@ def division_improves(
     typical error with one BRDF, with two).
     """
     black = near_black(seen)
-    zero = np.zeros((len(nodes.points), COUNT), np.float32)
-    error = max(robust_deviation(log_errors(whole, seen, nodes, zero, black)[0]), MIN_ERROR)
+    error = error_without_variation(whole, seen, nodes, black)
     one, several = HeldOut(), HeldOut()
     folds = folds_of(seen.photo)
     for done, fold in enumerate(folds):
-        out = np.isin(seen.photo, fold)
-        fitted = seen.select(~out)
-        shown = np.zeros(len(nodes.points), bool)
-        shown[fitted.node] = True
-        held = seen.select(out & shown[seen.node])
-        theta = _solved(whole, fitted, nodes)
+        fitted, held, shown = divided_photos(seen, fold, nodes)
+        theta = nodes.estimate(whole, fitted, ALL_VARIATIONS)
         one.add_photos(held, error, log_errors(whole, held, nodes, theta, black))
         values = features(whole, nodes.points, theta)
         again = divide(values[shown], np.count_nonzero(shown), (division.feature,)) or division
@@ -130,9 +132,9 @@ def division_improves(
         errors = tuple(np.zeros((len(held), 3), np.float32) for _ in range(3))
         for number, model in enumerate(parts):
             rows = np.flatnonzero(second == number)
-            own, some = nodes.select(rows), _at(fitted, rows, len(second))
-            theta, at = _solved(model, some, own), np.flatnonzero(second[held.node] == number)
-            found = log_errors(model, _at(held, rows, len(second)), own, theta, black)
+            own, at = nodes.select(rows), np.flatnonzero(second[held.node] == number)
+            theta = own.estimate(model, fitted.at_nodes(rows, len(second)), ALL_VARIATIONS)
+            found = log_errors(model, held.at_nodes(rows, len(second)), own, theta, black)
             for into, part in zip(errors, found, strict=True):
                 into[at] = part
         several.add_photos(held, error, errors)
@@ -140,23 +142,6 @@ def division_improves(
     accepted = bool(one.cost) and several.better(one, True, True, 0.0)
     typical = [float(np.mean(e.typical)) if e.typical else np.nan for e in (one, several)]
     return accepted, typical[0], typical[1]
-
-
-def _solved(model: NodeModel, seen: Observations, nodes: Nodes) -> NDArray[np.float32]:
-    """(n, 8) parameters of the nodes, all free."""
-    theta = np.zeros((len(nodes.points), COUNT), np.float32)
-    if len(seen):
-        for _, fields in nodes.solve(model, seen, EVERYTHING):
-            theta = fields.parameters
-    return theta
-
-
-def _at(seen: Observations, rows: NDArray[np.intp], count: int) -> Observations:
-    """The observations of the nodes ``rows`` of ``count``, numbered from 0."""
-    number = np.full(count, -1, np.int32)
-    number[rows] = np.arange(len(rows), dtype=np.int32)
-    own = seen.select(np.flatnonzero(number[seen.node] >= 0))
-    return replace(own, node=number[own.node])
 
 
 def _threshold(values: Array, count: int, difference: float) -> float | None:

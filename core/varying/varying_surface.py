@@ -23,6 +23,7 @@ VARIATIONS: dict[str, tuple[int, ...]] = {
     "diffuse, specular, gloss and normals": (0, 1, 2, 3, 4, 5, 6, 7),
 }
 """What may vary over a material → the parameters of its nodes (node_model.py), simplest first."""
+ALL_VARIATIONS = tuple(VARIATIONS)[-1]
 
 
 @dataclass(frozen=True)

@@ -19,13 +19,11 @@ from patina.core.inputs.separated_materials import (
 )
 from patina.core.jobs import FitJob, finished
 from patina.core.jobs.select_photos import select_photos
-from patina.core.jobs.varying_job import VaryingJob
 from patina.core.result import read_result
 from patina.core.varying.separation import divide, second_at
 from tests import make_capture as made
-from tests.core.test_varying_job import held_out_errors
+from tests.core.test_varying_job import fit_of_sixteen, held_out_errors
 
-NODES = 20_000
 AXIS = np.array([0.6, 0.0, 0.8])  # of the half that is metal
 
 
@@ -94,17 +92,12 @@ def metallic(normal):
 
 @pytest.fixture(scope="module")
 def halves(tmp_path_factory):
-    """(file of a capture of 17 photos, the job of a fit of the first 16)."""
-    path = made.make_capture(tmp_path_factory.mktemp("halves"), photos=17, brdf=half_metal)
-    capture = select_photos(read_capture(path), range(16))
-    job = VaryingJob(FitJob(capture), nodes=NODES)
-    job.drain()
-    return path, job
+    return fit_of_sixteen(tmp_path_factory.mktemp("halves"), half_metal, portable=True)
 
 
 @pytest.mark.slow
 def test_metal_and_paint_are_separated(halves):
-    path, job = halves
+    capture, job = halves
     result = finished(job.result)
     assert [m.name for m in result.materials] == ["surface_1", "surface_2"]
     assert result.varying.separated_from == "surface"
@@ -116,7 +109,6 @@ def test_metal_and_paint_are_separated(halves):
     shown = shown.all(axis=1)
     agree = np.mean((result.face_material == 1) == true, where=shown)
     assert max(agree, 1 - agree) > 0.95
-    capture = read_capture(path)
     one = FitJob(select_photos(capture, range(16)), portable=False)
     one.drain()
     even = held_out_errors(capture, finished(one.result), 16)
@@ -128,7 +120,7 @@ def test_metal_and_paint_are_separated(halves):
 @pytest.mark.slow
 def test_separated_materials_are_written_and_used_again(halves, tmp_path, monkeypatch):
     monkeypatch.setattr("patina.commands.fit.has_blender", lambda: False)
-    path, job = halves
+    capture, job = halves
     out, predicted = tmp_path / "out", tmp_path / "predicted"
     out.mkdir()
     write_results(out, out, finished(job.result), job.stages, Progress())
@@ -136,7 +128,7 @@ def test_separated_materials_are_written_and_used_again(halves, tmp_path, monkey
     stored = read_result(out)
     assert stored.separated_from == "surface"
     assert [m.name for m in stored.materials] == ["surface_1", "surface_2"]
-    assert command_line.main(["predict", str(path), str(out), "--out", str(predicted)]) == 0
+    assert command_line.main(["predict", str(capture.file), str(out), "--out", str(predicted)]) == 0
     errors = json.loads((predicted / "errors.json").read_text("utf-8"))
     assert errors["fitted"]["typical"] < 0.1
 

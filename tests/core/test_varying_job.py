@@ -39,15 +39,17 @@ def held_out_errors(capture, fitted, place):
     return drained(predict_one(given, place)).errors
 
 
-@pytest.fixture(scope="module")
-def banded(tmp_path_factory):
-    """(capture of 17 photos, the job of a fit of the first 16)."""
-    capture = read_capture(
-        made.make_capture(tmp_path_factory.mktemp("banded"), photos=17, brdf=painted)
-    )
-    job = VaryingJob(FitJob(select_photos(capture, range(16)), portable=False), nodes=NODES)
+def fit_of_sixteen(folder, brdf, portable=False):
+    """(capture of 17 photos of a sphere, the job of a fit of the first 16)."""
+    capture = read_capture(made.make_capture(folder, photos=17, brdf=brdf))
+    job = VaryingJob(FitJob(select_photos(capture, range(16)), portable=portable), nodes=NODES)
     job.drain()
     return capture, job
+
+
+@pytest.fixture(scope="module")
+def banded(tmp_path_factory):
+    return fit_of_sixteen(tmp_path_factory.mktemp("banded"), painted)
 
 
 @pytest.mark.slow
