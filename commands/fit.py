@@ -14,7 +14,7 @@ from ..core.concurrency.job import Step, peak_memory
 from ..core.fit.fit_quality import FitQuality
 from ..core.fit.measured_result import MeasuredResult
 from ..core.jobs import CaptureResult, FitJob, Stage, finished
-from ..core.jobs.varying_job import MODES, VaryingJob
+from ..core.jobs.varying.varying_job import MODES, VaryingJob
 from ..core.output_folder import check_out, staged_folder
 from ..core.report import result_json, write_report
 from ..core.report.figures import reach

@@ -10,7 +10,7 @@ import bpy
 from ..core.capture import read_capture
 from ..core.counted import counted
 from ..core.jobs import CaptureResult, FitJob
-from ..core.jobs.varying_job import VaryingJob
+from ..core.jobs.varying.varying_job import VaryingJob
 from ..core.samples import Margins
 from ..scene.material.file_cache import own_basis, trim_cache
 from ..scene.material.prepared_materials import PreparedJob

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from patina.core.capture import Capture
     from patina.core.jobs import CaptureResult
-    from patina.core.jobs.surface_observations import SurfaceObservations
+    from patina.core.jobs.varying.surface_observations import SurfaceObservations
     from patina.core.varying.observations import Observations
     from patina.core.varying.varying_surface import VaryingSurface
 
@@ -59,8 +59,8 @@ def compare(path: Path, count: int) -> None:
     import patina
     from patina.core.concurrency.steps import drained
     from patina.core.jobs import FitJob, finished
-    from patina.core.jobs.surface_observations import observe_surface
-    from patina.core.jobs.varying_job import VaryingJob
+    from patina.core.jobs.varying.surface_observations import observe_surface
+    from patina.core.jobs.varying.varying_job import VaryingJob
 
     from .objects import plain
 

@@ -34,7 +34,7 @@ def run(_: Path) -> None:
     import patina
     from patina.core.capture import read_capture
     from patina.core.jobs import FitJob, finished
-    from patina.core.jobs.varying_job import VaryingJob
+    from patina.core.jobs.varying.varying_job import VaryingJob
     from patina.scene.export.blend_file import write_blend
     from patina.scene.export.export_gltf import write_glb
     from tests.wheel import maps_scene

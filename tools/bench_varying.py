@@ -61,7 +61,7 @@ def run(data: Path) -> None:
 def _even(label: str, path: Path) -> None:
     """Print what a fit says of an even material, and how far it changes it."""
     from patina.core.jobs import FitJob, finished
-    from patina.core.jobs.varying_job import VaryingJob
+    from patina.core.jobs.varying.varying_job import VaryingJob
 
     job = FitJob(_read(path), portable=False)
     since = time.perf_counter()
@@ -136,7 +136,7 @@ def _held_out(
     more for a plain way, and for the latter at the same nodes."""
     import patina
     from patina.core.jobs import FitJob, finished
-    from patina.core.jobs.varying_job import VaryingJob
+    from patina.core.jobs.varying.varying_job import VaryingJob
     from patina.core.predict.errors import PhotoErrors
 
     capture = _read(path)
@@ -185,7 +185,7 @@ def _errors_at_nodes(
     colour at each node with one GGX lobe for all, and of a fit with variation."""
     from patina.core.concurrency.steps import drained
     from patina.core.jobs.photo_prediction import prediction_inputs
-    from patina.core.jobs.surface_observations import observe_surface
+    from patina.core.jobs.varying.surface_observations import observe_surface
     from patina.core.photo.encoding import Encoding
     from patina.core.predict.errors import PhotoErrors
 

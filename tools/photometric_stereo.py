@@ -22,6 +22,8 @@ CLIPPED = 0.99
 MIN_LEVEL = 0.05  # of the brightest value: darker pixels are in shadow
 MIN_FACING = 0.15  # z of a normal that is integrated
 PIXELS = 6000  # of a photo
+MAX_RADIUS = 0.9  # of a sphere: its rim is blurred into the background
+MIN_LIT_COSINE, LIT_ROUNDS = 0.1, 6  # of incidence; rounds in which the lit pixels are found
 
 
 def found_lights(folder: Path) -> Iterable[tuple[str, list[float], list[float]]]:
@@ -91,18 +93,46 @@ def _search(mesh, mask, photos, which) -> tuple[Array, Array]:
     return np.array([one.light.direction for one in found]), spread
 
 
+def sphere_lights(mask: NDArray[np.bool_], photos: list) -> Array:
+    """(photos, 3) directions of distant lights on a matt sphere that fills a mask: for each photo,
+    the Lambertian sphere with the least squares of the difference, in the lit pixels."""
+    centre, radius = _circle(mask)
+    rows, columns = np.nonzero(mask)
+    x = (columns + 0.5 - mask.shape[1] / 2 - centre[0]) / radius
+    y = (mask.shape[0] / 2 - rows - 0.5 - centre[1]) / radius
+    inside = np.hypot(x, y) < MAX_RADIUS
+    normal = np.stack([x, y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], axis=1)[inside]
+    found = []
+    for photo in photos:
+        level = np.asarray(photo, np.float64).mean(axis=2)[mask][inside]
+        lit = (level > MIN_LEVEL * level.max()) & (level < CLIPPED)
+        light = np.zeros(3)
+        for _ in range(LIT_ROUNDS):
+            light = np.linalg.lstsq(normal[lit], level[lit], rcond=None)[0]
+            facing = normal @ light / np.linalg.norm(light)
+            lit = (facing > MIN_LIT_COSINE) & (level < CLIPPED)
+        found.append(light / np.linalg.norm(light))
+    return np.array(found)
+
+
+def _circle(mask: NDArray[np.bool_]) -> tuple[Array, float]:
+    """(centre (x, y, 0), radius) in pixels of the circle that fills a mask."""
+    rows, columns = np.nonzero(mask)
+    height, width = mask.shape
+    centre = np.array([columns.mean() + 0.5 - width / 2, height / 2 - rows.mean() - 0.5, 0.0])
+    return centre, float(np.sqrt(mask.sum() / np.pi))
+
+
 def sphere(mask: NDArray[np.bool_]):
     """The sphere that fills a mask."""
     from patina.core.scan import Mesh
 
-    rows, columns = np.nonzero(mask)
-    height, width = mask.shape
-    centre = np.array([columns.mean() + 0.5 - width / 2, height / 2 - rows.mean() - 0.5, 0.0])
+    centre, radius = _circle(mask)
     polar, around = np.meshgrid(
         np.linspace(0, np.pi, 181), np.linspace(0, 2 * np.pi, 361)[:-1], indexing="ij"
     )
     unit = [np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)]
-    points = np.stack(unit, -1).reshape(-1, 3) * np.sqrt(mask.sum() / np.pi) + centre
+    points = np.stack(unit, -1).reshape(-1, 3) * radius + centre
     index = np.arange(181 * 360).reshape(181, 360)
     return Mesh(points, _faces(index, np.roll(index, -1, axis=1)))
 

@@ -16,6 +16,7 @@ from ..concurrency.thread_pool import thread_count, thread_pool
 from ..diagnose.assessment.assessment import Assessment
 from ..diagnose.effects import effects_for
 from ..diagnose.forward.diagnosis_context import DiagnosisContext
+from ..diagnose.forward.known_variation import KnownVariation
 from ..diagnose.forward.material_brdfs import MaterialBRDFs
 from ..diagnose.forward.rig import Rig
 from ..diagnose.pixels.pixel_selection import select_pixels
@@ -25,12 +26,14 @@ from ..fit.measured_result import MeasuredResult
 from ..inputs import capture_data
 from ..light import MountedLight, NearLight
 from .fit_job import CaptureResult, FitJob
+from .varying.variation_for_diagnosis import variation_for_diagnosis
 
 Result = TypeVar("Result")
 
 DEFAULT_NORMAL_DEVIATION = 1.0  # degrees, of a scan's normals where the fit does not estimate it
-SHARE = 0.115  # fraction of the job's time that the fit takes, measured with the demo
-EXAMINED = 0.025  # of the time after the fit
+FITTED, VARIED, EXAMINED = 0.11, 0.15, 0.17
+"""Fractions of the job's time after which the materials are fitted, their variation is known, and
+the pixels are read, measured with the demo."""
 EXAMINING, TESTING = "examining the photos", "testing possible causes"
 
 
@@ -55,12 +58,13 @@ class DiagnoseJob(Job):
     def run(self) -> Iterator[Step]:
         """The steps of the fit, then those of the diagnosis."""
         for step in self.fit.run():
-            yield Step(step.stage, SHARE * step.fraction)
+            yield Step(step.stage, FITTED * step.fraction)
         result = finished(self.fit.result)
+        variation = yield from variation_for_diagnosis(result, FITTED, VARIED - FITTED)
         with thread_pool(thread_count(self.fit.threads)) as pool:
-            steps = context_of(result, pool)
-            self.context = yield from _stepped(steps, EXAMINING, 0.0, EXAMINED)
-            yield Step(EXAMINING, SHARE + EXAMINED * (1 - SHARE))
+            steps = context_of(result, pool, variation)
+            self.context = yield from _stepped(steps, EXAMINING, VARIED, EXAMINED)
+            yield Step(EXAMINING, EXAMINED)
             self.found = yield from _stepped(self._search(pool), TESTING, EXAMINED, 1.0)
 
     def _search(self, pool: ThreadPoolExecutor | None) -> Generator[float, None, Diagnosis]:
@@ -70,9 +74,12 @@ class DiagnoseJob(Job):
 
 
 def context_of(
-    result: CaptureResult, pool: ThreadPoolExecutor | None = None
+    result: CaptureResult,
+    pool: ThreadPoolExecutor | None = None,
+    variation: KnownVariation | None = None,
 ) -> Generator[float, None, DiagnosisContext]:
-    """The input of a diagnosis; yields the fraction done. Raises what select_pixels raises."""
+    """The input of a diagnosis; yields the fraction done. variation: of the materials over the
+    surface. Raises what select_pixels raises."""
     capture = result.capture
     brdfs = MaterialBRDFs.of([m.fit.brdf for m in result.materials])
     rays = result.rays.close()
@@ -97,6 +104,7 @@ def context_of(
         level=level,
         scale=scale,
         materials=tuple(material.name for material in result.materials),
+        variation=variation,
     )
 
 
@@ -128,8 +136,7 @@ def _stepped(
     steps: Generator[float, None, Result], stage: str, begin: float, end: float
 ) -> Generator[Step, None, Result]:
     """Steps of one part of the diagnosis, which spans ``begin`` to ``end`` of its time."""
-    span = (1 - SHARE) * (end - begin)
     return relayed(
         steps_in_background(steps),
-        lambda done: Step(stage, SHARE + (1 - SHARE) * begin + span * done),
+        lambda done: Step(stage, begin + (end - begin) * done),
     )

@@ -15,7 +15,7 @@ from patina.core.errors import InputError
 from patina.core.jobs import FitJob, finished
 from patina.core.jobs.photo_prediction import predict_one, prediction_inputs
 from patina.core.jobs.select_photos import select_photos
-from patina.core.jobs.varying_job import VaryingJob
+from patina.core.jobs.varying.varying_job import VaryingJob
 from patina.core.predict.errors import PhotoErrors
 from patina.core.result import read_result
 from patina.core.varying.node_model import DIFFUSE

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...geometry import RayScene
 from .face_radiosity import face_radiosity
+from .known_variation import KnownVariation
 from .material_brdfs import MaterialBRDFs
 from .pixels import Pixels
 from .radiosity import visible_faces
@@ -28,9 +29,10 @@ class DiagnosisContext:
     distant: (lights,) whether each is distant. rig: cameras and lamps of the photos. centre: (3,)
     of the visible surface; size: its extent, both in scan units. level: median irradiance. scale:
     (materials,) factor by which each material's reflectance was multiplied and the irradiance on it
-    divided, where the irradiance is unknown. materials: their names. ray_count: rays per pixel and
-    sampling strategy (surroundings.py). Few rays make a noisy regressor, which biases the estimated
-    light towards zero (errors in variables): by one half at 20 rays, by one twentieth at 100.
+    divided, where the irradiance is unknown. materials: their names. variation: of the materials
+    over the surface, None where they are even. ray_count: rays per pixel and sampling strategy
+    (surroundings.py). Few rays make a noisy regressor, which biases the estimated light towards
+    zero (errors in variables): by one half at 20 rays, by one twentieth at 100.
     """
 
     pixels: Pixels
@@ -46,6 +48,7 @@ class DiagnosisContext:
     scale: NDArray[np.float32]
     ray_count: int = 100
     materials: tuple[str, ...] = ()
+    variation: KnownVariation | None = None
 
     @property
     def pixel_level(self) -> Array:

@@ -19,7 +19,8 @@ Array = NDArray[np.floating]
 class ShadingState:
     """At n pixels. normal, light: (n, 3) unit. irradiance: (n, 3) at normal incidence. visible:
     (n,) fraction of the light that arrives. stretch: (n,) increase of ln tan θh by anisotropic
-    reflection; None: the surface is isotropic."""
+    reflection; None: the surface is isotropic. albedo: (n, 3) factor of the reflectance of light
+    from all directions, relative to the material's BRDF; None: 1."""
 
     pixels: Pixels
     normal: Array
@@ -27,6 +28,7 @@ class ShadingState:
     irradiance: Array
     visible: Array
     stretch: Array | None = None
+    albedo: Array | None = None
 
     @classmethod
     def of(cls, pixels: Pixels) -> ShadingState:
@@ -38,6 +40,7 @@ class ShadingState:
         return ShadingState(
             pixels, self.normal[rows], self.light[rows], self.irradiance[rows], self.visible[rows],
             None if self.stretch is None else self.stretch[rows],
+            None if self.albedo is None else self.albedo[rows],
         )  # fmt: skip
 
     @property

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..effects.camera_pose import CameraPose
 from ..forward.basis_slack import COUNT
+from ..nuisances.fine_variation import log_albedo_of_patches
 from ..nuisances.surface_variation import ALBEDO, TILTS, WAYS, SurfaceVariation
 from ..solver.model_fit import ModelFit
 from .cross_validation import parameter_variances
@@ -36,7 +37,8 @@ class ScanQuality:
             if isinstance(effect, SurfaceVariation):
                 by_way = dict(zip(WAYS, _over_patches(fitted, place, variances), strict=True))
                 normals = float(np.degrees(np.hypot(by_way[TILTS[0]], by_way[TILTS[1]])))
-                albedo = float(by_way[ALBEDO[0]])
+                known = log_albedo_of_patches(fitted.model.effects, effect.patch).mean(axis=1)
+                albedo = float(np.hypot(by_way[ALBEDO[0]], known.std()))
         return cls(normals, _poses(fitted, variances), _outside_basis(fitted), albedo)
 
     def sentence(self) -> str:

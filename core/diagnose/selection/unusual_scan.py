@@ -14,6 +14,7 @@ from ..effects.normal_error import NormalError
 from ..effects.outside_basis import OutsideBasis
 from ..effects.second_material import SecondMaterial
 from ..forward.diagnosis_context import DiagnosisContext
+from ..nuisances.fine_variation import log_albedo_of_patches
 from ..nuisances.pose_jitter import PoseJitter
 from ..nuisances.surface_variation import ALBEDO, WAYS, SurfaceVariation
 from ..solver.gauss_newton import fit
@@ -131,7 +132,7 @@ def _log_reflectance(now: ModelFit, place: int, effect: SurfaceVariation) -> NDA
     patches = model.x[place].reshape(effect.count, -1)
     first = WAYS.index(ALBEDO[0])
     factor = 1 + patches[:, first, None] + patches[:, first + 1 : first + 4] / albedo
-    found = np.log(np.maximum(factor, DARKEST))
+    found = np.log(np.maximum(factor, DARKEST)) + log_albedo_of_patches(model.effects, effect.patch)
     return np.asarray(found - np.median(found, axis=0))
 
 

@@ -189,11 +189,13 @@ class Model:
     def entering(
         self, reflected: Array, state: ShadingState, x: Sequence[Vector] | None = None
     ) -> Array:
-        """(n, 3) radiance that reaches the camera."""
+        """(n, 3) radiance that reaches the camera. All that is added to the light of the lamp is
+        reflected by the surface too."""
         total = reflected
         for effect, values in zip(self.effects, self.x if x is None else x, strict=True):
             if isinstance(effect, AddsRadiance):
-                total = total + effect.added_radiance(state, self.brdfs, values)
+                added = effect.added_radiance(state, self.brdfs, values)
+                total = total + (added if state.albedo is None else added * state.albedo)
         return total
 
     def recorded(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ....angles.vectors import tangents
 from ...forward.diagnosis_context import DiagnosisContext
 from .effect import Array
+from .surface_patches import mean_of
 
 MAX_PLACE = 1.5  # half widths: a pixel outside its nearest patch does not extrapolate the curvature
 
@@ -30,11 +31,10 @@ class PatchFrames:
     @classmethod
     def of(cls, context: DiagnosisContext, patch: NDArray[np.intp], width: float) -> PatchFrames:
         """patch: (n,) number of each pixel's patch, −1 none; some pixel has one."""
-        known = np.flatnonzero(patch >= 0)
-        mean = _means(patch[known], context.pixels.normal[known])
+        mean = mean_of(patch, context.pixels.normal)
         mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9)
         first, other = (v[patch].astype(np.float32) for v in tangents(mean))
-        middle = _means(patch[known], context.pixels.point[known])
+        middle = mean_of(patch, context.pixels.point)
         return cls(first, other, middle, _place(context, middle[patch], first, other, width), width)
 
     def at_pixels(
@@ -56,13 +56,6 @@ class PatchFrames:
         normal = normal + tilt[:, :1] * self.first + tilt[:, 1:] * self.other
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         return normal
-
-
-def _means(patch: NDArray[np.intp], values: Array) -> Array:
-    """(P, 3) means of values (n, 3) over each patch; patch: (n,) its number."""
-    count = np.maximum(np.bincount(patch), 1)
-    sums = [np.bincount(patch, values[:, k].astype(np.float64)) for k in range(3)]
-    return np.stack(sums, axis=1) / count[:, None]
 
 
 def _place(

@@ -28,6 +28,14 @@ def surface_patches(context: DiagnosisContext, across: int = ACROSS) -> NDArray[
     return np.asarray(number[of], np.intp)
 
 
+def mean_of(patch: NDArray[np.intp], values: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(p, k) means of values (n, k) in each patch; patch: (n,) of each pixel, −1 none."""
+    known = np.flatnonzero(patch >= 0)
+    count = np.bincount(patch[known])
+    sums = [np.bincount(patch[known], column) for column in values[known].T]
+    return np.asarray(np.stack(sums, axis=1) / count[:, None], np.float64)
+
+
 def median_of(patch: NDArray[np.intp], values: NDArray[np.floating]) -> NDArray[np.float64]:
     """(p,) median of values (n,) in each patch; patch: (n,) of each pixel, −1 none."""
     known = np.flatnonzero(patch >= 0)

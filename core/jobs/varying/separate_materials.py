@@ -8,22 +8,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..concurrency.background import in_background, steps_in_background
-from ..concurrency.job import Step, finished
-from ..concurrency.steps import relayed
-from ..errors import PatinaError
-from ..inputs.separated_materials import (
+from ...concurrency.background import in_background, steps_in_background
+from ...concurrency.job import Step, finished
+from ...concurrency.steps import relayed
+from ...errors import PatinaError
+from ...inputs.separated_materials import (
     can_separate,
     separated_names,
     separated_scan,
     with_separated,
 )
-from ..scan import Scan
-from ..varying.choice import MIN_PHOTOS
-from ..varying.node_model import NodeModel
-from ..varying.separation import divide, division_improves, features, second_at
-from ..varying.varying_surface import ALL_VARIATIONS
-from .fit_job import CaptureResult, FitJob, MaterialResult
+from ...scan import Scan
+from ...varying.choice import MIN_PHOTOS
+from ...varying.separation import divide, division_improves, features, second_at
+from ...varying.varying_surface import ALL_VARIATIONS
+from ..fit_job import CaptureResult, FitJob, MaterialResult
+from .node_steps import model_of
 from .surface_observations import SurfaceObservations
 
 MAX_KINDS = 4  # of material on one object: more are seldom, and each takes as long as a fit
@@ -116,7 +116,7 @@ def _trial(
     seen, nodes = surface.of_material(index, material, limit)
     if len(np.unique(seen.photo)) < MIN_PHOTOS:
         return None
-    model = NodeModel.of(material.fit.brdf, material.scale)
+    model = model_of(material)
     step = Step("looking for kinds of material", start)
     parameters = yield from in_background(lambda: nodes.estimate(model, seen, ALL_VARIATIONS), step)
     values = features(model, nodes.points, parameters)
@@ -136,7 +136,7 @@ def _trial(
             yield Step(f"separate materials: {one.stage}", start + share * done)
     except PatinaError:  # too few samples of one kind
         return None
-    parts = [NodeModel.of(m.fit.brdf, m.scale) for m in finished(again.result).materials]
+    parts = [model_of(m) for m in finished(again.result).materials]
     accepted, *errors = yield from relayed(
         steps_in_background(division_improves(model, parts, division, seen, nodes)),
         lambda done: Step(

@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..concurrency.background import in_background
-from ..concurrency.job import Step
-from ..fit.measured_result import MeasuredResult
-from ..inputs import capture_data
-from ..varying.choice import MIN_NORMAL_ERROR, Nodes
-from ..varying.hierarchy import MAX_TILT
-from ..varying.labels import label_pixels
-from ..varying.observations import Observations, observe
-from ..varying.surface_grid import SurfaceGrid
-from ..varying.surface_photo import SurfacePhoto
-from .fit_job import CaptureResult, MaterialResult
+from ...concurrency.background import in_background
+from ...concurrency.job import Step
+from ...fit.measured_result import MeasuredResult
+from ...inputs import capture_data
+from ...varying.choice import MIN_NORMAL_ERROR, Nodes
+from ...varying.hierarchy import MAX_TILT
+from ...varying.labels import label_pixels
+from ...varying.observations import Observations, observe
+from ...varying.surface_grid import SurfaceGrid
+from ...varying.surface_photo import SurfacePhoto
+from ..fit_job import CaptureResult, MaterialResult
 
 
 @dataclass(frozen=True)

@@ -7,23 +7,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..concurrency.background import in_background, steps_in_background
-from ..concurrency.job import Job, Step, finished
-from ..concurrency.steps import relayed
-from ..varying.choice import Nodes, choose
-from ..varying.conversion import typical_samples
-from ..varying.hierarchy import NodeFields
-from ..varying.labels import check_material_count
-from ..varying.node_model import COUNT, NodeModel
-from ..varying.observations import Observations
-from ..varying.varying_surface import (
+from ...concurrency.background import in_background
+from ...concurrency.job import Job, Step, finished
+from ...varying.choice import Nodes
+from ...varying.conversion import typical_samples
+from ...varying.labels import check_material_count
+from ...varying.node_model import COUNT
+from ...varying.observations import Observations
+from ...varying.varying_surface import (
     ALL_VARIATIONS,
     EVEN,
     VARIATIONS,
     MaterialVariation,
     VaryingSurface,
 )
-from .fit_job import CaptureResult, FitJob, MaterialResult, with_portable
+from ..fit_job import CaptureResult, FitJob, MaterialResult, with_portable
+from .node_steps import CHOICE_NODES, chosen_kind, final_fields, model_of
 from .separate_materials import separate_materials
 from .surface_observations import SurfaceObservations, observe_surface, pixel_size
 
@@ -32,7 +31,6 @@ _, DIFFUSE, *FURTHER = VARIATIONS
 MAX_NODES = 1_000_000  # of the grid: the texels that a mesh covers in a texture of 1400 × 1400
 MAX_OBSERVATIONS = 40_000_000  # nodes times photos, 60 bytes each
 NODES_PER_PIXEL = 4.0  # at most: half a pixel apart, photos are interpolated without loss
-CHOICE_NODES = 30_000  # of a material, that choice and refits use
 REFITS = 2  # of the BRDF, without the variation found so far
 FITTED, OBSERVED, SEPARATED, CHOSEN = 0.25, 0.3, 0.45, 0.75
 """Fractions of the time after which the fit is done, photos are read, materials are separated, and
@@ -99,10 +97,10 @@ class VaryingJob(Job):
         seen, nodes = coarse.of_material(index, material, CHOICE_NODES)
         if not len(seen):
             return material, MaterialVariation(EVEN)
-        before, model = material, _model(material)
+        before, model = material, model_of(material)
         if self.mode == "auto":
             candidates = [(EVEN, model), (DIFFUSE, model)]
-            kind = yield from _choice(candidates, seen, nodes, False, start, 0.25 * share)
+            kind = yield from chosen_kind(candidates, seen, nodes, False, start, 0.25 * share)
             if kind.kind == EVEN:
                 return material, kind
         part = 0.25 * share / REFITS
@@ -111,9 +109,11 @@ class VaryingJob(Job):
             material = yield from self._without_variation(index, material, seen, nodes, at, part)
         if self.mode == "always":
             return material, MaterialVariation(ALL_VARIATIONS)
-        again = _model(material)
+        again = model_of(material)
         candidates = [(EVEN, model), *((one, again) for one in (DIFFUSE, *FURTHER))]
-        found = yield from _choice(candidates, seen, nodes, True, start + 0.5 * share, 0.5 * share)
+        found = yield from chosen_kind(
+            candidates, seen, nodes, True, start + 0.5 * share, 0.5 * share
+        )
         return (before if found.kind == EVEN else material), found
 
     def _without_variation(
@@ -126,8 +126,8 @@ class VaryingJob(Job):
         share: float,
     ) -> Generator[Step, None, MaterialResult]:
         """The material, fitted to samples without the variation of its diffuse colour."""
-        step, model = Step("fitting without the variation", start), _model(material)
-        fields = yield from _last(nodes, model, seen, DIFFUSE, step, 0.0)
+        step, model = Step("fitting without the variation", start), model_of(material)
+        fields = yield from final_fields(nodes, model, seen, DIFFUSE, step, 0.0)
         table = yield from in_background(
             lambda: typical_samples(model, seen, nodes.points, nodes.normals, fields.parameters),
             step,
@@ -161,7 +161,9 @@ class VaryingJob(Job):
             if kinds[index].kind == EVEN or not len(seen):
                 continue
             step = Step("estimating the variation", CHOSEN + 0.05 + index * share)
-            fields = yield from _last(nodes, _model(material), seen, kinds[index].kind, step, share)
+            fields = yield from final_fields(
+                nodes, model_of(material), seen, kinds[index].kind, step, share
+            )
             rows = fine.rows(index)
             parameters[rows], variance[rows] = fields.parameters, fields.variance
         return VaryingSurface(
@@ -172,40 +174,6 @@ class VaryingJob(Job):
             before.face_material.astype(np.uint8),
             tuple(kinds),
         )
-
-
-def _choice(
-    candidates: list[tuple[str, NodeModel]],
-    seen: Observations,
-    nodes: Nodes,
-    highlights: bool,
-    start: float,
-    share: float,
-) -> Generator[Step, None, MaterialVariation]:
-    return (
-        yield from relayed(
-            steps_in_background(choose(candidates, seen, nodes, highlights)),
-            lambda done: Step("predicting held-out photos", start + share * done),
-        )
-    )
-
-
-def _last(
-    nodes: Nodes, model: NodeModel, seen: Observations, kind: str, step: Step, share: float
-) -> Generator[Step, None, NodeFields]:
-    """The fields after the finest level."""
-    steps = nodes.solve(model, seen, kind)
-    fields, start = None, step.fraction
-    while True:
-        found = yield from in_background(lambda: next(steps, None), step)
-        if found is None:
-            return finished(fields)
-        done, fields = found
-        step = Step(step.stage, start + share * done)
-
-
-def _model(material: MaterialResult) -> NodeModel:
-    return NodeModel.of(material.fit.brdf, material.scale)
 
 
 def _sentence(name: str, kind: MaterialVariation) -> str:

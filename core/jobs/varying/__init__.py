@@ -1,0 +1,1 @@
+"""How materials vary over the surface: read from the photos, chosen, and estimated."""

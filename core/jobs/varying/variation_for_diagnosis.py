@@ -1,0 +1,58 @@
+"""How the materials of a fit vary, as the baseline of a diagnosis needs it.
+
+The BRDFs are those of the fit: the diagnosis fits them again, and patches of the surface absorb
+what the variation gets wrong in their mean. Without refits and a fine grid it takes a fraction of
+the time of VaryingJob.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+
+import numpy as np
+
+from ...concurrency.job import Step
+from ...varying.node_variation import MaterialNodes, NodeVariation
+from ...varying.varying_surface import EVEN, VARIATIONS
+from ..fit_job import CaptureResult
+from .node_steps import CHOICE_NODES, chosen_kind, final_fields, model_of
+from .surface_observations import observe_surface
+
+_, DIFFUSE, *FURTHER = VARIATIONS
+DIAGNOSIS_CHOICE_NODES = 10_000
+"""Of a material, that the choice uses: a third of those of VaryingJob in a third of the time."""
+OBSERVED, DECIDED, CHOSEN = 0.3, 0.5, 0.9
+"""Fractions of the time after which the photos are read; whether a material varies is decided; and
+what varies is chosen. The last two are of the time after the first."""
+
+
+def variation_for_diagnosis(
+    result: CaptureResult, start: float, share: float
+) -> Generator[Step, None, NodeVariation | None]:
+    """The variation of all materials; None where held-out photos find all of them even. start,
+    share: the part of the job that this takes."""
+    surface = yield from observe_surface(result, CHOICE_NODES, start, OBSERVED * share)
+    found = dict[int, MaterialNodes]()
+    each = (1 - OBSERVED) * share / len(result.materials)
+    for index, material in enumerate(result.materials):
+        few, some = surface.of_material(index, material, DIAGNOSIS_CHOICE_NODES)
+        if not len(few):
+            continue
+        model, begin = model_of(material), start + OBSERVED * share + index * each
+        candidates = [(EVEN, model), (DIFFUSE, model)]
+        kind = yield from chosen_kind(candidates, few, some, False, begin, DECIDED * each)
+        if kind.kind == EVEN:
+            continue
+        candidates = [(one, model) for one in (DIFFUSE, *FURTHER)]
+        begin, part = begin + DECIDED * each, (CHOSEN - DECIDED) * each
+        kind = yield from chosen_kind(candidates, few, some, True, begin, part)
+        seen, nodes = surface.of_material(index, material, CHOICE_NODES)
+        step = Step("estimating the variation", begin + part)
+        fields = yield from final_fields(nodes, model, seen, kind.kind, step, (1 - CHOSEN) * each)
+        shown = np.zeros(len(nodes.points), bool)
+        shown[seen.node] = True
+        rows = np.flatnonzero(shown)
+        own = replace(model, scale=1.0)  # pixels of a diagnosis have irradiance divided by it
+        found[index] = MaterialNodes(nodes.select(rows), own, fields.parameters[rows])
+    return NodeVariation(found) if found else None
