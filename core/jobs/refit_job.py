@@ -83,8 +83,14 @@ class RefitJob(Job):
         selected, dropped = list(order), list[Trial]()
         again: list[Refit] = []
         begin = 0.0
+        judged = before.materials
+        if selected and not self.exactly and finished(self.checked.context).variation is not None:
+            # samples without the variation are predicted better, with any cause and with none
+            plain, _ = yield from self._fits(before, found, (), begin)
+            judged = tuple(_proposed(before, plain))
+            begin += ROUND_SHARE * (1 - begin)
         while selected:
-            again, fitted, rejection = yield from self._with(before, found, selected, begin)
+            again, fitted, rejection = yield from self._with(before, judged, found, selected, begin)
             begin += ROUND_SHARE * (1 - begin)
             if rejection is None:
                 self.fitted = fitted
@@ -94,7 +100,7 @@ class RefitJob(Job):
             reasons_of[dropped[-1].effect.cause] = rejection.evidence
         for trial in dropped[-2::-1]:
             more = [t for t in order if t in selected or t is trial]
-            other, fitted, rejection = yield from self._with(before, found, more, begin)
+            other, fitted, rejection = yield from self._with(before, judged, found, more, begin)
             begin += ROUND_SHARE * (1 - begin)
             if rejection is None:
                 selected, again, self.fitted = more, other, fitted
@@ -129,10 +135,28 @@ class RefitJob(Job):
         self.result = replace(result, materials=tuple(done))
 
     def _with(
-        self, before: CaptureResult, found: Diagnosis, selected: Sequence[Trial], done: float
+        self,
+        before: CaptureResult,
+        judged: Sequence[MaterialResult],
+        found: Diagnosis,
+        selected: Sequence[Trial],
+        done: float,
     ) -> Generator[Step, None, tuple[list[Refit], ModelFit, Rejection | None]]:
-        """(second fits, the joint fit they are based on, the evidence against them). done: fraction
-        of the job; this takes ROUND_SHARE of the rest."""
+        """(second fits, the joint fit they are based on, the evidence against them). judged: the
+        materials without these causes. done: fraction of the job; this takes ROUND_SHARE of the
+        rest."""
+        again, fitted = yield from self._fits(before, found, selected, done)
+        if self.exactly:
+            return again, fitted, None
+        step = Step(STAGE, done + ROUND_SHARE * (1 - done))
+        jointly = yield from in_background(lambda: joint_log_growth(found, fitted), step)
+        return again, fitted, evidence_against(judged, again, jointly)
+
+    def _fits(
+        self, before: CaptureResult, found: Diagnosis, selected: Sequence[Trial], done: float
+    ) -> Generator[Step, None, tuple[list[Refit], ModelFit]]:
+        """(second fits, the joint fit they are based on). done: fraction of the job; this takes
+        ROUND_SHARE of the rest."""
         step = Step(STAGE, done)
         yield step
         causes = [trial.effect.cause for trial in selected]
@@ -152,10 +176,7 @@ class RefitJob(Job):
                 )
                 one = Refit(None, {}, (note,))
             again.append(one)
-        if self.exactly:
-            return again, fitted, None
-        jointly = yield from in_background(lambda: joint_log_growth(found, fitted), step)
-        return again, fitted, evidence_against(before.materials, again, jointly)
+        return again, fitted
 
     def _refit_material(
         self, index: int, material: MaterialResult, model: Model, start: float, share: float

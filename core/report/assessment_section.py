@@ -21,6 +21,7 @@ MAX_MATRIX = 60  # parameters of a correlation matrix that is drawn
 OF_THE_SCAN = {
     "pose_jitter": "Errors of the Poses",
     "material_scale": "Brightness of the Material",
+    "surface_variation": "Variation of the Surface",
 }  # what every joint fit has
 RED, BLUE, GREY = "#b4443c", "#2f6fb0", "#999"
 

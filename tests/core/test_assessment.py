@@ -11,10 +11,13 @@ from patina.core.diagnose.assessment.assessment import Assessment
 from patina.core.diagnose.assessment.calibration import Calibration
 from patina.core.diagnose.assessment.joint_parameters import JointParameters
 from patina.core.diagnose.assessment.sensor_residuals import SensorResiduals
+from patina.core.diagnose.assessment.surface_correlation import surface_correlations
 from patina.core.diagnose.effects.ambient_light import AmbientLight
 from patina.core.diagnose.effects.black_level import BlackLevel
 from patina.core.diagnose.effects.light_intensity import LightIntensity
+from patina.core.diagnose.effects.vignetting import Vignetting
 from patina.core.diagnose.nuisances.pose_jitter import PoseJitter
+from patina.core.diagnose.nuisances.surface_variation import SurfaceVariation
 from patina.core.diagnose.selection.cross_validation import predict_held_out_regions
 from patina.core.diagnose.solver.gauss_newton import fit
 from patina.core.diagnose.solver.model import Model
@@ -106,6 +109,22 @@ def test_ambient_light_and_black_level_are_confusable_on_a_matte_ball():
     assert all(effect is not None for effect in both)
     pairs = JointParameters.of(_fitted(context, *both)).confusable
     assert {AmbientLight.cause, BlackLevel.cause} in [set(pair[:2]) for pair in pairs]
+
+
+def test_what_a_varying_surface_could_imitate():
+    """On a ball photographed from all sides, a drift of single photos is no texture. Dark corners
+    of photos that all show the same view are."""
+    context = lit_ball(1, GLOSSY)
+    drift = np.array([0.1, -0.1, 0.1, -0.1, 0.1, -0.1])
+    variation, drifting = SurfaceVariation.across(context, 6), LightIntensity.of(context)
+    model = Model(context.pixels, context.brdfs).with_effect(variation)
+    deviation = expected_deviation(context.pixels, context.brdfs, np.radians(0.3))
+    fitted = ModelFit.of(model.with_effect(drifting, drift), deviation)
+    of_drift = surface_correlations(fitted)[LightIntensity.cause]
+    corners = Vignetting(context.pixels.point[:, 0] ** 2 / 0.16)  # the same in all photos
+    fitted = ModelFit.of(model.with_effect(corners, np.array([-0.5, 0.0])), deviation)
+    of_corners = surface_correlations(fitted)[Vignetting.cause]
+    assert of_drift < 0.75 < 0.9 < of_corners <= 1
 
 
 def test_a_dark_corner_shows_on_the_sensor():

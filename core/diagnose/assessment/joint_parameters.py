@@ -10,8 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..nuisances.surface_variation import SurfaceVariation
 from ..selection.one_step import ProjectedBaseline
 from ..solver.model_fit import ModelFit
+from .surface_correlation import surface_correlations
 
 Vector = NDArray[np.float64]
 
@@ -24,7 +26,8 @@ class JointParameters:
 
     cause, name: of each. estimate: at the optimum. error: standard error. prior: standard deviation
     of the prior. correlation: (p, p) of the errors. impact: cause → RMS change of ln(ρ·cosMap + ε)
-    in the pixels of the diagnosis, if the effect is off by one standard error.
+    in the pixels of the diagnosis, if the effect is off by one standard error. surface: cause →
+    correlation with a reflectance that varies over the surface (surface_correlation.py).
     """
 
     cause: tuple[str, ...]
@@ -34,6 +37,7 @@ class JointParameters:
     prior: Vector
     correlation: NDArray[np.float64]
     impact: dict[str, float]
+    surface: dict[str, float]
 
     @property
     def pull(self) -> Vector:
@@ -49,7 +53,7 @@ class JointParameters:
     @property
     def confusable(self) -> list[tuple[str, str, float]]:
         """(cause, other cause, largest correlation of their parameters), of effects that the photos
-        hardly distinguish, largest first."""
+        hardly distinguish, largest first. A surface that varies is one of them."""
         found, causes = [], list(dict.fromkeys(self.cause))
         places = {c: np.flatnonzero(np.array(self.cause) == c) for c in causes}
         for k, one in enumerate(causes):
@@ -57,6 +61,8 @@ class JointParameters:
                 most = float(np.abs(self.correlation[np.ix_(places[one], places[other])]).max())
                 if most > CONFUSABLE:
                     found.append((one, other, most))
+        varies = SurfaceVariation.cause
+        found += [(c, varies, r) for c, r in self.surface.items() if r > CONFUSABLE]
         return sorted(found, key=lambda pair: -pair[2])
 
     @classmethod
@@ -78,6 +84,7 @@ class JointParameters:
             fit.joined(lambda parameters: parameters.deviation),
             covariance[size:, size:] / np.outer(scale, scale),
             _impact(fit, covariance, np.array(causes)),
+            surface_correlations(fit),
         )
 
 

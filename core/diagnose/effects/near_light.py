@@ -20,6 +20,7 @@ NEARNESS_SCALE = 0.3  # size of the object / distance, standard deviation of the
 MIN_DISTANCE = 1.2  # of the lamp from the centre, in sizes: it is not inside the object
 # radians and ln gain, of the prior: the light may have been measured away from the centre
 ANGLE_SCALE, GAIN_SCALE = np.radians(1.0), 0.05
+MAX_DEVIATIONS = 3.0  # of these priors, beyond what the object's size explains
 MIN_NEARNESS = 0.03  # below it, the light varies by less than 6 % over the object
 EACH = 4  # parameters of a light
 START = 0.15  # of the nearness: away from its bound 0, where steps would be cut short
@@ -81,7 +82,16 @@ class NearLight(ChangesShading, DisplacesLamp):
         return x[::EACH]
 
     def is_relevant(self, x: np.ndarray) -> bool:
-        return float(self.nearness(x).max()) > MIN_NEARNESS
+        return float(self.nearness(x).max()) > MIN_NEARNESS and self._is_possible(x)
+
+    def _is_possible(self, x: NDArray[np.float64]) -> bool:
+        """Whether a lamp that is so near can have been measured with these directions and gains
+        anywhere on the object. If not, the parameters imitate something else."""
+        across = np.minimum(self.nearness(x) / 2, 0.9)  # half a size / distance
+        angle = np.arcsin(across) + MAX_DEVIATIONS * ANGLE_SCALE
+        gain = -2 * np.log(1 - across) + MAX_DEVIATIONS * GAIN_SCALE
+        found = np.hypot(x[1::EACH], x[2::EACH])
+        return bool(np.all(found < angle) and np.all(np.abs(x[3::EACH]) < gain))
 
     def with_rays(self, context: DiagnosisContext, x: np.ndarray) -> NearLight:
         return replace(self, shadows=DisplacedShadows.of(context, replace(self, shadows=None), x))

@@ -20,6 +20,9 @@ RADII = (0.015, 0.04, 0.1)  # scattering distances, fractions of the object's si
 CUT = 2.5  # radii beyond which the kernel is cut off
 NEIGHBOURS = 100  # points within that distance of a pixel, about
 MAX_POINTS = 20_000  # on the surface
+MIN_FRACTION = 0.03
+"""Of the light. Marble and wax scatter most of it; less than this at the edges of shadows is light
+from the room or an edge of the mesh that is not in its place."""
 MAX_NEIGHBOURS = 160  # points that are looked up for a pixel at most
 
 
@@ -62,6 +65,9 @@ class Subsurface(AddsRadiance):
     def parameters(self) -> Parameters:
         names = [f"{100 * r:.1f} % of the size, {c}" for r in RADII for c in "rgb"]
         return Parameters.alike(names, "of the light", 0.15, 0.0, 1.0)
+
+    def is_relevant(self, x: np.ndarray) -> bool:
+        return float(x.reshape(-1, 3).sum(axis=0).max()) > MIN_FRACTION
 
     def added_radiance(self, state: ShadingState, brdfs: MaterialBRDFs, x: np.ndarray) -> Array:
         return np.einsum("knc,kc->nc", self.spread, x.reshape(-1, 3).astype(np.float32))

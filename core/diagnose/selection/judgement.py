@@ -73,7 +73,7 @@ def overlap(one: Evidence, other: Evidence) -> float:
 def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
     """The effects that are to be fitted jointly, best first; empty: none is convincing. The parts
     of an effect are fitted too, each alone. evidence: best first."""
-    strong = [one for one in evidence if _has_sufficient_evidence(one.trial)]
+    strong = [one for one in evidence if has_sufficient_evidence(one.trial)]
     strong = [one for one in strong if not _is_composed(one, evidence)]
     if not strong:
         return []
@@ -117,7 +117,8 @@ def _replaces(simple: Evidence, other: Evidence) -> bool:
     return simpler and enough and related(simple.cause, other.cause)
 
 
-def _has_sufficient_evidence(trial: Trial) -> bool:
+def has_sufficient_evidence(trial: Trial) -> bool:
+    """Whether the gain of a step or a joint fit is large, and large beside its standard error."""
     enough = trial.density > min_gain(trial.effect.cause)
     sure = trial.density > NAT * STRONG or trial.effect.cause in UNRIVALLED
     return enough and trial.ratio > MIN_RATIOS[sure]

@@ -32,7 +32,7 @@ from .effect_trials import (
 )
 from .evidence import Evidence, evidence_for, has_one_step
 from .held_out_error import held_out_errors
-from .judgement import best_of, contenders, min_gain
+from .judgement import best_of, contenders, has_sufficient_evidence
 from .one_step import ProjectedBaseline
 from .residual_structure import residual_structure
 from .scan_quality import ScanQuality
@@ -74,9 +74,7 @@ def search(
         found = [
             t
             for t in found
-            if t.is_accepted
-            and t.gain > MIN_GAIN_FRACTION * gained
-            and t.density > min_gain(t.effect.cause)
+            if t.is_accepted and t.gain > MIN_GAIN_FRACTION * gained and has_sufficient_evidence(t)
         ]
         if not found:
             break
