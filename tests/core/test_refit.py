@@ -118,17 +118,48 @@ def named(cause: str, is_distinct: bool = True) -> SimpleNamespace:
     return SimpleNamespace(effect=SimpleNamespace(cause=cause), is_distinct=is_distinct)
 
 
+def diagnosed(variation) -> SimpleNamespace:
+    """A finished diagnosis. variation: that its baseline knows."""
+    return SimpleNamespace(
+        result=Result((Material(("first",)),)), found=SimpleNamespace(),
+        context=SimpleNamespace(variation=variation),
+    )  # fmt: skip
+
+
+def test_samples_without_variation_are_judged_by_a_fit_to_the_same_samples(monkeypatch):
+    """The error of the first fit contains the texture; without that, any cause would do."""
+    monkeypatch.setattr(refit_job, "correctable_effects", lambda found: [named("vignetting")])
+    monkeypatch.setattr(refit_job, "_applied", lambda trial, model: trial.effect.cause)
+
+    def fits(self, before, found, taken, done):
+        yield Step("fitting", done)
+        causes = ", ".join(trial.effect.cause for trial in taken)
+        return [Refit(Material((causes,)), {}, ())], SimpleNamespace(model=None)
+
+    compared = []
+
+    def evidence(before, after, jointly):
+        compared.append((before[0].warnings, after[0].material.warnings))
+
+    monkeypatch.setattr(refit_job.RefitJob, "_fits", fits)
+    monkeypatch.setattr(refit_job, "evidence_against", evidence)
+    monkeypatch.setattr(refit_job, "joint_log_growth", lambda found, fitted: 0.0)
+    for variation in (None, SimpleNamespace()):
+        refit_job.RefitJob(diagnosed(variation), portable=False).drain()
+    assert compared == [(("first",), ("vignetting",)), (("",), ("vignetting",))]
+
+
 def test_causes_whose_parameters_may_be_0_are_contradicted(monkeypatch):
     accepted = [named("flash_offset"), named("veiling_glare", is_distinct=False)]
     monkeypatch.setattr(refit_job, "correctable_effects", lambda found: accepted)
     monkeypatch.setattr(refit_job, "_applied", lambda trial, model: trial.effect.cause)
 
-    def fitted(self, before, found, taken, done):
+    def fitted(self, before, judged, found, taken, done):
         yield Step("fitting", done)
         return [Refit(Material(("again",)), {}, ())], SimpleNamespace(model=None), None
 
     monkeypatch.setattr(refit_job.RefitJob, "_with", fitted)
-    checked = SimpleNamespace(result=Result((Material(("first",)),)), found=SimpleNamespace())
+    checked = diagnosed(variation=None)
     job = refit_job.RefitJob(checked, portable=False)
     job.drain()
     assert job.result.effects == ("flash_offset",)
@@ -156,7 +187,7 @@ def test_causes_that_worsen_held_out_photos_are_removed(monkeypatch, order, guil
     monkeypatch.setattr(refit_job, "_applied", lambda trial, model: trial.effect.cause)
     fractions = []
 
-    def fitted(self, before, found, taken, done):
+    def fitted(self, before, judged, found, taken, done):
         fractions.append(done)
         yield Step("fitting", done)
         again = [Refit(Material(("again",)), {}, ())]
@@ -165,7 +196,7 @@ def test_causes_that_worsen_held_out_photos_are_removed(monkeypatch, order, guil
         return again, SimpleNamespace(model=None), refusal
 
     monkeypatch.setattr(refit_job.RefitJob, "_with", fitted)
-    checked = SimpleNamespace(result=Result((Material(("first",)),)), found=SimpleNamespace())
+    checked = diagnosed(variation=None)
     job = refit_job.RefitJob(checked, portable=False)
     job.drain()
     reported, other = (job.contradicted, job.unused) if of_cause else (job.unused, job.contradicted)

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...concurrency.job import Step
+from ...varying.labels import MAX_MATERIALS
 from ...varying.node_variation import MaterialNodes, NodeVariation
 from ...varying.varying_surface import EVEN, VARIATIONS
 from ..fit_job import CaptureResult
@@ -31,7 +32,9 @@ def variation_for_diagnosis(
     result: CaptureResult, start: float, share: float
 ) -> Generator[Step, None, NodeVariation | None]:
     """The variation of all materials; None where held-out photos find all of them even. start,
-    share: the part of the job that this takes."""
+    share: the part of the job that this takes. None too where there are more than MAX_MATERIALS."""
+    if len(result.materials) > MAX_MATERIALS:
+        return None
     surface = yield from observe_surface(result, CHOICE_NODES, start, OBSERVED * share)
     found = dict[int, MaterialNodes]()
     each = (1 - OBSERVED) * share / len(result.materials)
