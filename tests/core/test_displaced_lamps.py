@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.concurrency.steps import drained
@@ -68,6 +70,42 @@ def test_a_lamp_that_lights_the_object_evenly_is_not_near(nearness: float, named
     x = np.zeros(len(effect.parameters))
     x[::4], x[1::4] = nearness, 0.05
     assert effect.is_relevant(x) == named
+
+
+@pytest.fixture(scope="module")
+def near_ball() -> NearLight:
+    effect = NearLight.of(lit_ball(1))
+    assert effect is not None
+    return effect
+
+
+PLACE = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
+
+
+@given(st.floats(0.04, 0.8), PLACE, st.integers(0, 2**31))
+def test_a_lamp_measured_anywhere_on_the_object_is_possible(near_ball, nearness, place, seed):
+    """The stated direction and irradiance are those at a place on the object, not at its centre."""
+    effect = near_ball
+    place = 0.5 * np.array(place) / max(np.linalg.norm(place), 1.0)  # sizes from the centre
+    towards = np.random.default_rng(seed).normal(size=3)
+    lamp = towards / np.linalg.norm(towards) / nearness
+    away = lamp - place
+    angle = np.arccos(min(1.0, lamp @ away / np.linalg.norm(lamp) / np.linalg.norm(away)))
+    x = np.zeros(len(effect.parameters))
+    x[::4], x[1::4] = nearness, angle
+    x[3::4] = 2 * np.log(np.linalg.norm(away) / np.linalg.norm(lamp))
+    assert effect.is_relevant(x)
+
+
+@pytest.mark.parametrize(("place", "size"), [(1, 0.3), (3, 0.4), (3, -0.4)])
+def test_a_lamp_that_was_measured_nowhere_on_the_object_is_not_near(near_ball, place, size):
+    """One lamp is 17° elsewhere, or its brightness off by 40 %, though it is 10 sizes away."""
+    effect = near_ball
+    x = np.zeros(len(effect.parameters))
+    x[::4] = 0.1
+    assert effect.is_relevant(x)
+    x[place] = size
+    assert not effect.is_relevant(x)
 
 
 def test_a_flash_beside_the_lens_is_found_with_its_place():

@@ -1,9 +1,9 @@
 """How materials vary over the surface, as estimated before the diagnosis.
 
 Texture is finer than the patches of SurfaceVariation. Without it, the residual of an object that is
-painted or corroded is its texture, and no effect of a few percent is significant beside that. The
-variation is a fixed part of the model: it has no parameters. Patches of SurfaceVariation absorb its
-errors, those of an effect that it imitates included.
+painted or corroded is its texture, which hides any effect of a few percent. The variation is a
+fixed part of the model: it has no parameters. Patches of SurfaceVariation absorb its errors, those
+of an effect that it imitates included.
 """
 
 from __future__ import annotations

@@ -118,7 +118,7 @@ def _replaces(simple: Evidence, other: Evidence) -> bool:
 
 
 def has_sufficient_evidence(trial: Trial) -> bool:
-    """Whether the gain of a step or a joint fit is large, and large beside its standard error."""
+    """Whether the gain of a step or a joint fit is large, also relative to its standard error."""
     enough = trial.density > min_gain(trial.effect.cause)
     sure = trial.density > NAT * STRONG or trial.effect.cause in UNRIVALLED
     return enough and trial.ratio > MIN_RATIOS[sure]

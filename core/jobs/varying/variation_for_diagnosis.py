@@ -15,12 +15,12 @@ import numpy as np
 from ...concurrency.job import Step
 from ...varying.labels import MAX_MATERIALS
 from ...varying.node_variation import MaterialNodes, NodeVariation
-from ...varying.varying_surface import EVEN, VARIATIONS
+from ...varying.varying_surface import ALL_VARIATIONS, EVEN, VARIATIONS
 from ..fit_job import CaptureResult
 from .node_steps import CHOICE_NODES, chosen_kind, final_fields, model_of
 from .surface_observations import observe_surface
 
-_, DIFFUSE, *FURTHER = VARIATIONS
+_, DIFFUSE, *_ = VARIATIONS
 DIAGNOSIS_CHOICE_NODES = 10_000
 """Of a material, that the choice uses: a third of those of VaryingJob in a third of the time."""
 OBSERVED, DECIDED, CHOSEN = 0.3, 0.5, 0.9
@@ -47,7 +47,7 @@ def variation_for_diagnosis(
         kind = yield from chosen_kind(candidates, few, some, False, begin, DECIDED * each)
         if kind.kind == EVEN:
             continue
-        candidates = [(one, model) for one in (DIFFUSE, *FURTHER)]
+        candidates = [(one, model) for one in (DIFFUSE, ALL_VARIATIONS)]
         begin, part = begin + DECIDED * each, (CHOSEN - DECIDED) * each
         kind = yield from chosen_kind(candidates, few, some, True, begin, part)
         seen, nodes = surface.of_material(index, material, CHOICE_NODES)
