@@ -104,6 +104,28 @@ def choose(
     )
 
 
+def varies_within(
+    edge: float, model: NodeModel, seen: Observations, nodes: Nodes, kind: str
+) -> Generator[float, None, bool]:
+    """Whether a material varies within cells of the surface, by cross-validation over photos;
+    yields the fraction done. A wrong light or a veil looks like a reflectance that varies slowly,
+    not like texture. edge: of the cells, scan units; kind: of VARIATIONS, that varies."""
+    if len(np.unique(seen.photo)) < MIN_PHOTOS:
+        return False
+    black = near_black(seen)
+    error = error_without_variation(model, seen, nodes, black)
+    scales = replace(nodes, spacing=max(edge, nodes.spacing)), nodes
+    coarse, fine = found = HeldOut(), HeldOut()
+    folds = folds_of(seen.photo)
+    for done, fold in enumerate(folds, 1):
+        fitted, held, _ = divided_photos(seen, fold, nodes)
+        for some, errors in zip(scales, found, strict=True):
+            theta = some.estimate(model, fitted, kind)
+            errors.add_photos(held, error, log_errors(model, held, nodes, theta, black))
+        yield done / len(folds)
+    return len(fine.cost) >= MIN_PHOTOS and fine.better(coarse, even=True, highlights=False)
+
+
 def folds_of(photo: NDArray[np.integer]) -> list[NDArray[np.integer]]:
     """The photos of observations (m,) in groups, each to be held out once."""
     photos = np.unique(photo)

@@ -7,13 +7,14 @@ from collections.abc import Generator
 from ...concurrency.background import in_background, steps_in_background
 from ...concurrency.job import Step, finished
 from ...concurrency.steps import relayed
-from ...varying.choice import Nodes, choose
+from ...varying.choice import Nodes, choose, varies_within
 from ...varying.hierarchy import NodeFields
 from ...varying.node_model import NodeModel
 from ...varying.observations import Observations
-from ...varying.varying_surface import MaterialVariation
+from ...varying.varying_surface import VARIATIONS, MaterialVariation
 from ..fit_job import MaterialResult
 
+_, DIFFUSE_ONLY, *_ = VARIATIONS
 CHOICE_NODES = 30_000  # of a material, that the choice of what varies and refits use
 
 
@@ -35,6 +36,18 @@ def chosen_kind(
         yield from relayed(
             steps_in_background(choose(candidates, seen, nodes, highlights)),
             lambda done: Step("predicting held-out photos", start + share * done),
+        )
+    )
+
+
+def is_textured(
+    edge: float, model: NodeModel, seen: Observations, nodes: Nodes, start: float, share: float
+) -> Generator[Step, None, bool]:
+    """Whether the colour varies within cells of the surface; see choice.varies_within."""
+    return (
+        yield from relayed(
+            steps_in_background(varies_within(edge, model, seen, nodes, DIFFUSE_ONLY)),
+            lambda done: Step("looking for texture", start + share * done),
         )
     )
 

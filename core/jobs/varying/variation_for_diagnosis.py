@@ -13,14 +13,21 @@ from dataclasses import replace
 import numpy as np
 
 from ...concurrency.job import Step
+from ...diagnose.selection.baseline import ACROSS
 from ...varying.labels import MAX_MATERIALS
 from ...varying.node_variation import MaterialNodes, NodeVariation
-from ...varying.varying_surface import ALL_VARIATIONS, EVEN, VARIATIONS
+from ...varying.varying_surface import ALL_VARIATIONS
 from ..fit_job import CaptureResult
-from .node_steps import CHOICE_NODES, chosen_kind, final_fields, model_of
+from .node_steps import (
+    CHOICE_NODES,
+    DIFFUSE_ONLY,
+    chosen_kind,
+    final_fields,
+    is_textured,
+    model_of,
+)
 from .surface_observations import observe_surface
 
-_, DIFFUSE, *_ = VARIATIONS
 DIAGNOSIS_CHOICE_NODES = 10_000
 """Of a material, that the choice uses: a third of those of VaryingJob in a third of the time."""
 OBSERVED, DECIDED, CHOSEN = 0.3, 0.5, 0.9
@@ -31,7 +38,8 @@ what varies is chosen. The last two are of the time after the first."""
 def variation_for_diagnosis(
     result: CaptureResult, start: float, share: float
 ) -> Generator[Step, None, NodeVariation | None]:
-    """The variation of all materials; None where held-out photos find all of them even. start,
+    """The variation of all materials; None where held-out photos find none that varies within the
+    patches of a diagnosis: these know what varies slowly, as causes do that it imitates. start,
     share: the part of the job that this takes. None too where there are more than MAX_MATERIALS."""
     if len(result.materials) > MAX_MATERIALS:
         return None
@@ -43,11 +51,10 @@ def variation_for_diagnosis(
         if not len(few):
             continue
         model, begin = model_of(material), start + OBSERVED * share + index * each
-        candidates = [(EVEN, model), (DIFFUSE, model)]
-        kind = yield from chosen_kind(candidates, few, some, False, begin, DECIDED * each)
-        if kind.kind == EVEN:
+        size = float(np.ptp(some.points, axis=0).max())
+        if not (yield from is_textured(size / ACROSS, model, few, some, begin, DECIDED * each)):
             continue
-        candidates = [(one, model) for one in (DIFFUSE, ALL_VARIATIONS)]
+        candidates = [(one, model) for one in (DIFFUSE_ONLY, ALL_VARIATIONS)]
         begin, part = begin + DECIDED * each, (CHOSEN - DECIDED) * each
         kind = yield from chosen_kind(candidates, few, some, True, begin, part)
         seen, nodes = surface.of_material(index, material, CHOICE_NODES)
