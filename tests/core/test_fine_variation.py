@@ -9,6 +9,7 @@ import pytest
 
 from patina.core.angles import half_difference
 from patina.core.basis import PrincipalBRDF, default_basis
+from patina.core.concurrency.steps import drained
 from patina.core.diagnose.correction.sample_correction import model_at_pixels
 from patina.core.diagnose.effects.ambient_light import AmbientLight
 from patina.core.diagnose.effects.light_intensity import LightIntensity
@@ -20,9 +21,10 @@ from patina.core.diagnose.selection.baseline import fit_baseline
 from patina.core.diagnose.selection.effect_trials import held_out_predictions, try_effect
 from patina.core.diagnose.selection.scan_quality import ScanQuality
 from patina.core.diagnose.solver.model import Model
-from patina.core.varying.choice import Nodes
+from patina.core.varying.choice import Nodes, varies_within
 from patina.core.varying.node_model import COUNT, DIFFUSE, GLOSS, SPECULAR, TILT, NodeModel
 from patina.core.varying.node_variation import MaterialNodes, NodeVariation
+from tests.core.varying_scene import SPACING, fitted_model, scene
 from tests.make_lit_ball import GLOSSY, PHOTOS, changed, lit_ball
 
 GAINS = 0.03 * np.array([1.0, -1.0, 0.5, -0.5, 1.0, -1.0])  # ln, of the photos
@@ -59,6 +61,17 @@ def striped_ball(gains, known):
 def trial_of_drift(context):
     now = fit_baseline(context, NORMALS, ACROSS).fitted
     return now, try_effect(now, held_out_predictions(now), LightIntensity.of(context))
+
+
+@pytest.mark.parametrize(("waves", "textured"), [(0.0, False), (4.0, False), (70.0, True)])
+def test_only_what_varies_within_a_patch_is_texture(waves, textured):
+    """Colour that varies slowly looks like a wrong light, and is left to the patches."""
+    made = scene(6, 0, vary=False)
+    factor = np.exp(CONTRAST * np.sin(waves * made.points[made.seen.node, 0]))[:, None]
+    seen = replace(made.seen, radiance=(factor * made.seen.radiance).astype(np.float32))
+    nodes = Nodes(made.points, made.normals.astype(np.float32), SPACING, SPACING)
+    found = drained(varies_within(2 / 36, fitted_model(), seen, nodes, "diffuse"))
+    assert found == textured
 
 
 @pytest.mark.slow

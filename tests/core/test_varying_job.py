@@ -13,7 +13,6 @@ from patina.core.capture import read_capture
 from patina.core.concurrency.steps import drained
 from patina.core.errors import InputError
 from patina.core.jobs import FitJob, finished
-from patina.core.jobs.diagnose_job import context_of
 from patina.core.jobs.photo_prediction import predict_one, prediction_inputs
 from patina.core.jobs.select_photos import select_photos
 from patina.core.jobs.varying.variation_for_diagnosis import variation_for_diagnosis
@@ -86,21 +85,10 @@ def test_colour_of_nodes_is_that_of_the_paint(banded):
 
 
 @pytest.mark.slow
-def test_a_diagnosis_knows_the_paint(banded):
-    """Estimated with the even BRDF of the first fit."""
+def test_slow_variation_is_left_to_the_patches(banded):
+    """A wrong light or a veil looks like that too."""
     _, job = banded
-    even = finished(job.fit.result)
-    variation = drained(variation_for_diagnosis(even, 0.0, 1.0))
-    assert variation is not None
-    pixels = drained(context_of(even)).pixels
-    found = np.log(variation.at(pixels).albedo)
-    normal = (pixels.point - made.CENTRE) / np.linalg.norm(pixels.point - made.CENTRE, axis=1)[
-        :, None
-    ]
-    true = np.log(paint(normal))
-    error = found - true
-    error -= np.median(error, axis=0)
-    assert np.all(np.median(np.abs(error), axis=0) < 0.25 * true.std(axis=0))
+    assert drained(variation_for_diagnosis(finished(job.fit.result), 0.0, 1.0)) is None
 
 
 @pytest.mark.slow

@@ -28,8 +28,9 @@ from .node_steps import (
 )
 from .surface_observations import observe_surface
 
-DIAGNOSIS_CHOICE_NODES = 10_000
-"""Of a material, that the choice uses: a third of those of VaryingJob in a third of the time."""
+DIAGNOSIS_CHOICE_NODES = 20_000
+"""Of a material, that the choice uses: so many that nodes on a closed surface are half as far apart
+as the patches of a diagnosis are wide."""
 OBSERVED, DECIDED, CHOSEN = 0.3, 0.5, 0.9
 """Fractions of the time after which the photos are read; whether a material varies is decided; and
 what varies is chosen. The last two are of the time after the first."""
