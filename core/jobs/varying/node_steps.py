@@ -14,7 +14,7 @@ from ...varying.observations import Observations
 from ...varying.varying_surface import VARIATIONS, MaterialVariation
 from ..fit_job import MaterialResult
 
-_, DIFFUSE_ONLY, *_ = VARIATIONS
+DIFFUSE_ONLY = tuple(VARIATIONS)[1]
 CHOICE_NODES = 30_000  # of a material, that the choice of what varies and refits use
 
 
