@@ -79,18 +79,8 @@ def choose(
     first, even = candidates[0]
     if len(photos) < MIN_PHOTOS:
         return MaterialVariation(first)
-    black = near_black(seen)
-    error = error_without_variation(even, seen, nodes, black)
-    found = {kind: HeldOut() for kind, _ in candidates}
-    folds = folds_of(seen.photo)
-    done, total = 0, len(folds) * len(candidates)
-    for fold in folds:
-        fitted, held, _ = divided_photos(seen, fold, nodes)
-        for kind, model in candidates:
-            theta = nodes.estimate(model, fitted, kind)
-            found[kind].add_photos(held, error, log_errors(model, held, nodes, theta, black))
-            done += 1
-            yield done / total
+    errors = yield from _held_out([(nodes, *each) for each in candidates], even, seen)
+    found = {kind: one for (kind, _), one in zip(candidates, errors, strict=True)}
     if len(found[first].cost) < MIN_PHOTOS:
         return MaterialVariation(first)
     chosen = first
@@ -112,18 +102,29 @@ def varies_within(
     not like texture. edge: of the cells, scan units; kind: of VARIATIONS, that varies."""
     if len(np.unique(seen.photo)) < MIN_PHOTOS:
         return False
-    black = near_black(seen)
-    error = error_without_variation(model, seen, nodes, black)
     scales = replace(nodes, spacing=max(edge, nodes.spacing)), nodes
-    coarse, fine = found = HeldOut(), HeldOut()
+    coarse, fine = yield from _held_out([(some, kind, model) for some in scales], model, seen)
+    return len(fine.cost) >= MIN_PHOTOS and fine.better(coarse, even=True, highlights=False)
+
+
+def _held_out(
+    candidates: Sequence[tuple[Nodes, str, NodeModel]], even: NodeModel, seen: Observations
+) -> Generator[float, None, list[HeldOut]]:
+    """The errors of held-out photos with each candidate; yields the fraction done. candidates:
+    (the nodes, at some spacing; what varies; model); even: of the material without variation."""
+    nodes, black = candidates[0][0], near_black(seen)
+    error = error_without_variation(even, seen, nodes, black)
+    found = [HeldOut() for _ in candidates]
     folds = folds_of(seen.photo)
-    for done, fold in enumerate(folds, 1):
+    done, total = 0, len(folds) * len(candidates)
+    for fold in folds:
         fitted, held, _ = divided_photos(seen, fold, nodes)
-        for some, errors in zip(scales, found, strict=True):
+        for (some, kind, model), errors in zip(candidates, found, strict=True):
             theta = some.estimate(model, fitted, kind)
             errors.add_photos(held, error, log_errors(model, held, nodes, theta, black))
-        yield done / len(folds)
-    return len(fine.cost) >= MIN_PHOTOS and fine.better(coarse, even=True, highlights=False)
+            done += 1
+            yield done / total
+    return found
 
 
 def folds_of(photo: NDArray[np.integer]) -> list[NDArray[np.integer]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,16 +30,19 @@ class MaterialNodes:
     model: NodeModel
     parameters: NDArray[np.float32]
 
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(_places(self.nodes.points, self.nodes.normals, self.nodes.spacing))
+
     def at(self, points: NDArray[np.float64], normals: NDArray[np.floating]) -> NDArray[np.float32]:
         """(m, 8) parameters at points (m, 3) with normals (m, 3), weighted by inverse distances to
         the nearest nodes of the same side of the surface."""
         unit = self.nodes.spacing
-        tree = cKDTree(_places(self.nodes.points, self.nodes.normals, unit))
         out = np.empty((len(points), self.parameters.shape[1]), np.float32)
         nearest = min(NEAREST, len(self.parameters))
         for begin in range(0, len(points), CHUNK):
             part = slice(begin, begin + CHUNK)
-            away, node = tree.query(_places(points[part], normals[part], unit), nearest)
+            away, node = self._tree.query(_places(points[part], normals[part], unit), nearest)
             away, node = away.reshape(-1, nearest), node.reshape(-1, nearest)
             weight = 1 / (away + MIN_DISTANCE)
             weight /= weight.sum(axis=1, keepdims=True)

@@ -1,8 +1,8 @@
 """Effects hidden in real photographs: photometric-stereo sets and samples under a phone's flash.
 
 The honest captures state what their sources state; the owl's lights are those that the grey sphere
-of the same set shows. With an effect, photos are changed in linear
-radiance and written anew with the depth that they had, or the capture file states something wrong.
+of the same set shows. With an effect, photos are changed in linear radiance and written anew with
+the depth that they had, or the capture file states something wrong.
 """
 
 from __future__ import annotations
@@ -209,7 +209,7 @@ def _uw(source: Path, name: str) -> RealSet:
     if name == "grey_sphere":
         directions = np.loadtxt(source / "lights_chrome_mine.txt").reshape(-1, 3)
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    else:  # the stated ones are off by up to 4.6°, as the grey sphere under the same lights shows
+    else:  # the stated ones are off by up to 5°, as the grey sphere under the same lights shows
         grey = photometric_stereo.read(source / "data" / "gray", "gray")
         directions = photometric_stereo.sphere_lights(*grey)
 
