@@ -7,7 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from tools.package import load_patina
+# Tests that call functions outside a job, which would limit BLAS itself: its threads wait for one
+# another in a loop, and take the cores from other tests. Set before NumPy is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from tools.package import load_patina  # noqa: E402
 
 load_patina()
 
