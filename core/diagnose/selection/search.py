@@ -132,12 +132,22 @@ def _tried(
     wanted: list[Effect | Evidence] = [*spots, *supported]
     trials = list(ordered_map(pool, trial_of, wanted, ahead=2))
     found, trials = trials[: len(spots)], trials[len(spots) :]
-    best = best_of(trials)
-    if best is None or best.gain < MIN_CONFIRMED * supported[0].trial.gain:
+    best = best_of(_confirmed(trials, supported))
+    if best is None:
         return [*found, *trials]
     ties = best.ties
     best = try_rebuilt(now, without, best, context) if len(supported) == 1 else best
     return [*found, replace(try_with_rays(now, without, best, context), ties=ties)]
+
+
+def _confirmed(trials: Sequence[Trial], steps: Sequence[Evidence]) -> list[Trial]:
+    """The joint fits with enough evidence, that gain what their steps promise. steps: of the same
+    effects."""
+    return [
+        trial
+        for trial, step in zip(trials, steps, strict=True)
+        if has_sufficient_evidence(trial) and trial.gain > MIN_CONFIRMED * step.trial.gain
+    ]
 
 
 def _spots_and_plateaus(

@@ -1,0 +1,35 @@
+"""The museum's bronze: its flash stands above and beside the lens, and the capture says at it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.slow
+
+from patina.core.capture import read_capture  # noqa: E402
+from patina.core.jobs import FitJob, finished  # noqa: E402
+from patina.core.jobs.diagnose_job import DiagnoseJob  # noqa: E402
+from patina.core.jobs.select_photos import select_photos  # noqa: E402
+from tools import real_captures  # noqa: E402
+
+EVERY = 2  # photos; half of them are enough, and take half of the time
+RIGHT, ABOVE = (0.0, 0.4), (0.5, 0.9)
+"""Scan units from the lens, by highlights on the bronze and by shadows (../shared/real.md)."""
+
+
+def test_the_flash_of_the_bronze_is_found(shared, tmp_path):
+    path = real_captures.rodin(shared / "data", tmp_path, chart=False, refine=False)
+    capture = read_capture(path)
+    capture = select_photos(capture, range(0, len(capture.photos), EVERY))
+    job = DiagnoseJob(FitJob(capture, portable=False))
+    job.drain()
+    found = finished(job.found)
+    assert found.causes[0] == "flash_offset", found.causes
+    assert not {"cast_shadow", "environment_reflection"} & set(found.causes)
+    trial = found.accepted[0]
+    right, down, _ = trial.identified
+    error = 2 * np.asarray(trial.standard_errors)
+    assert RIGHT[0] - error[0] < right < RIGHT[1] + error[0]
+    assert ABOVE[0] - error[1] < -down < ABOVE[1] + error[1]
+    assert found.error_after.photos < found.error_before.photos - 0.01
