@@ -11,7 +11,7 @@ import pytest
 # another in a loop, and take the cores from other tests. Set before NumPy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from tools.package import load_patina  # noqa: E402
+from tools.package import load_patina
 
 load_patina()
 
