@@ -9,13 +9,24 @@ import pytest
 
 from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.diagnose.nuisances.material_scale import MaterialScale
-from patina.core.diagnose.solver.gauss_newton import fit
+from patina.core.diagnose.solver.block_elimination import solve
+from patina.core.diagnose.solver.gauss_newton import fit, step_within_bounds
+from patina.core.diagnose.solver.jacobian import jacobian_of
 from patina.core.diagnose.solver.model import Model
+from patina.core.diagnose.solver.model_fit import ModelFit
+from patina.core.diagnose.solver.normal_equations import NormalEquations
 from patina.core.diagnose.solver.residual_scale import expected_deviation
 from patina.core.diagnose.solver.scaled_brdfs import scaled_brdfs, with_brdf
 from tests.make_lit_ball import GLOSSY, changed, lit_ball
 
 SCALE = 1.7  # ln
+DARK = 0.1  # brightness of a material
+
+
+class NarrowScale(MaterialScale):
+    @property
+    def parameters(self):
+        return replace(super().parameters, low=np.full(1, -0.3), high=np.full(1, 0.3))
 
 
 @pytest.fixture(scope="module")
@@ -71,3 +82,24 @@ def test_a_darker_material_is_explained_by_the_factor(context):
     with_factor = fit(start.with_effect(MaterialScale.of(darker)), deviation)
     assert with_factor.total_cost < without.total_cost
     assert with_factor.model.x[0][0] < -1
+
+
+def test_steps_just_inside_a_bound_are_those_at_the_bound(context):
+    """The coefficients follow the factor as far as it moves, and not as far as it would: a fit
+    would otherwise stop there, since each step costs more than it gains."""
+    darker = changed(context, DARK * context.pixels.observed)
+    darker = replace(darker, pixels=replace(darker.pixels, noise=DARK**2 * context.pixels.noise))
+    deviation = expected_deviation(darker.pixels, darker.brdfs, np.radians(0.3))
+    scale = NarrowScale.of(darker)
+    low = scale.parameters.low
+    start = fit(Model(darker.pixels, darker.brdfs).with_effect(scale, low), deviation, 2).model
+    at = ModelFit.of(start, deviation)
+    near = ModelFit.of(replace(start, x=(low + 1e-3,)), deviation)
+    everything = np.arange(len(near.residual))
+    unbounded = solve(NormalEquations.of(near, jacobian_of(near), everything), near)
+    assert unbounded.x[0] < -0.1
+    found, expected = step_within_bounds(near), step_within_bounds(at)
+    assert found.x == pytest.approx(-1e-3, abs=1e-9) and expected.x == pytest.approx(0.0)
+    size = np.abs(expected.coefficients).max()
+    assert found.coefficients == pytest.approx(expected.coefficients, abs=0.02 * size)
+    assert np.abs(unbounded.coefficients - expected.coefficients).max() > 0.1 * size

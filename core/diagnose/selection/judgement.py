@@ -27,8 +27,9 @@ DEFAULT_MIN_GAIN = 10.0
 looks like a tone curve; only lamps on the camera are insensitive to errors of the normals."""
 STRONG = 100.0  # a gain above this is accepted even if unrelated effects gain as well
 MIN_RATIOS = (3.5, 2.5)
-"""Standard errors of the gain over regions: of a weak gain, and of a strong or an unrivalled one,
-most of which may be in few regions."""
+"""Standard errors of the gain over regions: of a weak gain, and of one that is strong, unrivalled
+or of a spot, most of which may be in few regions."""
+SPOTS = ("cast_shadow", "clipping")  # effects on a small part of the photos
 UNRIVALLED = ("flash_offset",)  # nothing that a scan gets wrong looks like it
 RIVAL_FRACTION = 0.5  # of the best gain, at which an unrelated effect makes weak evidence doubtful
 SAME_EVIDENCE = 0.5  # overlap of gains above which two effects explain the same residual
@@ -72,14 +73,15 @@ def overlap(one: Evidence, other: Evidence) -> float:
 
 def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
     """The effects that are to be fitted jointly, best first; empty: none is convincing. The parts
-    of an effect are fitted too, each alone. evidence: best first."""
+    of an effect are fitted too, each alone. Weak evidence beside other weak evidence counts only
+    for an unrivalled effect. evidence: best first."""
     strong = [one for one in evidence if has_sufficient_evidence(one.trial)]
     strong = [one for one in strong if not _is_composed(one, evidence)]
     if not strong:
         return []
     weak = strong[0].trial.density < NAT * STRONG and strong[0].cause not in UNRIVALLED
     if weak and _has_rival(strong[0], strong):
-        return []
+        return [one for one in strong if one.cause in UNRIVALLED]
     close = [one for one in strong if one.trial.gain > CLOSE * strong[0].trial.gain]
     kept = [one for one in close if not any(_replaces(other, one) for other in close)]
     kept = kept[:MAX_CONTENDERS]
@@ -120,7 +122,7 @@ def _replaces(simple: Evidence, other: Evidence) -> bool:
 def has_sufficient_evidence(trial: Trial) -> bool:
     """Whether the gain of a step or a joint fit is large, also relative to its standard error."""
     enough = trial.density > min_gain(trial.effect.cause)
-    sure = trial.density > NAT * STRONG or trial.effect.cause in UNRIVALLED
+    sure = trial.density > NAT * STRONG or trial.effect.cause in (*UNRIVALLED, *SPOTS)
     return enough and trial.ratio > MIN_RATIOS[sure]
 
 

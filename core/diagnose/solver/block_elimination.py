@@ -91,11 +91,18 @@ def projected_squares(rows: Array, blocks: Array) -> Array:
     return row_gram(times_blocks(rows, np.linalg.cholesky(blocks)))
 
 
-def solve(equations: NormalEquations, fit: ModelFit, spread: bool = False) -> Step:
+def solve(
+    equations: NormalEquations,
+    fit: ModelFit,
+    spread: bool = False,
+    moves: Vector | None = None,
+) -> Step:
     """The step of the maximum a posteriori; parameters that a bound holds do not move. spread: with
-    the variances of the patches' parameters, which take longest."""
+    the variances of the patches' parameters, which take longest. moves: (p,) of global parameters
+    whose step is known, NaN where it is not; all others follow them."""
+    known = np.full(len(equations.own), np.nan) if moves is None else moves
     if len(equations.local):
-        return _solve_with_patches(equations, fit, spread)
+        return _solve_with_patches(equations, fit, spread, known)
     brdfs = fit.model.brdfs
     own = with_prior(equations, fit)
     right = equations.own_pull - fit.identified / _prior(fit) ** 2
@@ -104,17 +111,21 @@ def solve(equations: NormalEquations, fit: ModelFit, spread: bool = False) -> St
     eliminated = EliminatedBlocks.of(equations.blocks, brdfs.variance, columns)
     own = eliminated.schur_complement(own, equations.coupling, slice(0, -1))
     right = eliminated.schur_complement(right, equations.coupling, -1)
-    free = np.flatnonzero(~_held(fit, right))
+    held, moved = _held(fit, right), np.nan_to_num(known)
+    free = np.flatnonzero(~held & np.isnan(known))
     covariance = np.zeros_like(own)
     covariance[np.ix_(free, free)] = np.linalg.inv(own[np.ix_(free, free)])
-    x = covariance @ right
+    x = covariance @ (right - own @ moved) + moved
     change = np.stack([found[:, -1] - found[:, :-1] @ x for found in eliminated.solutions])
     none = np.zeros(0)
     return Step(change.reshape(brdfs.coefficients.shape), x, none, covariance, none)
 
 
-def _solve_with_patches(equations: NormalEquations, fit: ModelFit, spread: bool) -> Step:
-    """Patches are eliminated first: the remaining matrix is dense, but small."""
+def _solve_with_patches(
+    equations: NormalEquations, fit: ModelFit, spread: bool, moves: Vector
+) -> Step:
+    """Patches are eliminated first: the remaining matrix is dense, but small. moves: as of
+    ``solve``."""
     model = fit.model
     assert model.patch_place is not None
     parameters, y = model.effects[model.patch_place].parameters, model.x[model.patch_place]
@@ -131,12 +142,13 @@ def _solve_with_patches(equations: NormalEquations, fit: ModelFit, spread: bool)
     inverse = np.linalg.inv(patch_blocks(equations.local, parameters.deviation, held))
     dense -= projected_squares(side, inverse)
     right = right - side @ _blockwise(inverse, pull)
-    stuck = np.concatenate([np.zeros(size, bool), _held(fit, right[size:])])
+    stuck = np.concatenate([np.zeros(size, bool), _held(fit, right[size:]) | ~np.isnan(moves)])
     free = np.flatnonzero(~stuck)
-    known = np.concatenate([right[:, None], np.eye(size + p)[:, size:]], axis=1)
+    moved = np.concatenate([np.zeros(size), np.nan_to_num(moves)])
+    known = np.concatenate([(right - dense @ moved)[:, None], np.eye(size + p)[:, size:]], axis=1)
     solved = np.zeros((size + p, 1 + p))
     solved[free] = solve_positive(dense[np.ix_(free, free)], known[free])
-    z, covariance = solved[:, 0], solved[size:, 1:]
+    z, covariance = solved[:, 0] + moved, solved[size:, 1:]
     local = _blockwise(inverse, pull - side.T @ z)
     variance = np.zeros(0)
     if spread:

@@ -17,6 +17,7 @@ Array = NDArray[np.floating]
 
 MAX_STEPS, MAX_HALVINGS = 25, 5
 CONVERGED = 1e-4  # relative decrease of the cost
+MAX_BOUND_ROUNDS = 3  # in which further parameters are found to pass a bound
 
 
 def fit(model: Model, deviation: Array, steps: int = MAX_STEPS, longest: float = 1.0) -> ModelFit:
@@ -36,9 +37,7 @@ def fit(model: Model, deviation: Array, steps: int = MAX_STEPS, longest: float =
 def _stepped(now: ModelFit, longest: float) -> ModelFit:
     """One Gauss–Newton step, halved until the cost decreases, or doubled while it does; parameters
     stay within bounds."""
-    everything = np.arange(len(now.residual))
-    step = solve(NormalEquations.of(now, jacobian_of(now), everything), now)
-    length = 1.0
+    step, length = step_within_bounds(now), 1.0
     best = now
     for _ in range(MAX_HALVINGS):
         best = ModelFit.of(_moved(now.model, step, length), now.deviation)
@@ -52,6 +51,23 @@ def _stepped(now: ModelFit, longest: float) -> ModelFit:
             break
         best = farther
     return best
+
+
+def step_within_bounds(now: ModelFit) -> Step:
+    """The step in which global parameters that would pass a bound end at it. All others follow
+    them: the coefficients of a BRDF would otherwise compensate for a larger change."""
+    equations = NormalEquations.of(now, jacobian_of(now), np.arange(len(now.residual)))
+    step, x = solve(equations, now), now.parameters
+    low, high = now.joined(lambda n: n.low), now.joined(lambda n: n.high)
+    moves = np.full(len(x), np.nan)
+    for _ in range(MAX_BOUND_ROUNDS):
+        ends = np.clip(x + step.x, low, high)
+        beyond = np.isnan(moves) & (ends != x + step.x)
+        if not beyond.any():
+            break
+        moves[beyond] = (ends - x)[beyond]
+        step = solve(equations, now, moves=moves)
+    return step
 
 
 def _moved(model: Model, step: Step, length: float) -> Model:
