@@ -11,7 +11,14 @@ import pytest
 from patina.core.diagnose.effects.base.effect import Effect
 from patina.core.diagnose.effects.base.parameters import Parameters
 from patina.core.diagnose.selection.evidence import Evidence
-from patina.core.diagnose.selection.judgement import NAT, STRONG, best_of, contenders, min_gain
+from patina.core.diagnose.selection.judgement import (
+    NAT,
+    STRONG,
+    best_of,
+    confirmed,
+    contenders,
+    min_gain,
+)
 from patina.core.diagnose.selection.one_step import OneStep, joint_step
 from patina.core.diagnose.selection.trial import Trial
 from patina.core.statistics.student_t import robust_cost, robust_weights
@@ -119,6 +126,30 @@ def test_a_flash_elsewhere_is_always_fitted():
     both = residual_of(p0=2 * NAT * STRONG, p1=10 * min_gain("flash_offset"))
     found = ranked(evidence("light_intensity", [0], both), evidence("flash_offset", [1], both))
     assert causes(contenders(found)) == ["light_intensity", "flash_offset"]
+
+
+def test_weak_evidence_does_not_hide_a_flash_elsewhere():
+    both = residual_of(p0=2 * min_gain("vignetting"), p1=1.5 * min_gain("vignetting"))
+    found = ranked(evidence("vignetting", [0], both), evidence("flash_offset", [1], both))
+    assert causes(contenders(found)) == ["flash_offset"]
+
+
+def test_a_joint_fit_without_enough_evidence_does_not_hide_another():
+    """The larger gain is in few regions, and so hardly more than its standard error."""
+    gain = 5 * min_gain("vignetting") * 1000
+    few = np.zeros(REGIONS)
+    few[:6] = 2 * gain / 6
+    trials = [replace(_tried("subsurface", 1, 1.0), by_region=few), _tried("vignetting", 1, gain)]
+    steps = [evidence(trial.effect.cause, [0], NOISE) for trial in trials]
+    best = best_of(confirmed(trials, steps))
+    assert best is not None and best.effect.cause == "vignetting"
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.4, 0), (0.6, 1)])
+def test_a_joint_fit_gains_at_least_half_of_what_its_step_promises(share, kept):
+    step = evidence("vignetting", [0], residual_of(p0=20 * min_gain("vignetting")))
+    trial = replace(_tried("vignetting", 1, share * step.trial.gain), values=step.trial.values)
+    assert len(confirmed([trial], [step])) == kept
 
 
 def _tried(cause: str, count: int, gain: float) -> Trial:

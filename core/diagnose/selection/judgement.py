@@ -35,6 +35,7 @@ RIVAL_FRACTION = 0.5  # of the best gain, at which an unrelated effect makes wea
 SAME_EVIDENCE = 0.5  # overlap of gains above which two effects explain the same residual
 NEARLY_BEST = 0.93  # fraction of the best gain at which the simpler effect is preferred
 CLOSE, MAX_CONTENDERS = 0.75, 3  # fraction of the best gain at which an effect is fitted too
+MIN_CONFIRMED = 0.5  # of the gain of a step, that the joint fit has to reach
 TIE_STANDARD_ERRORS = 2.0  # difference of gains below which two effects are tied
 COMMONER: Mapping[str, str] = {"black_level": "ambient_light"}
 """Of two causes that are tied, the one that is met more often: a raw converter subtracts the black
@@ -88,6 +89,16 @@ def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
     also = {*UNRIVALLED, *(part for one in kept for part in PARTS.get(one.cause, ()))}
     also -= {one.cause for one in kept}
     return [*kept, *(one for one in strong if one.cause in also)]
+
+
+def confirmed(trials: Sequence[Trial], steps: Sequence[Evidence]) -> list[Trial]:
+    """The joint fits with enough evidence, that gain what their steps promise. steps: of the same
+    effects."""
+    return [
+        trial
+        for trial, step in zip(trials, steps, strict=True)
+        if has_sufficient_evidence(trial) and trial.gain > MIN_CONFIRMED * step.trial.gain
+    ]
 
 
 def best_of(trials: Sequence[Trial]) -> Trial | None:

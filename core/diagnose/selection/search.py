@@ -32,7 +32,7 @@ from .effect_trials import (
 )
 from .evidence import Evidence, evidence_for, has_one_step
 from .held_out_error import held_out_errors
-from .judgement import best_of, contenders, has_sufficient_evidence
+from .judgement import best_of, confirmed, contenders, has_sufficient_evidence
 from .one_step import ProjectedBaseline
 from .residual_structure import residual_structure
 from .scan_quality import ScanQuality
@@ -42,7 +42,6 @@ from .unusual_scan import unusual_causes, with_unusual_normals, with_unusual_pos
 MAX_ROUNDS = 3  # of effects that are accepted one after the other
 # fraction of the time at which the baseline is fitted, and at which each round starts
 BASELINE_DONE, ROUND_STARTS = 0.3, (0.3, 0.6, 0.8, 0.95)
-MIN_CONFIRMED = 0.5  # of the gain of a step, that the joint fit has to reach
 
 
 def search(
@@ -132,22 +131,12 @@ def _tried(
     wanted: list[Effect | Evidence] = [*spots, *supported]
     trials = list(ordered_map(pool, trial_of, wanted, ahead=2))
     found, trials = trials[: len(spots)], trials[len(spots) :]
-    best = best_of(_confirmed(trials, supported))
+    best = best_of(confirmed(trials, supported))
     if best is None:
         return [*found, *trials]
     ties = best.ties
     best = try_rebuilt(now, without, best, context) if len(supported) == 1 else best
     return [*found, replace(try_with_rays(now, without, best, context), ties=ties)]
-
-
-def _confirmed(trials: Sequence[Trial], steps: Sequence[Evidence]) -> list[Trial]:
-    """The joint fits with enough evidence, that gain what their steps promise. steps: of the same
-    effects."""
-    return [
-        trial
-        for trial, step in zip(trials, steps, strict=True)
-        if has_sufficient_evidence(trial) and trial.gain > MIN_CONFIRMED * step.trial.gain
-    ]
 
 
 def _spots_and_plateaus(
