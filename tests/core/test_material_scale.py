@@ -29,6 +29,12 @@ class NarrowScale(MaterialScale):
         return replace(super().parameters, low=np.full(1, -0.3), high=np.full(1, 0.3))
 
 
+def darkened(context):
+    """The same photos of a material that is DARK times as bright."""
+    darker = changed(context, DARK * context.pixels.observed)
+    return replace(darker, pixels=replace(darker.pixels, noise=DARK**2 * context.pixels.noise))
+
+
 @pytest.fixture(scope="module")
 def context():
     return lit_ball(5, GLOSSY)
@@ -73,9 +79,7 @@ def test_derivative_of_scaled_brdfs_is_that_of_their_reflectance(context, model)
 def test_a_darker_material_is_explained_by_the_factor(context):
     """A material of the basis, but a tenth as bright: with its own factor the fit costs less than
     without, and nothing but the factor and the BRDF is needed."""
-    darker = changed(context, 0.1 * context.pixels.observed)
-    noise = replace(darker.pixels, noise=0.01 * context.pixels.noise)
-    darker = replace(darker, pixels=noise)
+    darker = darkened(context)
     start = Model(darker.pixels, darker.brdfs)
     deviation = expected_deviation(darker.pixels, darker.brdfs, np.radians(0.3))
     without = fit(start, deviation)
@@ -87,8 +91,7 @@ def test_a_darker_material_is_explained_by_the_factor(context):
 def test_steps_just_inside_a_bound_are_those_at_the_bound(context):
     """The coefficients follow the factor as far as it moves, and not as far as it would: a fit
     would otherwise stop there, since each step costs more than it gains."""
-    darker = changed(context, DARK * context.pixels.observed)
-    darker = replace(darker, pixels=replace(darker.pixels, noise=DARK**2 * context.pixels.noise))
+    darker = darkened(context)
     deviation = expected_deviation(darker.pixels, darker.brdfs, np.radians(0.3))
     scale = NarrowScale.of(darker)
     low = scale.parameters.low

@@ -74,8 +74,8 @@ def overlap(one: Evidence, other: Evidence) -> float:
 
 def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
     """The effects that are to be fitted jointly, best first; empty: none is convincing. The parts
-    of an effect are fitted too, each alone. Weak evidence counts only for
-    an unrivalled effect where an unrelated effect has some too. evidence: best first."""
+    of an effect are fitted too, each alone. Where an unrelated effect
+    has evidence too, weak evidence counts only for an unrivalled one. evidence: best first."""
     strong = [one for one in evidence if has_sufficient_evidence(one.trial)]
     strong = [one for one in strong if not _is_composed(one, evidence)]
     if not strong:
