@@ -14,6 +14,7 @@ from ...varying.conversion import typical_samples
 from ...varying.labels import check_material_count
 from ...varying.node_model import COUNT
 from ...varying.observations import Observations
+from ...varying.rough_lobe import rough_lobe_variance
 from ...varying.varying_surface import (
     ALL_VARIATIONS,
     EVEN,
@@ -161,11 +162,11 @@ class VaryingJob(Job):
             if kinds[index].kind == EVEN or not len(seen):
                 continue
             step = Step("estimating the variation", CHOSEN + 0.05 + index * share)
-            fields = yield from final_fields(
-                nodes, model_of(material), seen, kinds[index].kind, step, share
-            )
+            model = model_of(material)
+            fields = yield from final_fields(nodes, model, seen, kinds[index].kind, step, share)
             rows = fine.rows(index)
             parameters[rows], variance[rows] = fields.parameters, fields.variance
+            variance[rows] += rough_lobe_variance(model, fields.parameters)
         return VaryingSurface(
             fine.grid,
             parameters,
