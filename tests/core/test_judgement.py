@@ -12,15 +12,13 @@ from patina.core.diagnose.effects.base.effect import Effect
 from patina.core.diagnose.effects.base.parameters import Parameters
 from patina.core.diagnose.selection.evidence import Evidence
 from patina.core.diagnose.selection.judgement import (
-    NAT,
-    STRONG,
     best_of,
     confirmed,
     contenders,
     min_gain,
 )
 from patina.core.diagnose.selection.one_step import OneStep, joint_step
-from patina.core.diagnose.selection.trial import Trial
+from patina.core.diagnose.selection.trial import STRONG_GAIN, Trial
 from patina.core.statistics.student_t import robust_cost, robust_weights
 
 PIXELS, REGIONS = 4000, 100
@@ -101,7 +99,7 @@ def test_weak_evidence_beside_an_unrelated_rival_names_nothing():
 
 
 def test_strong_evidence_is_found_beside_a_rival():
-    both = residual_of(p0=2 * NAT * STRONG, p1=1.4 * NAT * STRONG)
+    both = residual_of(p0=2 * STRONG_GAIN, p1=1.4 * STRONG_GAIN)
     found = ranked(evidence("vignetting", [0], both), evidence("subsurface", [1], both))
     assert causes(contenders(found)) == ["vignetting"]
 
@@ -123,7 +121,7 @@ def test_a_near_light_needs_more_than_its_parts_explain(own):
 
 def test_a_flash_elsewhere_is_always_fitted():
     """No error of a scan looks like it, so it is compared with what gains more in one step."""
-    both = residual_of(p0=2 * NAT * STRONG, p1=10 * min_gain("flash_offset"))
+    both = residual_of(p0=2 * STRONG_GAIN, p1=10 * min_gain("flash_offset"))
     found = ranked(evidence("light_intensity", [0], both), evidence("flash_offset", [1], both))
     assert causes(contenders(found)) == ["light_intensity", "flash_offset"]
 
@@ -132,6 +130,22 @@ def test_weak_evidence_does_not_hide_a_flash_elsewhere():
     both = residual_of(p0=2 * min_gain("vignetting"), p1=1.5 * min_gain("vignetting"))
     found = ranked(evidence("vignetting", [0], both), evidence("flash_offset", [1], both))
     assert causes(contenders(found)) == ["flash_offset"]
+
+
+def test_a_flash_that_a_tone_curve_imitates_is_not_fitted():
+    """The curve explains more, but less than flaked paints without a curve do."""
+    both = residual_of(p0=0.5 * min_gain("camera_response"), p1=2 * min_gain("flash_offset"))
+    found = ranked(evidence("camera_response", [0], both), evidence("flash_offset", [1], both))
+    assert contenders(found) == []
+
+
+@pytest.mark.parametrize(
+    ("gain", "accepted"), [(2 * STRONG_GAIN, True), (0.5 * STRONG_GAIN, False)]
+)
+def test_a_strong_gain_may_predict_a_few_highlights_worse(gain, accepted):
+    trial = replace(_tried("vignetting", 1, 1000 * gain), growth=1.05)
+    assert trial.is_accepted == accepted
+    assert not replace(trial, growth=1.2).is_accepted
 
 
 def test_a_joint_fit_without_enough_evidence_does_not_hide_another():

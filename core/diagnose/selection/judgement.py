@@ -25,7 +25,6 @@ MIN_GAINS: Mapping[str, float] = {
 DEFAULT_MIN_GAIN = 10.0
 """Of an effect that is accepted: above the largest gain in captures without it. A flaked paint
 looks like a tone curve; only lamps on the camera are insensitive to errors of the normals."""
-STRONG = 100.0  # a gain above this is accepted even if unrelated effects gain as well
 MIN_RATIOS = (3.5, 2.5)
 """Standard errors of the gain over regions: of a weak gain, and of one that is strong, unrivalled
 or of a spot, most of which may be in few regions."""
@@ -78,9 +77,10 @@ def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
     has evidence too, weak evidence counts only for an unrivalled one. evidence: best first."""
     strong = [one for one in evidence if has_sufficient_evidence(one.trial)]
     strong = [one for one in strong if not _is_composed(one, evidence)]
+    strong = [one for one in strong if not _is_imitation(one, evidence)]
     if not strong:
         return []
-    weak = strong[0].trial.density < NAT * STRONG and strong[0].cause not in UNRIVALLED
+    weak = not strong[0].trial.is_strong and strong[0].cause not in UNRIVALLED
     if weak and _has_rival(strong[0], strong):
         return [one for one in strong if one.cause in UNRIVALLED]
     close = [one for one in strong if one.trial.gain > CLOSE * strong[0].trial.gain]
@@ -133,8 +133,21 @@ def _replaces(simple: Evidence, other: Evidence) -> bool:
 def has_sufficient_evidence(trial: Trial) -> bool:
     """Whether the gain of a step or a joint fit is large, also relative to its standard error."""
     enough = trial.density > min_gain(trial.effect.cause)
-    sure = trial.density > NAT * STRONG or trial.effect.cause in (*UNRIVALLED, *SPOTS)
+    sure = trial.is_strong or trial.effect.cause in (*UNRIVALLED, *SPOTS)
     return enough and trial.ratio > MIN_RATIOS[sure]
+
+
+def _is_imitation(one: Evidence, evidence: Sequence[Evidence]) -> bool:
+    """Whether the evidence for an unrivalled effect may be that of an unrelated one that explains
+    more of the residual, but whose own evidence is not sufficient: a tone curve is not named where
+    a material could be the reason, and then neither is the flash that it looks like."""
+    return one.cause in UNRIVALLED and any(
+        other.trial.gain > one.trial.gain
+        and other.trial.ratio > MIN_RATIOS[1]
+        and not has_sufficient_evidence(other.trial)
+        and not related(other.cause, one.cause)
+        for other in evidence
+    )
 
 
 def _has_rival(best: Evidence, strong: Sequence[Evidence]) -> bool:

@@ -15,7 +15,10 @@ Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
 
 MIN_STANDARD_ERRORS = 2.5  # of the gain over regions, in a joint fit
-MAX_GROWTH = 1.03  # of the RMS error of held-out regions: outliers may hardly be predicted worse
+STRONG_GAIN = 0.1  # nats a pixel and channel: of effects that nobody would overlook
+MAX_GROWTH, MAX_GROWTH_IF_STRONG = 1.03, 1.1
+"""Of the RMS error of held-out regions. Outliers may hardly be predicted worse; where the gain is
+strong, a few pixels in highlights, which dominate the RMS error, do not outweigh all others."""
 HALF_WIDTH_95 = 1.96  # standard errors from the centre of a 95 % interval to its ends
 MODEL_ERROR_RATIO = 3.0
 """Errors of parameters in units of the standard error that curvature and jackknife give. These do
@@ -78,8 +81,13 @@ class Trial:
             and self.change > MIN_RELATIVE_CHANGE
             and self.effect.is_relevant(self.identified)
             and not self.contradicted_by
-            and self.growth < MAX_GROWTH
+            and self.growth < (MAX_GROWTH_IF_STRONG if self.is_strong else MAX_GROWTH)
         )
+
+    @property
+    def is_strong(self) -> bool:
+        """Whether the gain is so large that weak evidence for another effect does not matter."""
+        return self.density > STRONG_GAIN
 
     def sentence(self) -> str:
         """The effect in words, and the photos that would decide between it and its ties."""
