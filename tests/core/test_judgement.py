@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from patina.core.diagnose.effects.base.capabilities import ShownByBackground
 from patina.core.diagnose.effects.base.effect import Effect
 from patina.core.diagnose.effects.base.parameters import Parameters
 from patina.core.diagnose.selection.evidence import Evidence
@@ -130,6 +131,23 @@ def test_weak_evidence_does_not_hide_a_flash_elsewhere():
     both = residual_of(p0=2 * min_gain("vignetting"), p1=1.5 * min_gain("vignetting"))
     found = ranked(evidence("vignetting", [0], both), evidence("flash_offset", [1], both))
     assert causes(contenders(found)) == ["flash_offset"]
+
+
+@dataclass(frozen=True)
+class Shown(Pattern, ShownByBackground):
+    """An effect that the background shows, too."""
+
+    def is_shown(self, x) -> bool:
+        return True
+
+
+def test_the_background_decides_between_black_level_and_ambient_light():
+    black, ambient = _tried("black_level", 3, 100.0), _tried("ambient_light", 3, 100.01)
+    best = best_of([black, ambient])
+    assert best is not None and best.effect.cause == "ambient_light" and len(best.ties) == 1
+    shown = replace(black, effect=Shown("black_level", 3))
+    best = best_of([shown, ambient])
+    assert best is not None and best.effect.cause == "black_level" and not best.ties
 
 
 def test_a_flash_that_a_tone_curve_imitates_is_not_fitted():

@@ -18,6 +18,7 @@ from tools.field_hunt.make import MAKERS as FIELD_MAKERS  # noqa: E402
 from tools.hunt import judged, table  # noqa: E402
 from tools.hunt.judged import Row  # noqa: E402
 from tools.hunt.make import MAKERS  # noqa: E402
+from tools.hunt.scene import find_size  # noqa: E402
 
 ROW = Row("area_light", 0.01, 1, 0.01, ("area_light",), (), 5.0, 1.1, 0.3, (0.2,), (1.0, 1.0))
 
@@ -66,3 +67,13 @@ def test_table_counts_correct_causes():
     assert "**near_light**" in text and "**none**" in text
     assert "| parameters within their 95 % interval | 3 of 3 | |" in text
     assert "| rows computed by the current code" in text and "| 0 of 3 | |" in text
+
+
+@pytest.mark.parametrize("wanted", [0.03, 0.1, 0.15])
+def test_size_of_an_effect_that_sets_in_suddenly_is_found(wanted):
+    """A painted shadow changes nothing until it reaches the object."""
+
+    def change(size: float) -> float:
+        return 0.2 / (1 + np.exp(-25 * (size - 1.3)))
+
+    assert change(find_size(change, 0.3, wanted)) == pytest.approx(wanted, rel=0.1)

@@ -19,7 +19,7 @@ Array = np.ndarray
 
 IRRADIANCE = float(np.pi)
 TOLERANCE = 0.08  # relative error of the strength at which the search ends
-TRIES = 6
+TRIES = 12
 MAX_STRENGTH_ERROR = 0.15  # relative; above it the size is searched for a second time
 WHITE = 99.5  # percentile of a photo, including the black background
 
@@ -171,19 +171,24 @@ def find_size(
     """Return the size (at most ``most``) at which the photos change by ``wanted``.
 
     Assumes that the RMS change is proportional to a power of the size. ``power`` is its initial
-    exponent, which is updated from the last two evaluations.
+    exponent, which is updated from the last two evaluations. A size outside the interval that is
+    known to contain the solution is replaced by the middle of that interval.
     """
     size, last = start, None
+    low, high = 0.0, np.inf
     for _ in range(TRIES):
         found = max(rms_of(size), 1e-9)
         if abs(found / wanted - 1) < TOLERANCE or (size >= most and found < wanted):
             break
+        low, high = (size, high) if found < wanted else (low, size)
         if last is not None and abs(np.log(size / last[0])) > 0.02:
             exponent = np.log(found / last[1]) / np.log(size / last[0])
             power = float(np.clip(exponent, 0.4, 3.0))
         last = (size, found)
         size *= float(np.clip((wanted / found) ** (1 / power), 0.1, 10))
         size = min(size, most)
+        if low > 0 and not low < size < high:
+            size = float(np.sqrt(low * min(high, most)))
     return size
 
 

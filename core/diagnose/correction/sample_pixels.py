@@ -47,6 +47,7 @@ def pixels_of_samples(
         irradiance=table.irradiance, visible=np.ones(n, np.float32),
         edge=np.full(n, REACH, np.float32), curvature=table.curvature, observed=table.radiance,
         noise=np.full((n, 3), 1e-20, np.float32), slope=slope, veil=veil,
+        background=np.full((n, 3), np.nan, np.float32),
         turn=np.zeros((n, 2, 3), np.float32), step=np.zeros((n, 2, 3), np.float32),
         usable=np.ones(n, bool), block=np.zeros(n, np.int32),
     )  # fmt: skip

@@ -20,7 +20,8 @@ class Pixels:
     to the next edge of a shadow, at most REACH. curvature: (n,) 1/pixel, NaN unknown. observed: (n,
     3) radiance; noise: (n, 3) its variance by the photo's own noise. slope: (n, 2, 3) change of the
     observed radiance per pixel to the right and per pixel down; veil: (n, 2, 3) the photo under a
-    wide blur, and its mean. turn, step: (n, 2, 3) change of normal and point per pixel to the right
+    wide blur, and its mean; background: (n, 3) radiance of the photo's background, NaN where it
+    shows none. turn, step: (n, 2, 3) change of normal and point per pixel to the right
     and per pixel down. usable: (n,) not clipped. block: (n,) int32 number of the held-out region.
     """
 
@@ -41,6 +42,7 @@ class Pixels:
     noise: NDArray[np.float32]
     slope: NDArray[np.float32]
     veil: NDArray[np.float32]
+    background: NDArray[np.float32]
     turn: NDArray[np.float32]
     step: NDArray[np.float32]
     usable: NDArray[np.bool_]

@@ -34,6 +34,7 @@ from ...scan import Camera, Scan
 from ..forward.material_brdfs import MaterialBRDFs
 from ..forward.partial_visibility import partial_visibility
 from ..forward.pixels import Pixels
+from .background import background_radiance
 from .image_cells import cell_numbers, centred_coordinates
 from .refined_pixels import grid_step, on_grid, pixels_near_unexplained_shadows
 
@@ -120,7 +121,9 @@ def _of_photo(
     )
     more = rows[~np.isin(dense.pixel[rows], selected.pixel)]
     selected = Pixels.join([selected, dense.select(more)])
-    return _with_photo(_with_partial_visibility(selected, rays, light, camera), photo)
+    selected = _with_photo(_with_partial_visibility(selected, rays, light, camera), photo)
+    background = background_radiance(photo.radiance, rays.cover.columns(camera))
+    return replace(selected, background=np.tile(background, (len(selected), 1)))
 
 
 def _of_band(
@@ -177,6 +180,7 @@ def _of_band(
         noise=none,
         slope=np.zeros((n, 2, 3), np.float32),
         veil=np.zeros((n, 2, 3), np.float32),
+        background=none,
         turn=_steps(view, view.normal)[rows],
         step=_steps(view, view.point - rays.origin)[rows],
         usable=photo.usable.ravel().take(pixel),

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from ..effects.base.capabilities import ShownByBackground
 from .cross_validation import standard_error_of_sum
 from .evidence import Evidence
 from .one_step import joint_step
@@ -102,19 +103,28 @@ def confirmed(trials: Sequence[Trial], steps: Sequence[Evidence]) -> list[Trial]
 
 
 def best_of(trials: Sequence[Trial]) -> Trial | None:
-    """The simplest of the joint fits that gain nearly as much as the best, with its ties: many
-    light sources can imitate uniform ambient light, which is one. None: no trial is accepted."""
+    """Of the joint fits that gain nearly as much as the best, the one that the background of the
+    photos shows too; else the simplest, with its ties: many light sources can imitate uniform
+    ambient light, which is one. None: no trial is accepted."""
     accepted = [trial for trial in trials if trial.is_accepted]
     if not accepted:
         return None
     most = max(trial.gain for trial in accepted)
     nearly = [trial for trial in accepted if trial.gain > NEARLY_BEST * most]
+    shown = [trial for trial in nearly if _is_shown(trial)]
+    if shown:
+        return max(shown, key=lambda trial: trial.gain)
     best = min(nearly, key=lambda trial: (trial.effect.degrees_of_freedom, -trial.gain))
     tied = [trial for trial in accepted if trial is not best and _is_tie(trial, best)]
     commoner = [trial for trial in tied if COMMONER.get(best.effect.cause) == trial.effect.cause]
     if commoner:
         tied, best = [*(t for t in tied if t is not commoner[0]), best], commoner[0]
     return replace(best, ties=tuple(trial.effect for trial in tied))
+
+
+def _is_shown(trial: Trial) -> bool:
+    """Whether the background of the photos shows the effect too."""
+    return isinstance(trial.effect, ShownByBackground) and trial.effect.is_shown(trial.x)
 
 
 def _is_composed(one: Evidence, evidence: Sequence[Evidence]) -> bool:

@@ -54,5 +54,13 @@ class AffectsHighlightsOnly(Effect, ABC):
     """Changes nothing but highlights: the change it makes is measured up to their peak."""
 
 
+class ShownByBackground(Effect, ABC):
+    """Changes the background of the photos too, which other effects do not."""
+
+    @abstractmethod
+    def is_shown(self, x: Vector) -> bool:
+        """Whether the background of every photo is what the parameters x predict."""
+
+
 class JudgedByPixel(Effect, ABC):
     """Confined to few regions of the photos: held-out pixels judge it, not held-out regions."""
