@@ -18,6 +18,9 @@ UNREADABLE_NPZ = (
 )
 
 
+MAX_WORD = 250  # characters of a name that a message quotes: one line of a terminal, or two
+
+
 class PatinaError(Exception):
     """An error that a user can resolve; its message is one line, shown without traceback."""
 
@@ -38,13 +41,18 @@ class InputError(PatinaError):
         line: int | None = None,
     ) -> None:
         self.file, self.key, self.line = file, key, line
-        self.detail = " ".join(
-            message.split()
-        )  # without the prefix, for callers that add their own
+        # without the prefix, for callers that add their own
+        self.detail = " ".join(_shortened(word) for word in message.split())
         where = "" if file is None else str(file) if line is None else f"{file}:{line}"
         head = ": ".join(part for part in (where, key and f"[{key}]") if part)
-        super().__init__(" ".join(f"{head}: {message}".split()) if head else message)
+        super().__init__(" ".join(f"{head}: {self.detail}".split()) if head else self.detail)
 
 
 class FitError(PatinaError):
     """The samples do not support a fit (too few, all masked, none lit …)."""
+
+
+def _shortened(word: str) -> str:
+    """Both ends of a long word, such as a name from a damaged file."""
+    half = MAX_WORD // 2
+    return word if len(word) <= MAX_WORD else f"{word[:half]}…{word[-half:]}"
