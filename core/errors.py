@@ -18,7 +18,7 @@ UNREADABLE_NPZ = (
 )
 
 
-MAX_WORD = 250  # characters of a name that a message quotes: one line of a terminal, or two
+MAX_WORD = 320  # characters of a quoted name; paths that callers have shortened are not longer
 
 
 class PatinaError(Exception):

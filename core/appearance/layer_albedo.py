@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating]
 
 NODES = 16
+F0_OF_GLASS = 0.04  # reflectance at normal incidence of IOR 1.5
 SQUARE = 64  # points per side of the square from which visible normals are sampled
 
 

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 
 from .closeness import FitObjective
 from .cube_root import COARSE, NODES, Evaluate
-from .layer_albedo import ior_from_f0
+from .layer_albedo import F0_OF_GLASS, ior_from_f0
 from .principled import MIN_ROUGHNESS, Principled
 
 Array = NDArray[np.floating]
@@ -23,7 +23,6 @@ METALLIC, PINNED = 3, 1e-3  # index of the unknown; half the interval when it is
 COAT_GAIN = 0.97  # a coat must reduce the error below this fraction of that without
 COAT_FROM = 0.003  # no coat is tried where the error is smaller
 TINT_GAIN = 0.97  # a specular tint must reduce the error below this fraction of that without
-F0_OF_GLASS = 0.04  # reflectance at normal incidence of IOR 1.5
 MAX_F0_BY_LEVEL = 2 * F0_OF_GLASS  # largest reflectance that the specular level can set
 
 # unknowns: base colour (square root: perceptually even steps), metallic, roughness,

@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..appearance.layer_albedo import F0_OF_GLASS
 from .node_model import COUNT, DIFFUSE, NodeModel
 
-F0_OF_GLASS = 0.04  # reflectance at normal incidence of IOR 1.5
 ROUGH_LOBE_ALBEDO = F0_OF_GLASS / 4
 """Standard error of a diffuse albedo from a lobe that looks diffuse."""
 MIN_ALBEDO = 1e-3  # of a node, to limit its relative error

@@ -70,8 +70,9 @@ def test_cause_is_kept_when_only_joint_fit_improves():
     """A wide lamp: the joint fit is far better, although the corrected samples alone give a worse
     fit.
     """
-    for much in (0.12, 0.15):  # the second one is worse by more than the joint fit is better
-        reason = evidence_against(with_errors(0.1), again(much), jointly=-0.2)
+    # the last one is worse by more than the joint fit is better
+    for error, jointly in ((0.12, -1.0), (0.12, -0.2), (0.15, -0.2)):
+        reason = evidence_against(with_errors(0.1), again(error), jointly=jointly)
         assert reason is not None and not reason.of_cause
     assert evidence_against(with_errors(0.1), again(0.12)).of_cause
 

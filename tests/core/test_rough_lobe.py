@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from patina.core.appearance.layer_albedo import F0_OF_GLASS
 from patina.core.varying.node_model import COUNT, DIFFUSE, NodeModel
-from patina.core.varying.rough_lobe import F0_OF_GLASS, ROUGH_LOBE_ALBEDO, rough_lobe_variance
+from patina.core.varying.rough_lobe import ROUGH_LOBE_ALBEDO, rough_lobe_variance
 from patina.core.varying.split import EVERYTHING
 
 BODY = np.array([0.1, 0.02, 0.01], np.float32)  # 1/sr

@@ -104,7 +104,8 @@ def _of_photo(
     lines = PixelRays.of(camera)
     step = grid_step(camera.width, camera.height)
     parts, grid = [], []
-    for window in bands(camera, REACH + OUTLINE, rays.cover.columns(camera)):
+    columns = rays.cover.columns(camera)
+    for window in bands(camera, REACH + OUTLINE, columns):
         part = _of_band(capture, scan, rays, light, place, lines, photo, masks, window)
         parts.append(_thinned(part, count))
         grid.append(part.select(on_grid(part.pixel, camera.width, step)))
@@ -121,9 +122,7 @@ def _of_photo(
     )
     more = rows[~np.isin(dense.pixel[rows], selected.pixel)]
     selected = Pixels.join([selected, dense.select(more)])
-    selected = _with_photo(_with_partial_visibility(selected, rays, light, camera), photo)
-    background = background_radiance(photo.radiance, rays.cover.columns(camera))
-    return replace(selected, background=np.tile(background, (len(selected), 1)))
+    return _with_photo(_with_partial_visibility(selected, rays, light, camera), photo, columns)
 
 
 def _of_band(
@@ -203,9 +202,9 @@ def _thinned(pixels: Pixels, count: int) -> Pixels:
     return pixels.select(selected)
 
 
-def _with_photo(pixels: Pixels, photo: LitPhoto) -> Pixels:
-    """The pixels with observed radiance, noise, gradient and veil of the photo, and with the
-    numbers of their held-out regions."""
+def _with_photo(pixels: Pixels, photo: LitPhoto, columns: NDArray[np.integer]) -> Pixels:
+    """The pixels with observed radiance, noise, gradient, veil and background of the photo, and
+    with the numbers of their held-out regions. columns: that may show the mesh, as of Cover."""
     flat = photo.radiance.reshape(-1, 3)
     seen = flat.take(pixels.pixel, axis=0)
     assert photo.noise is not None
@@ -216,6 +215,7 @@ def _with_photo(pixels: Pixels, photo: LitPhoto) -> Pixels:
         noise=np.maximum(variance, np.float32(1e-20)),
         slope=photo_slopes(photo.radiance, pixels.pixel),
         veil=photo_veil(photo.radiance, pixels.pixel),
+        background=np.tile(background_radiance(photo.radiance, columns), (len(pixels), 1)),
         block=cell_numbers(pixels.photo, pixels.x, pixels.y, BLOCKS),
     )
 

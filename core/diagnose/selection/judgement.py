@@ -76,9 +76,13 @@ def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
     """The effects that are to be fitted jointly, best first; empty: none is convincing. The parts
     of an effect are fitted too, each alone. Where an unrelated effect
     has evidence too, weak evidence counts only for an unrivalled one. evidence: best first."""
-    strong = [one for one in evidence if has_sufficient_evidence(one.trial)]
-    strong = [one for one in strong if not _is_composed(one, evidence)]
-    strong = [one for one in strong if not _is_imitation(one, evidence)]
+    strong = [
+        one
+        for one in evidence
+        if has_sufficient_evidence(one.trial)
+        and not _is_composed(one, evidence)
+        and not _is_imitation(one, evidence)
+    ]
     if not strong:
         return []
     weak = not strong[0].trial.is_strong and strong[0].cause not in UNRIVALLED

@@ -15,7 +15,9 @@ Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
 
 MIN_STANDARD_ERRORS = 2.5  # of the gain over regions, in a joint fit
-STRONG_GAIN = 0.1  # nats a pixel and channel: of effects that nobody would overlook
+STRONG_GAIN = (
+    0.1  # nats a pixel and channel, which weak evidence for another effect does not outweigh
+)
 MAX_GROWTH, MAX_GROWTH_IF_STRONG = 1.03, 1.1
 """Of the RMS error of held-out regions. Outliers may hardly be predicted worse; where the gain is
 strong, a few pixels in highlights, which dominate the RMS error, do not outweigh all others."""

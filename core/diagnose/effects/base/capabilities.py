@@ -55,7 +55,7 @@ class AffectsHighlightsOnly(Effect, ABC):
 
 
 class ShownByBackground(Effect, ABC):
-    """Changes the background of the photos too, which other effects do not."""
+    """Predicts the background of the photos too, where the object is not."""
 
     @abstractmethod
     def is_shown(self, x: Vector) -> bool:
