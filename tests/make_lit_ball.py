@@ -52,7 +52,7 @@ def lit_ball(seed: int = 0, material: int = SHARP) -> DiagnosisContext:
                 edge=np.full(n, 8, np.float32), curvature=np.zeros(n, np.float32),
                 observed=vector, noise=vector, slope=np.zeros((n, 2, 3), np.float32),
                 veil=np.zeros((n, 2, 3), np.float32),
-                background=np.full((n, 3), np.nan, np.float32),
+                background=np.full((n, 3, 3), np.nan, np.float32),
                 turn=np.zeros((n, 2, 3), np.float32), step=np.zeros((n, 2, 3), np.float32),
                 usable=np.ones(n, bool),
                 block=(36 * photo + 6 * (x > 0) + 3 * (y > 0)

@@ -1,4 +1,4 @@
-"""Run `diagnose` on real photographs and on the demo."""
+"""Run `diagnose` on real photographs, on the demo, and on eight photos of one megapixel."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import tempfile
 import time
 from pathlib import Path
 
+from .bench_speed_scene import make_capture
 from .common import ROOT
 
+MEGAPIXELS, TRIANGLES = 1.0, 100_000  # of the capture whose time counts
 DEMO = ROOT / "assets" / "demo" / "demo.capture.toml"
 
 
@@ -23,6 +25,7 @@ def run(data: Path) -> None:
                 data, folder, chart=False, refine=False
             ),
             "demo": DEMO,
+            "8 photos of 1 MP, 100,000 faces": make_capture(folder / "fast", MEGAPIXELS, TRIANGLES),
         }
         print(
             "| capture | named | error on held-out regions, before → after | on held-out photos | "

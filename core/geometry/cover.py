@@ -1,8 +1,8 @@
 """The part of a photo that can show the mesh; no rays are cast elsewhere.
 
-The mesh is enclosed in cells of a coarse lattice. A cell is convex, so a pinhole camera sees it
-within the rectangle around its projected corners. A lens with distortion bends the edges of the
-cell, by much less than the size of the rectangle.
+The mesh is enclosed in cells of a coarse lattice. A cell is convex, so a pinhole or orthographic
+camera sees it within the rectangle around its projected corners. A lens with distortion bends the
+edges of the cell, by much less than the size of the rectangle.
 """
 
 from __future__ import annotations
@@ -66,10 +66,12 @@ class Cover:
         of a photo; equal where no column can."""
         blocks = -(-camera.height // ROWS)
         everywhere = np.tile(np.array([[0, camera.width]], np.int32), (blocks, 1))
-        if camera.panoramic or camera.orthographic:
+        if camera.panoramic:
             return everywhere
-        ahead = self.points @ camera.pose.rotation[2] + camera.pose.translation[2] > 0
-        corners = self.corners[ahead[self.corners].any(axis=1)]
+        corners = self.corners
+        if not camera.orthographic:
+            ahead = self.points @ camera.pose.rotation[2] + camera.pose.translation[2] > 0
+            corners = corners[ahead[corners].any(axis=1)]
         pixels = camera.project(self.points)
         if not np.isfinite(
             pixels[corners]

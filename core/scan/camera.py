@@ -74,11 +74,12 @@ class Camera:
         return bool(lens.is_undistorted()) and square
 
     def project(self, points: Array) -> Array:
-        """Pixels (n, 2) of world points (n, 3); NaN behind the camera."""
+        """Pixels (n, 2) of world points (n, 3); NaN behind the camera. Nothing is behind an
+        orthographic camera: its rays start in front of the whole object."""
         in_camera = points @ self.pose.rotation.T + self.pose.translation
         pixels = np.full((len(points), 2), np.nan)
         front = in_camera[:, 2] > 0
-        if self.panoramic:
+        if self.panoramic or self.orthographic:
             front = np.ones(len(points), bool)
         if front.any():
             pixels[front] = self.lens.img_from_cam(np.ascontiguousarray(in_camera[front]))

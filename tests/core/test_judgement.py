@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from patina.core.diagnose.effects.base.capabilities import ShownByBackground
 from patina.core.diagnose.effects.base.effect import Effect
 from patina.core.diagnose.effects.base.parameters import Parameters
+from patina.core.diagnose.effects.base.shown_by_background import ShownByBackground
 from patina.core.diagnose.selection.evidence import Evidence
 from patina.core.diagnose.selection.judgement import (
     best_of,
@@ -137,17 +137,41 @@ def test_weak_evidence_does_not_hide_a_flash_elsewhere():
 class Shown(Pattern, ShownByBackground):
     """An effect that the background shows, too."""
 
+    def in_background(self, x):
+        raise NotImplementedError
+
     def is_shown(self, x) -> bool:
         return True
+
+
+def shown(one: Evidence | Trial, count: int):
+    """The same evidence or joint fit, of an effect that the background shows."""
+    trial = one if isinstance(one, Trial) else one.trial
+    trial = replace(trial, effect=Shown(trial.effect.cause, count))
+    return trial if isinstance(one, Trial) else replace(one, trial=trial)
+
+
+def test_weak_evidence_that_the_background_shows_is_found_beside_a_rival():
+    both = residual_of(p0=2 * min_gain("black_level"), p1=2.2 * min_gain("vignetting"))
+    black, rival = evidence("black_level", [0], both), evidence("vignetting", [1], both)
+    assert contenders(ranked(black, rival)) == []
+    assert causes(contenders(ranked(shown(black, 1), rival))) == ["black_level"]
 
 
 def test_the_background_decides_between_black_level_and_ambient_light():
     black, ambient = _tried("black_level", 3, 100.0), _tried("ambient_light", 3, 100.01)
     best = best_of([black, ambient])
     assert best is not None and best.effect.cause == "ambient_light" and len(best.ties) == 1
-    shown = replace(black, effect=Shown("black_level", 3))
-    best = best_of([shown, ambient])
+    best = best_of([shown(black, 3), ambient])
     assert best is not None and best.effect.cause == "black_level" and not best.ties
+    much = _tried("ambient_light", 3, 150.0)
+    best = best_of([shown(black, 3), much])
+    assert best is not None and best.effect.cause == "ambient_light"
+
+
+def test_an_effect_that_the_background_shows_may_change_the_object_little():
+    small = replace(_tried("black_level", 3, 100.0), change=0.003)
+    assert not small.is_accepted and shown(small, 3).is_accepted
 
 
 def test_a_flash_that_a_tone_curve_imitates_is_not_fitted():

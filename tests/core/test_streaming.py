@@ -150,6 +150,20 @@ def test_skipped_columns_contain_no_hit(away: float) -> None:
         assert not (seen & ~may).any()
 
 
+@pytest.mark.parametrize("plane", [-3.0, 0.0, 3.0])
+def test_orthographic_camera_skips_columns_and_sees_what_is_behind_its_plane(plane: float) -> None:
+    rays = RayScene.build(rough_ball())
+    rotation, _ = next(iter(made.poses(6)))
+    pose = Pose(rotation, -rotation @ made.CENTRE + (0, 0, plane))
+    lens = {"model": "ORTHOGRAPHIC", "parameters": (30.0, 30.0, 90.0, 80.0)}
+    camera = replace(lens_with_distortion(200), pose=pose, **lens)
+    seen = view_window(rays, PixelRays.of(camera), whole(camera)).seen
+    may = np.zeros_like(seen)
+    for block, (first, last) in enumerate(rays.cover.columns(camera)):
+        may[16 * block : 16 * block + 16, first:last] = True
+    assert seen.any() and not (seen & ~may).any() and may.mean() < 0.6
+
+
 def test_widening_equals_repeated_dilation() -> None:
     edge = np.random.default_rng(0).random((40, 50)) < 0.01
     for pixels in range(6):

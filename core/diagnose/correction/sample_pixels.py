@@ -16,7 +16,8 @@ from ...scan import Scan
 from ..forward.diagnosis_context import NearestPixels
 from ..forward.pixels import Pixels
 from ..pixels.image_cells import centred_coordinates, separated_positions
-from ..pixels.pixel_selection import REACH, photo_slopes, photo_veil
+from ..pixels.neighbourhood import Veil, photo_slopes
+from ..pixels.pixel_selection import REACH
 
 SIDE = 0.02  # of the object's size: weight of a difference of normals in the distance
 
@@ -40,14 +41,14 @@ def pixels_of_samples(
         if read:
             radiance = photos.read(place).radiance
             slope[rows] = photo_slopes(radiance, pixel)
-            veil[rows] = photo_veil(radiance, pixel)
+            veil[rows] = Veil.of(radiance).at(*np.divmod(pixel, radiance.shape[1]))
     return Pixels(
         photo=table.photo, material=np.full(n, material, np.int16), pixel=table.pixel, x=x, y=y,
         point=table.point, normal=table.normal, view=table.view, light=table.light,
         irradiance=table.irradiance, visible=np.ones(n, np.float32),
         edge=np.full(n, REACH, np.float32), curvature=table.curvature, observed=table.radiance,
         noise=np.full((n, 3), 1e-20, np.float32), slope=slope, veil=veil,
-        background=np.full((n, 3), np.nan, np.float32),
+        background=np.full((n, 3, 3), np.nan, np.float32),
         turn=np.zeros((n, 2, 3), np.float32), step=np.zeros((n, 2, 3), np.float32),
         usable=np.ones(n, bool), block=np.zeros(n, np.int32),
     )  # fmt: skip

@@ -8,23 +8,21 @@ import numpy as np
 
 from ..forward.diagnosis_context import DiagnosisContext, NearestPixels
 from ..forward.shading_state import ShadingState
-from .base.capabilities import ShownByBackground
 from .base.effect import Array
 from .base.image_formation import CameraEffect
 from .base.parameters import Parameters
+from .base.shown_by_background import TOLERANCE, ShownByBackground, known_backgrounds
 
 WHITE = 99.0  # percentile of the photos' radiance that counts as white
 PRIOR_SCALE, BOUND = 0.02, 0.3  # of white: standard deviation of the prior, and bound
 MIN_BOUND = 1e-3  # of white, less than which no photo shows
-TOLERANCE = 0.25  # relative: of the background, which compression and noise change
 CHANNELS = ("red", "green", "blue")
 
 
 @dataclass(frozen=True)
 class BlackLevel(CameraEffect, ShownByBackground):
     """Parameters: the constant for red, green and blue, as a fraction of ``white``, a radiance.
-    background: (k, 3) radiance of the background of each photo that shows one. As every pixel has
-    the constant, none is darker."""
+    As every pixel has the constant, no background is darker."""
 
     white: float
     background: Array
@@ -34,9 +32,7 @@ class BlackLevel(CameraEffect, ShownByBackground):
     @classmethod
     def of(cls, context: DiagnosisContext) -> BlackLevel:
         white = max(float(np.percentile(context.pixels.observed, WHITE)), 1e-9)
-        _, first = np.unique(context.pixels.photo, return_index=True)
-        background = context.pixels.background[first]
-        return cls(white, background[np.isfinite(background).all(axis=1)])
+        return cls(white, known_backgrounds(context))
 
     def at_pixels(self, context: DiagnosisContext, nearest: NearestPixels) -> BlackLevel:
         return self
@@ -46,14 +42,11 @@ class BlackLevel(CameraEffect, ShownByBackground):
         every = Parameters.alike(CHANNELS, "of white", PRIOR_SCALE, -BOUND, BOUND)
         if not len(self.background):
             return every
-        darkest = (1 + TOLERANCE) * self.background.min(axis=0) / self.white
+        darkest = (1 + TOLERANCE) * self.background[:, 0].min(axis=0) / self.white
         return replace(every, high=np.clip(darkest, MIN_BOUND, BOUND))
 
-    def is_shown(self, x: np.ndarray) -> bool:
-        level = self.white * float(np.mean(x))
-        if level <= 0 or not len(self.background):
-            return False
-        return bool(np.all(np.abs(self.background.mean(axis=1) / level - 1) < TOLERANCE))
+    def in_background(self, x: np.ndarray) -> Array:
+        return np.tile(self.white * x, (len(self.background), 1))
 
     def recorded(self, radiance: Array, state: ShadingState, x: np.ndarray) -> Array:
         return radiance + (self.white * x).astype(np.float32)

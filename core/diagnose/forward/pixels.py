@@ -20,9 +20,10 @@ class Pixels:
     to the next edge of a shadow, at most REACH. curvature: (n,) 1/pixel, NaN unknown. observed: (n,
     3) radiance; noise: (n, 3) its variance by the photo's own noise. slope: (n, 2, 3) change of the
     observed radiance per pixel to the right and per pixel down; veil: (n, 2, 3) the photo under a
-    wide blur, and its mean; background: (n, 3) radiance of the photo's background, NaN where it
-    shows none. turn, step: (n, 2, 3) change of normal and point per pixel to the right
-    and per pixel down. usable: (n,) not clipped. block: (n,) int32 number of the held-out region.
+    wide blur, and its mean; background: (n, 3, 3) radiance, veil (2, 3) of the photo's dark
+    background, NaN where it shows none. turn, step: (n, 2, 3) change of normal and point per pixel
+    to the right and per pixel down. usable: (n,) not clipped. block: (n,) int32 number of the
+    held-out region.
     """
 
     photo: NDArray[np.int16]

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, gaussian_filter
+from scipy.ndimage import distance_transform_edt
 
 from ...angles import half_difference
 from ...angles.vectors import dot
@@ -34,8 +34,9 @@ from ...scan import Camera, Scan
 from ..forward.material_brdfs import MaterialBRDFs
 from ..forward.partial_visibility import partial_visibility
 from ..forward.pixels import Pixels
-from .background import background_radiance
+from .background import dark_background
 from .image_cells import cell_numbers, centred_coordinates
+from .neighbourhood import Veil, photo_slopes
 from .refined_pixels import grid_step, on_grid, pixels_near_unexplained_shadows
 
 Array = NDArray[np.float32]
@@ -49,9 +50,6 @@ BLOCKS = 6  # held-out regions along the longer side of the image of the object
 PENUMBRA = 1.5  # pixels from the edge of a shadow that may be partially lit
 OUTLINE = 2  # pixels from an outline that may show another surface
 MIN_COS_O = 0.15  # beyond 81° a pixel covers too much surface
-VEIL = 0.2  # standard deviation of the wide blur, fraction of the diagonal
-STENCIL = np.array([-2, -1, 0, 1, 2])  # pixels, for the derivative of a Gaussian
-WIDTH = 1.0  # pixels, standard deviation of that Gaussian
 
 
 def select_pixels(
@@ -179,7 +177,7 @@ def _of_band(
         noise=none,
         slope=np.zeros((n, 2, 3), np.float32),
         veil=np.zeros((n, 2, 3), np.float32),
-        background=none,
+        background=np.zeros((n, 3, 3), np.float32),
         turn=_steps(view, view.normal)[rows],
         step=_steps(view, view.point - rays.origin)[rows],
         usable=photo.usable.ravel().take(pixel),
@@ -209,13 +207,15 @@ def _with_photo(pixels: Pixels, photo: LitPhoto, columns: NDArray[np.integer]) -
     seen = flat.take(pixels.pixel, axis=0)
     assert photo.noise is not None
     variance = photo.noise.at(pixels.pixel, seen)
+    veil = Veil.of(photo.radiance)
+    background = dark_background(photo.radiance, columns, veil)
     return replace(
         pixels,
         observed=seen,
         noise=np.maximum(variance, np.float32(1e-20)),
         slope=photo_slopes(photo.radiance, pixels.pixel),
-        veil=photo_veil(photo.radiance, pixels.pixel),
-        background=np.tile(background_radiance(photo.radiance, columns), (len(pixels), 1)),
+        veil=veil.at(*np.divmod(pixels.pixel, photo.radiance.shape[1])),
+        background=np.tile(background, (len(pixels), 1, 1)),
         block=cell_numbers(pixels.photo, pixels.x, pixels.y, BLOCKS),
     )
 
@@ -241,47 +241,3 @@ def _steps(view: SurfaceView, values: NDArray[np.floating]) -> Array:
     out[:, 1:-1, 0] = 0.5 * (image[:, 2:] - image[:, :-2])
     out[1:-1, :, 1] = 0.5 * (image[2:] - image[:-2])
     return np.nan_to_num(view.at(out.reshape(*out.shape[:2], 6))).reshape(-1, 2, 3)
-
-
-def photo_slopes(radiance: Array, pixel: NDArray[np.int32]) -> Array:
-    """(n, 2, 3) derivatives to the right and down of a photo (h, w, 3) under a narrow Gaussian, per
-    pixel. pixel: (n,) flat indices."""
-    height, width = radiance.shape[:2]
-    flat = radiance.reshape(-1, 3)
-    row, column = np.divmod(pixel, width)
-    bell = np.exp(-0.5 * (STENCIL / WIDTH) ** 2)
-    bell /= bell.sum()
-    rise = STENCIL * bell
-    rise /= np.sum(rise * STENCIL)
-    out = np.zeros((len(pixel), 2, 3), np.float32)
-    for i, down in enumerate(STENCIL):
-        for j, right in enumerate(STENCIL):
-            at = np.clip(row + down, 0, height - 1) * width + np.clip(column + right, 0, width - 1)
-            value = flat.take(at, axis=0)
-            out[:, 0] += np.float32(bell[i] * rise[j]) * value
-            out[:, 1] += np.float32(rise[i] * bell[j]) * value
-    return out
-
-
-def photo_veil(radiance: Array, pixel: NDArray[np.int32]) -> Array:
-    """(n, 2, 3) a photo (h, w, 3) under a wide blur, and its mean. pixel: (n,) flat indices."""
-    height, width = radiance.shape[:2]
-    step = max(1, max(height, width) // 128)
-    small = np.stack([_shrunk(radiance[..., c], step) for c in range(3)], axis=-1)
-    blur = VEIL * float(np.hypot(small.shape[0], small.shape[1]))
-    small = np.stack(
-        [gaussian_filter(small[..., c], blur, mode="constant") for c in range(3)], axis=-1
-    )
-    row, column = np.divmod(pixel, width)
-    at = np.minimum(row // step, len(small) - 1), np.minimum(column // step, small.shape[1] - 1)
-    even = np.broadcast_to(radiance.mean(axis=(0, 1)), (len(pixel), 3))
-    return np.stack([small[at], even], axis=1).astype(np.float32)
-
-
-def _shrunk(channel: Array, step: int) -> Array:
-    """Means of a channel (h, w) over squares of ``step`` × ``step`` pixels."""
-    height, width = (side // step * step for side in channel.shape)
-    if step == 1:
-        return channel
-    cut = channel[:height, :width]
-    return np.asarray(cut.reshape(height // step, step, width // step, step).mean(axis=(1, 3)))

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from ..effects.base.capabilities import ShownByBackground
 from .cross_validation import standard_error_of_sum
 from .evidence import Evidence
 from .one_step import joint_step
@@ -27,8 +26,8 @@ DEFAULT_MIN_GAIN = 10.0
 """Of an effect that is accepted: above the largest gain in captures without it. A flaked paint
 looks like a tone curve; only lamps on the camera are insensitive to errors of the normals."""
 MIN_RATIOS = (3.5, 2.5)
-"""Standard errors of the gain over regions: of a weak gain, and of one that is strong, unrivalled
-or of a spot, most of which may be in few regions."""
+"""Standard errors of the gain over regions: of a weak gain, and of one that is strong, unrivalled,
+shown by the background too, or of a spot, most of which may be in few regions."""
 SPOTS = ("cast_shadow", "clipping")  # effects on a small part of the photos
 UNRIVALLED = ("flash_offset",)  # nothing that a scan gets wrong looks like it
 RIVAL_FRACTION = 0.5  # of the best gain, at which an unrelated effect makes weak evidence doubtful
@@ -75,7 +74,8 @@ def overlap(one: Evidence, other: Evidence) -> float:
 def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
     """The effects that are to be fitted jointly, best first; empty: none is convincing. The parts
     of an effect are fitted too, each alone. Where an unrelated effect
-    has evidence too, weak evidence counts only for an unrivalled one. evidence: best first."""
+    has evidence too, weak evidence counts only for an unrivalled one, and for one that the
+    background of the photos shows and its cousins. evidence: best first."""
     strong = [
         one
         for one in evidence
@@ -87,11 +87,19 @@ def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
         return []
     weak = not strong[0].trial.is_strong and strong[0].cause not in UNRIVALLED
     if weak and _has_rival(strong[0], strong):
-        return [one for one in strong if one.cause in UNRIVALLED]
+        shown = [one.cause for one in strong if one.trial.is_shown]
+        strong = [
+            one
+            for one in strong
+            if one.cause in UNRIVALLED or any(related(one.cause, other) for other in shown)
+        ]
+        if not strong:
+            return []
     close = [one for one in strong if one.trial.gain > CLOSE * strong[0].trial.gain]
     kept = [one for one in close if not any(_replaces(other, one) for other in close)]
     kept = kept[:MAX_CONTENDERS]
-    also = {*UNRIVALLED, *(part for one in kept for part in PARTS.get(one.cause, ()))}
+    shown = [one.cause for one in strong if one.trial.is_shown]
+    also = {*UNRIVALLED, *shown, *(part for one in kept for part in PARTS.get(one.cause, ()))}
     also -= {one.cause for one in kept}
     return [*kept, *(one for one in strong if one.cause in also)]
 
@@ -107,28 +115,23 @@ def confirmed(trials: Sequence[Trial], steps: Sequence[Evidence]) -> list[Trial]
 
 
 def best_of(trials: Sequence[Trial]) -> Trial | None:
-    """Of the joint fits that gain nearly as much as the best, the one that the background of the
-    photos shows too; else the simplest, with its ties: many light sources can imitate uniform
-    ambient light, which is one. None: no trial is accepted."""
+    """Of the joint fits that come close to the best, the one that the background of the photos
+    shows too; else the simplest that gains nearly as much, with its ties: many light sources can
+    imitate uniform ambient light, which is one. None: no trial is accepted."""
     accepted = [trial for trial in trials if trial.is_accepted]
     if not accepted:
         return None
     most = max(trial.gain for trial in accepted)
-    nearly = [trial for trial in accepted if trial.gain > NEARLY_BEST * most]
-    shown = [trial for trial in nearly if _is_shown(trial)]
+    shown = [trial for trial in accepted if trial.is_shown and trial.gain > CLOSE * most]
     if shown:
         return max(shown, key=lambda trial: trial.gain)
+    nearly = [trial for trial in accepted if trial.gain > NEARLY_BEST * most]
     best = min(nearly, key=lambda trial: (trial.effect.degrees_of_freedom, -trial.gain))
     tied = [trial for trial in accepted if trial is not best and _is_tie(trial, best)]
     commoner = [trial for trial in tied if COMMONER.get(best.effect.cause) == trial.effect.cause]
     if commoner:
         tied, best = [*(t for t in tied if t is not commoner[0]), best], commoner[0]
     return replace(best, ties=tuple(trial.effect for trial in tied))
-
-
-def _is_shown(trial: Trial) -> bool:
-    """Whether the background of the photos shows the effect too."""
-    return isinstance(trial.effect, ShownByBackground) and trial.effect.is_shown(trial.x)
 
 
 def _is_composed(one: Evidence, evidence: Sequence[Evidence]) -> bool:
@@ -147,7 +150,7 @@ def _replaces(simple: Evidence, other: Evidence) -> bool:
 def has_sufficient_evidence(trial: Trial) -> bool:
     """Whether the gain of a step or a joint fit is large, also relative to its standard error."""
     enough = trial.density > min_gain(trial.effect.cause)
-    sure = trial.is_strong or trial.effect.cause in (*UNRIVALLED, *SPOTS)
+    sure = trial.is_strong or trial.is_shown or trial.effect.cause in (*UNRIVALLED, *SPOTS)
     return enough and trial.ratio > MIN_RATIOS[sure]
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects.base.effect import Effect
+from ..effects.base.shown_by_background import ShownByBackground
 from ..solver.model_fit import ModelFit
 from .cross_validation import standard_error_of_sum
 
@@ -80,11 +81,16 @@ class Trial:
         reported, and contradicted by no material."""
         return (
             self.ratio > MIN_STANDARD_ERRORS
-            and self.change > MIN_RELATIVE_CHANGE
+            and (self.change > MIN_RELATIVE_CHANGE or self.is_shown)
             and self.effect.is_relevant(self.identified)
             and not self.contradicted_by
             and self.growth < (MAX_GROWTH_IF_STRONG if self.is_strong else MAX_GROWTH)
         )
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether the background of the photos shows the effect too."""
+        return isinstance(self.effect, ShownByBackground) and self.effect.is_shown(self.x)
 
     @property
     def is_strong(self) -> bool:

@@ -54,13 +54,5 @@ class AffectsHighlightsOnly(Effect, ABC):
     """Changes nothing but highlights: the change it makes is measured up to their peak."""
 
 
-class ShownByBackground(Effect, ABC):
-    """Predicts the background of the photos too, where the object is not."""
-
-    @abstractmethod
-    def is_shown(self, x: Vector) -> bool:
-        """Whether the background of every photo is what the parameters x predict."""
-
-
 class JudgedByPixel(Effect, ABC):
     """Confined to few regions of the photos: held-out pixels judge it, not held-out regions."""
