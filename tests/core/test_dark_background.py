@@ -70,6 +70,12 @@ def test_a_photo_that_is_cut_out_or_full_has_no_background(columns):
     assert np.isnan(found_in(photo([0.0] * 3), columns)).all()
 
 
+def test_zeros_in_a_background_that_is_not_cut_out_are_black():
+    image = photo(LEVEL)
+    image[: HEIGHT // 3, 80:] = 0
+    assert found_in(image, MESH)[0] == pytest.approx([0, 0, 0])
+
+
 def test_no_pixel_is_darker_than_the_black_level():
     found = BlackLevel.of(with_background(LEVEL, 2 * LEVEL))
     assert found.parameters.high * found.white == pytest.approx((1 + TOLERANCE) * LEVEL)

@@ -33,7 +33,8 @@ def tone(scene: Scene) -> Hidden:
 
 def clipping(scene: Scene) -> Hidden:
     """Highlights are clipped at an unknown level."""
-    low, high = 0.02, 1.0
+    high = max(float(photo.max()) for photo in scene.plain)
+    low = 1e-3 * high
     for _ in range(20):
         level = (low * high) ** 0.5
         stronger = rms(camera_faults.clipped(scene.plain, level), scene.plain) > scene.strength
