@@ -11,6 +11,8 @@ from .scene import Hidden, Scene, find_size, rms
 
 Array = np.ndarray
 
+MIN_CLIPPING = 1e-4  # of the brightest value: below white in photos with a mirror-like highlight
+
 
 def _sized(name: str, apply: Callable[[list[Array], float], list[Array]], start: float):  # type: ignore[no-untyped-def]
     def made(scene: Scene) -> Hidden:
@@ -33,8 +35,7 @@ def tone(scene: Scene) -> Hidden:
 
 def clipping(scene: Scene) -> Hidden:
     """Highlights are clipped at an unknown level."""
-    high = max(float(photo.max()) for photo in scene.plain)
-    low = 1e-3 * high
+    low, high = MIN_CLIPPING, 1.0
     for _ in range(20):
         level = (low * high) ** 0.5
         stronger = rms(camera_faults.clipped(scene.plain, level), scene.plain) > scene.strength
