@@ -19,7 +19,13 @@ from scipy.optimize import lsq_linear
 from ...statistics.student_t import robust_cost, robust_weights
 from ..effects.base.effect import Effect
 from ..effects.base.parameters import Parameters
-from ..solver.block_elimination import dense_matrix, patch_blocks, projected_squares, times_blocks
+from ..solver.block_elimination import (
+    dense_matrix,
+    inverse_of_blocks,
+    patch_blocks,
+    projected_squares,
+    times_blocks,
+)
 from ..solver.jacobian import Jacobian, effect_derivatives, jacobian_of
 from ..solver.model_fit import ModelFit
 from ..solver.normal_equations import NormalEquations
@@ -60,8 +66,8 @@ class ProjectedBaseline:
             assert model.patch_place is not None
             deviation = model.effects[model.patch_place].parameters.deviation
             free = np.zeros(len(deviation), bool)
-            inverse = np.linalg.inv(patch_blocks(equations.local, deviation, free))
-            matrix -= projected_squares(side, inverse)
+            inverse, roots = inverse_of_blocks(patch_blocks(equations.local, deviation, free))
+            matrix -= projected_squares(side, roots)
         weight = robust_weights(fit.residual)
         return cls(fit, jacobian, weight, inverse, side, np.linalg.inv(matrix))
 

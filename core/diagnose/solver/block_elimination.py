@@ -20,6 +20,8 @@ from .normal_equations import NormalEquations
 Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
 
+ROUNDING = 1e-6  # relative, of sums of products of 32-bit numbers
+
 
 @dataclass(frozen=True)
 class Step:
@@ -84,11 +86,23 @@ def times_blocks(rows: Array, blocks: Array) -> Array:
     return np.asarray(each.transpose(1, 0, 2).reshape(len(rows), -1))
 
 
-def projected_squares(rows: Array, blocks: Array) -> Array:
-    """(r, r) rows · blocks · rowsᵀ for rows (r, P · e) and symmetric positive definite blocks
-    (P, e, e). By their roots, since a product of a matrix with its own transpose takes half the
-    time."""
-    return row_gram(times_blocks(rows, np.linalg.cholesky(blocks)))
+def projected_squares(rows: Array, roots: Array) -> Array:
+    """(r, r) rows · blocks · rowsᵀ for rows (r, P · e) and the roots (P, e, e) of blocks: a product
+    of a matrix with its own transpose takes half the time."""
+    return row_gram(times_blocks(rows, roots))
+
+
+def inverse_of_blocks(blocks: Array) -> tuple[Array, Array]:
+    """(inverse (P, e, e) of symmetric positive definite blocks, and its roots R: inverse = R · Rᵀ).
+    The roots come from those of the blocks: the inverse of a block with a pixel that decides
+    nearly all is not positive definite after rounding. Neither may the block be, which a larger
+    diagonal mends."""
+    try:
+        lower = np.linalg.cholesky(blocks)
+    except np.linalg.LinAlgError:
+        lower = np.linalg.cholesky(blocks * (1 + ROUNDING * np.eye(blocks.shape[1])))
+    roots = np.linalg.inv(lower).transpose(0, 2, 1)
+    return roots @ roots.transpose(0, 2, 1), roots
 
 
 def solve(
@@ -139,8 +153,9 @@ def _solve_with_patches(
     pull = equations.local_pull.ravel() - y / parameters.deviation**2
     held = _at_bound(y, pull, parameters)
     side, pull = np.where(held, 0, side), np.where(held, 0, pull)
-    inverse = np.linalg.inv(patch_blocks(equations.local, parameters.deviation, held))
-    dense -= projected_squares(side, inverse)
+    blocks = patch_blocks(equations.local, parameters.deviation, held)
+    inverse, roots = inverse_of_blocks(blocks)
+    dense -= projected_squares(side, roots)
     right = right - side @ _blockwise(inverse, pull)
     stuck = np.concatenate([np.zeros(size, bool), _held(fit, right[size:]) | ~np.isnan(moves)])
     free = np.flatnonzero(~stuck)
