@@ -68,10 +68,7 @@ class Cover:
         everywhere = np.tile(np.array([[0, camera.width]], np.int32), (blocks, 1))
         if camera.panoramic:
             return everywhere
-        corners = self.corners
-        if not camera.orthographic:
-            ahead = self.points @ camera.pose.rotation[2] + camera.pose.translation[2] > 0
-            corners = corners[ahead[corners].any(axis=1)]
+        corners = self.corners[camera.in_front(self.points)[self.corners].any(axis=1)]
         pixels = camera.project(self.points)
         if not np.isfinite(
             pixels[corners]

@@ -73,14 +73,18 @@ class Camera:
         square = abs(lens.focal_length_x / lens.focal_length_y - 1.0) < 1e-7
         return bool(lens.is_undistorted()) and square
 
+    def in_front(self, points: Array) -> NDArray[np.bool_]:
+        """(n,) whether world points (n, 3) are in front of the camera. Nothing is behind an
+        orthographic one: its rays start in front of the whole object."""
+        if self.panoramic or self.orthographic:
+            return np.ones(len(points), bool)
+        return np.asarray(points @ self.pose.rotation[2] + self.pose.translation[2] > 0)
+
     def project(self, points: Array) -> Array:
-        """Pixels (n, 2) of world points (n, 3); NaN behind the camera. Nothing is behind an
-        orthographic camera: its rays start in front of the whole object."""
+        """Pixels (n, 2) of world points (n, 3); NaN behind the camera."""
         in_camera = points @ self.pose.rotation.T + self.pose.translation
         pixels = np.full((len(points), 2), np.nan)
-        front = in_camera[:, 2] > 0
-        if self.panoramic or self.orthographic:
-            front = np.ones(len(points), bool)
+        front = self.in_front(points)
         if front.any():
             pixels[front] = self.lens.img_from_cam(np.ascontiguousarray(in_camera[front]))
             # a distortion polynomial can fold points far outside back into the photo

@@ -73,9 +73,9 @@ def overlap(one: Evidence, other: Evidence) -> float:
 
 def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
     """The effects that are to be fitted jointly, best first; empty: none is convincing. The parts
-    of an effect are fitted too, each alone. Where an unrelated effect
-    has evidence too, weak evidence counts only for an unrivalled one, and for one that the
-    background of the photos shows and its cousins. evidence: best first."""
+    of an effect are fitted too, each alone. Where an unrelated effect has evidence too, weak
+    evidence counts only for an unrivalled one, and for one that the background of the photos shows
+    and those that imitate it. evidence: best first."""
     strong = [
         one
         for one in evidence
@@ -85,9 +85,9 @@ def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
     ]
     if not strong:
         return []
+    shown = [one.cause for one in strong if one.trial.is_shown]
     weak = not strong[0].trial.is_strong and strong[0].cause not in UNRIVALLED
     if weak and _has_rival(strong[0], strong):
-        shown = [one.cause for one in strong if one.trial.is_shown]
         strong = [
             one
             for one in strong
@@ -98,7 +98,6 @@ def contenders(evidence: Sequence[Evidence]) -> list[Evidence]:
     close = [one for one in strong if one.trial.gain > CLOSE * strong[0].trial.gain]
     kept = [one for one in close if not any(_replaces(other, one) for other in close)]
     kept = kept[:MAX_CONTENDERS]
-    shown = [one.cause for one in strong if one.trial.is_shown]
     also = {*UNRIVALLED, *shown, *(part for one in kept for part in PARTS.get(one.cause, ()))}
     also -= {one.cause for one in kept}
     return [*kept, *(one for one in strong if one.cause in also)]
