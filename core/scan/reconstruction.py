@@ -11,6 +11,7 @@ from ..errors import InputError
 from .camera import Camera, Pose
 
 Array = NDArray[np.float64]
+SMALLEST_SCALE = float(np.finfo(np.float64).tiny)  # below, numbers lose digits
 
 
 @dataclass(frozen=True)
@@ -28,11 +29,15 @@ class Similarity:
         matrix = np.asarray(matrix, np.float64)
         if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
             raise ValueError("not a 4 × 4 matrix of finite numbers")
-        determinant = float(np.linalg.det(matrix[:3, :3]))
+        largest = float(np.abs(matrix[:3, :3]).max())
+        if largest < SMALLEST_SCALE:
+            raise ValueError(f"its largest coefficient is {largest:g}")
+        rows = matrix[:3, :3] / largest  # products of these neither overflow nor lose all digits
+        determinant = float(rows[0] @ np.cross(rows[1], rows[2]))
         if determinant <= 0:
-            raise ValueError(f"its determinant is {determinant:g}; expected a positive value")
-        scale = determinant ** (1 / 3)
-        rotation = matrix[:3, :3] / scale
+            raise ValueError("its determinant is not positive")
+        length = determinant ** (1 / 3)
+        rotation, scale = rows / length, largest * length
         if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4):
             raise ValueError("its axes are not perpendicular with equal lengths")
         if not np.allclose(matrix[3], (0, 0, 0, 1), atol=1e-9):

@@ -94,6 +94,7 @@ NUMBER = re.compile(rb"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 @example(place=0.05, odd="0", many=True)
 @example(place=0.3, odd="1e308", many=True)
 @example(place=0.3, odd="1e-320", many=True)
+@example(place=0.1015625, odd="1e-320", many=False)
 @example(place=0.0, odd="-1", many=True)
 @example(place=0.0, odd="1e12", many=True)
 @fuzz
