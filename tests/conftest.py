@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 # Tests that call functions outside a job, which would limit BLAS itself: its threads wait for one
 # another in a loop, and take the cores from other tests. Set before NumPy is imported.
@@ -14,6 +15,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from tools.package import load_patina
 
 load_patina()
+
+# The same examples in every run of a commit; --hypothesis-profile=random looks for new ones.
+settings.register_profile("fixed", derandomize=True, database=None)
+settings.register_profile("random", derandomize=False)
+settings.load_profile("fixed")
 
 ROOT = Path(__file__).resolve().parent.parent
 

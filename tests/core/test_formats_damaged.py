@@ -16,9 +16,7 @@ from patina.core.errors import InputError
 from patina.core.scan.reconstruction import Reconstruction
 from tests.damaged_formats import JSONS, NAMES, check_sound, damaged, read, write_all
 
-fuzz = settings(
-    max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), derandomize=False
-)
+fuzz = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
 
 
 @pytest.fixture(scope="module")
