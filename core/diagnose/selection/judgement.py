@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from .composed_effects import PARTS
 from .cross_validation import standard_error_of_sum
 from .evidence import Evidence
 from .one_step import joint_step
@@ -39,8 +40,6 @@ TIE_STANDARD_ERRORS = 2.0  # difference of gains below which two effects are tie
 COMMONER: Mapping[str, str] = {"black_level": "ambient_light"}
 """Of two causes that are tied, the one that is met more often: a raw converter subtracts the black
 level, but few rooms are black."""
-PARTS: Mapping[str, Sequence[str]] = {"near_light": ("light_direction", "light_intensity")}
-"""Effects that are a part of another: only what else it explains is evidence for it."""
 ALL_OF_IT = 0.9  # fraction of a gain that counts as all of it
 FAMILIES = (
     ("ambient_light", "environment_reflection", "veiling_glare", "black_level", "subsurface",

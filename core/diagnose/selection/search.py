@@ -21,6 +21,7 @@ from ..effects.clipping import Clipping
 from ..forward.diagnosis_context import DiagnosisContext
 from ..solver.model_fit import ModelFit
 from .baseline import fit_baseline
+from .composed_effects import with_parts_replaced, without_parts
 from .cross_validation import parameter_variances_by_photo
 from .diagnosis import MIN_GAIN_FRACTION, Diagnosis
 from .effect_trials import (
@@ -79,7 +80,7 @@ def search(
             break
         best = max(found, key=lambda trial: trial.gain)
         assert best.fitted is not None
-        accepted.append(best)
+        accepted = with_parts_replaced(accepted, best)
         now = best.fitted
         without = held_out_predictions(now)
         remaining = [e for e in remaining if e.cause != best.effect.cause]
@@ -125,8 +126,9 @@ def _tried(
     def trial_of(one: Effect | Evidence) -> Trial:
         if isinstance(one, Effect):
             return try_effect(now, without, one)
-        trial = try_effect(now, without, one.step.effect, one.trial.p_value)
-        return try_rebuilt(now, without, trial, context) if len(supported) > 1 else trial
+        start = without_parts(now, one.cause)
+        trial = try_effect(start, without, one.step.effect, one.trial.p_value)
+        return try_rebuilt(start, without, trial, context) if len(supported) > 1 else trial
 
     wanted: list[Effect | Evidence] = [*spots, *supported]
     trials = list(ordered_map(pool, trial_of, wanted, ahead=2))
@@ -134,9 +136,9 @@ def _tried(
     best = best_of(confirmed(trials, supported))
     if best is None:
         return [*found, *trials]
-    ties = best.ties
-    best = try_rebuilt(now, without, best, context) if len(supported) == 1 else best
-    return [*found, replace(try_with_rays(now, without, best, context), ties=ties)]
+    ties, start = best.ties, without_parts(now, best.effect.cause)
+    best = try_rebuilt(start, without, best, context) if len(supported) == 1 else best
+    return [*found, replace(try_with_rays(start, without, best, context), ties=ties)]
 
 
 def _spots_and_plateaus(
