@@ -40,7 +40,8 @@ from .core.jobs.check_job import CheckJob
 from .core.jobs.exported_result import exported_result
 from .core.jobs.photo_prediction import PhotoPrediction, predict_one, prediction_inputs
 from .core.jobs.select_photos import photo_indices, select_photos
-from .core.jobs.varying.varying_job import MODES, VaryingJob
+from .core.jobs.varying.variation_estimator import MODES
+from .core.jobs.varying.varying_job import VaryingJob
 from .core.output_folder import check_out, staged_folder
 from .core.predict.errors import PhotoErrors
 from .core.report import diagnosis_json, result_json, write_report

@@ -12,10 +12,11 @@ from ..core.diagnose.effects.actions import ACTIONS
 from ..core.diagnose.selection.diagnosis import Diagnosis
 from ..core.jobs import FitJob, finished
 from ..core.jobs.check_job import CheckJob
+from ..core.jobs.varying_second_fit import VaryingSecondFit
 from ..core.output_folder import check_out, staged_folder
 from ..core.report import diagnosis, diagnosis_json
 from . import capture_arguments
-from .fit import print_summary, write_results
+from .fit import add_varying, print_summary, write_results
 from .progress import Progress
 from .solve import check_threads
 
@@ -33,20 +34,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=[kind.cause for kind in EFFECTS],
         help="causes that the second fit ignores even if they are accepted: %(choices)s",
     )
+    add_varying(parser)
 
 
 def run(arguments: argparse.Namespace) -> None:
     check_threads(arguments.threads)
-    diagnose_to_folder(arguments.capture, arguments.out, arguments.threads, arguments.without)
+    diagnose_to_folder(
+        arguments.capture, arguments.out, arguments.threads, arguments.without, arguments.varying
+    )
 
 
 def diagnose_to_folder(
-    capture_file: Path, out: Path, threads: int | None = None, without: Sequence[str] = ()
+    capture_file: Path,
+    out: Path,
+    threads: int | None = None,
+    without: Sequence[str] = (),
+    varying: str = "never",
 ) -> None:
     """Diagnose a capture. Write diagnosis.json, report/ and the files of a fit to ``out``; the
-    report of the second fit is in report/materials. Raises PatinaError."""
+    report of the second fit is in report/materials. varying: one of MODES. Raises PatinaError."""
     out = check_out(out)
-    job = CheckJob(FitJob(read_capture(capture_file), threads=threads), without=without)
+    check = CheckJob(FitJob(read_capture(capture_file), threads=threads), without=without)
+    job = check if varying == "never" else VaryingSecondFit(check, varying)
     progress = Progress(share=0.9)
     job.drain(progress)
     progress.share = 1.0

@@ -14,7 +14,8 @@ from ..core.concurrency.job import Step, peak_memory
 from ..core.fit.fit_quality import FitQuality
 from ..core.fit.measured_result import MeasuredResult
 from ..core.jobs import CaptureResult, FitJob, Stage, finished
-from ..core.jobs.varying.varying_job import MODES, VaryingJob
+from ..core.jobs.varying.variation_estimator import MODES
+from ..core.jobs.varying.varying_job import VaryingJob
 from ..core.output_folder import check_out, staged_folder
 from ..core.report import result_json, write_report
 from ..core.report.figures import reach
@@ -31,6 +32,11 @@ HELP = "fit every material of a capture and write the results"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     capture_arguments.add_arguments(parser, "the results")
+    add_varying(parser)
+
+
+def add_varying(parser: argparse.ArgumentParser) -> None:
+    """Add the option that ``fit`` and ``diagnose`` share."""
     parser.add_argument(
         "--varying", choices=MODES, default="never",
         help="estimate how colour, gloss and normals vary over the surface: if held-out photos "

@@ -13,6 +13,7 @@ from ..core.diagnose.selection.effect_subset import correctable_effects
 from ..core.jobs import CaptureResult
 from ..core.jobs.check_job import CheckJob
 from ..core.jobs.refit_job import RefitJob
+from ..core.jobs.varying_second_fit import VaryingSecondFit
 from ..core.report.diagnosis_json import describe
 from ..scene.material.prepared_materials import PreparedJob
 from ..scene.session.last_diagnosis import keep_check, kept_check
@@ -22,7 +23,6 @@ from ..scene.session.scene_properties import (
     RESULT,
     capture_path,
     store_result,
-    stored_result,
 )
 from ..scene.views.evidence import paint_evidence
 from ..scene.views.evidence_overlay import toggle_evidence
@@ -46,8 +46,7 @@ the causes, and fit again with these causes included in the model"""
 
     def _start(self, context: bpy.types.Context) -> None:
         keep_check(None)  # the samples of two checks would need too much memory
-        self._varied = _varies(context.scene)
-        self._job = PreparedJob(CheckJob(fit_job(self, context.scene)))
+        self._job = PreparedJob(_varying(CheckJob(fit_job(self, context.scene)), context.scene))
         self._inputs = inputs_now(context.scene)
         self._scene = context.scene.name
 
@@ -89,8 +88,6 @@ the causes, and fit again with these causes included in the model"""
             self.report({"WARNING"}, f"{cause_label(trial.effect.cause)}: {found.sentence(trial)}")
         if not found.causes:
             self.report({"INFO"}, "No known cause found.")
-        if self._varied:
-            self.report({"WARNING"}, "Check fits even materials. Fit again to see how they vary.")
 
 
 class PATINA_OT_refit(Stepped, bpy.types.Operator):
@@ -113,7 +110,7 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
     def _start(self, context: bpy.types.Context) -> None:
         off = [cause.name for cause in context.scene.patina.causes if not cause.use]
         refit = RefitJob(kept_check(capture_path(context.scene)), without=off, exactly=True)
-        self._job = PreparedJob(refit)
+        self._job = PreparedJob(_varying(refit, context.scene))
         self._inputs = inputs_now(context.scene)
         self._scene = context.scene.name
 
@@ -131,9 +128,12 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
             record_inputs(scene, kind, self._inputs)
 
 
-def _varies(scene: bpy.types.Scene) -> bool:
-    """Whether a material of the last fit varies over the surface."""
-    return bool((stored_result(capture_path(scene)) or {}).get("varying"))
+def _varying(
+    second: CheckJob | RefitJob, scene: bpy.types.Scene
+) -> CheckJob | RefitJob | VaryingSecondFit:
+    """The job, with the variation of the materials unless the scene's settings exclude it."""
+    mode = scene.patina.varying
+    return second if mode == "never" else VaryingSecondFit(second, mode)
 
 
 def _show(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> Iterator[None]:

@@ -8,6 +8,7 @@ from ..concurrency.background import in_background
 from ..concurrency.job import Job, Step, finished
 from ..diagnose.assessment.assessment import Assessment
 from ..diagnose.selection.effect_subset import with_contradicted
+from ..diagnose.solver.model_fit import ModelFit
 from .diagnose_job import EXAMINING, DiagnoseJob
 from .fit_job import CaptureResult, FitJob
 from .refit_job import RefitJob
@@ -19,6 +20,7 @@ class CheckJob(Job):
     """Sets ``checked``, the diagnosis with the first fit, and ``result``, the second fit with a
     correction for the named causes except ``without``. Both are complete when the job is done.
     The diagnosis then has an assessment too.
+    ``fitted``: the joint fit that the second one is based on, None if it corrects nothing.
     Causes that the second fit does not confirm are no longer named (Diagnosis.contradicted). The
     materials of ``result`` have portable forms if those of ``fit`` would have had them."""
 
@@ -28,6 +30,7 @@ class CheckJob(Job):
         self.checked = DiagnoseJob(fit)
         self.without = frozenset(without)
         self.result: CaptureResult | None = None
+        self.fitted: ModelFit | None = None
 
     def run(self) -> Iterator[Step]:
         """The steps of the diagnosis, then those of the second fit."""
@@ -46,4 +49,4 @@ class CheckJob(Job):
         self.checked.assessment = yield from in_background(
             lambda: Assessment.of(last.after, last.held_out_after), step
         )
-        self.result = again.result
+        self.result, self.fitted = again.result, again.fitted

@@ -25,26 +25,36 @@ from ..diagnose.selection.search import search
 from ..fit.measured_result import MeasuredResult
 from ..inputs import capture_data
 from ..light import MountedLight, NearLight
+from ..varying.labels import MAX_MATERIALS
 from .fit_job import CaptureResult, FitJob
+from .varying.node_steps import CHOICE_NODES
+from .varying.separate_materials import SeparatedFit, separate_materials
+from .varying.surface_observations import observe_surface
 from .varying.variation_for_diagnosis import variation_for_diagnosis
 
 Result = TypeVar("Result")
 
 DEFAULT_NORMAL_DEVIATION = 1.0  # degrees, of a scan's normals where the fit does not estimate it
-FITTED, VARIED, EXAMINED = 0.17, 0.4, 0.42
-"""Fractions of the job's time after which the materials are fitted, their variation is known, and
-the pixels are read, measured with a simulated capture of an even material (field hunt, seed 3)."""
+FITTED, OBSERVED, VARIED, EXAMINED = 0.17, 0.24, 0.4, 0.42
+"""Fractions of the job's time after which the materials are fitted, their surface is observed,
+their variation is known, and the pixels are read, measured with a simulated capture of an even
+material (field hunt, seed 3)."""
+SEPARATING = 0.5  # fraction of the time until the variation is known that a separation takes
 EXAMINING, TESTING = "examining the photos", "testing possible causes"
 
 
 class DiagnoseJob(Job):
     """Sets ``result``, the fit; ``context``, the input of the diagnosis; and ``found``, the
     diagnosis. All are set when the job is done. ``assessment`` of the last joint fit: set by
-    CheckJob, after the second fit."""
+    CheckJob, after the second fit. separate: whether a single material may be separated into
+    several first (VaryingJob); ``parts`` is then the separation, and ``fit`` the fit of its
+    materials."""
 
-    def __init__(self, fit: FitJob) -> None:
+    def __init__(self, fit: FitJob, separate: bool = False) -> None:
         super().__init__()
         self.fit = fit
+        self.separate = separate
+        self.parts: SeparatedFit | None = None
         fit.keep = True
         self.context: DiagnosisContext | None = None
         self.found: Diagnosis | None = None
@@ -59,13 +69,29 @@ class DiagnoseJob(Job):
         """The steps of the fit, then those of the diagnosis."""
         for step in self.fit.run():
             yield Step(step.stage, FITTED * step.fraction)
+        variation = yield from self._variation(finished(self.fit.result))
         result = finished(self.fit.result)
-        variation = yield from variation_for_diagnosis(result, FITTED, VARIED - FITTED)
         with thread_pool(thread_count(self.fit.threads)) as pool:
             steps = context_of(result, pool, variation)
             self.context = yield from _stepped(steps, EXAMINING, VARIED, EXAMINED)
             yield Step(EXAMINING, EXAMINED)
             self.found = yield from _stepped(self._search(pool), TESTING, EXAMINED, 1.0)
+
+    def _variation(self, result: CaptureResult) -> Generator[Step, None, KnownVariation | None]:
+        """How the materials vary, after their separation; None where they are even, or more than
+        MAX_MATERIALS."""
+        if len(result.materials) > MAX_MATERIALS:
+            return None
+        surface = yield from observe_surface(result, CHOICE_NODES, FITTED, OBSERVED - FITTED)
+        start, share = OBSERVED, VARIED - OBSERVED
+        if self.separate:
+            part = SEPARATING * share
+            self.parts = yield from separate_materials(self.fit, surface, CHOICE_NODES, start, part)
+            start, share = start + part, share - part
+        if self.parts is not None:
+            self.fit, surface = self.parts.fit, self.parts.surface
+            result = finished(self.fit.result)
+        return (yield from variation_for_diagnosis(result, surface, start, share))
 
     def _search(self, pool: ThreadPoolExecutor | None) -> Generator[float, None, Diagnosis]:
         result, context = finished(self.result), finished(self.context)

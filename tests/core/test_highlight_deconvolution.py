@@ -124,7 +124,7 @@ def test_passes_stop_when_the_held_out_error_stops_decreasing(errors, passes, re
         return SimpleNamespace(held_out=held_out_samples, fit=SimpleNamespace(brdf=len(tables) - 1))
 
     steps = fit_with_deconvolution(
-        CorrectedSamples("samples", {}, Blur()), fit_again, 0.2, 0.5, required
+        CorrectedSamples("samples", np.arange(0), {}, Blur()), fit_again, 0.2, 0.5, required
     )
     fractions = []
     while True:

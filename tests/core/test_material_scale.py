@@ -10,7 +10,7 @@ import pytest
 from patina.core.basis import PrincipalBRDF, default_basis
 from patina.core.diagnose.nuisances.material_scale import MaterialScale
 from patina.core.diagnose.solver.block_elimination import solve
-from patina.core.diagnose.solver.gauss_newton import fit, step_within_bounds
+from patina.core.diagnose.solver.gauss_newton import equations_of, fit, step_within_bounds
 from patina.core.diagnose.solver.jacobian import jacobian_of
 from patina.core.diagnose.solver.model import Model
 from patina.core.diagnose.solver.model_fit import ModelFit
@@ -101,7 +101,7 @@ def test_steps_just_inside_a_bound_are_those_at_the_bound(context):
     everything = np.arange(len(near.residual))
     unbounded = solve(NormalEquations.of(near, jacobian_of(near), everything), near)
     assert unbounded.x[0] < -0.1
-    found, expected = step_within_bounds(near), step_within_bounds(at)
+    found, expected = (step_within_bounds(one, equations_of(one)) for one in (near, at))
     assert found.x == pytest.approx(-1e-3, abs=1e-9) and expected.x == pytest.approx(0.0)
     size = np.abs(expected.coefficients).max()
     assert found.coefficients == pytest.approx(expected.coefficients, abs=0.02 * size)

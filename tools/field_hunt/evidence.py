@@ -72,13 +72,16 @@ def _print(path: Path, title: str) -> Gains:
     from patina.core.diagnose.selection.one_step import ProjectedBaseline
     from patina.core.jobs import FitJob
     from patina.core.jobs.diagnose_job import context_of, normal_deviation
+    from patina.core.jobs.varying.node_steps import CHOICE_NODES
+    from patina.core.jobs.varying.surface_observations import observe_surface
     from patina.core.jobs.varying.variation_for_diagnosis import variation_for_diagnosis
 
     job = FitJob(read_capture(path), portable=False)
     job.keep = True
     job.drain()
     assert job.result is not None
-    variation = drained(variation_for_diagnosis(job.result, 0.0, 1.0))
+    surface = drained(observe_surface(job.result, CHOICE_NODES, 0.0, 0.3))
+    variation = drained(variation_for_diagnosis(job.result, surface, 0.3, 0.7))
     context = drained(context_of(job.result, None, variation))
     baseline = fit_baseline(context, np.radians(normal_deviation(job.result)))
     projected = ProjectedBaseline.of(baseline.fitted)

@@ -40,22 +40,30 @@ MIN_COS, MIN_LIGHT = 0.05, 0.5  # cosines of θi and θo; fraction of the lamp's
 
 @dataclass(frozen=True)
 class CorrectedSamples:
-    """table: the samples (m,) that can be corrected. light: photo → RMS of the recorded radiance of
-    the lamp on these samples, divided by the RMS of their whole recorded radiance. blur: of their
-    highlights, None where there is none."""
+    """table: the samples (m,) that can be corrected; rows: (m,) their indices in the given table.
+    light: photo → RMS of the recorded radiance of the lamp on these samples, divided by the RMS of
+    their whole recorded radiance. blur: of their highlights, None where there is none."""
 
     table: SampleTable
+    rows: NDArray[np.intp]
     light: Mapping[int, float]
     blur: HighlightBlur | None
 
 
 def correct_samples(
-    table: SampleTable, pixels: Pixels, model: Model, context: DiagnosisContext, tilt: float = 0.0
+    table: SampleTable,
+    pixels: Pixels,
+    model: Model,
+    context: DiagnosisContext,
+    tilt: float = 0.0,
+    shown: Model | None = None,
 ) -> Generator[float, None, CorrectedSamples]:
     """Correct samples (n,), photo by photo; yields the fraction done.
 
     pixels: of the samples (sample_pixels.py). model: with the effects, at its optimum. context: of
-    the diagnosis. tilt: radians along each tangent, standard deviation of the scan's normals."""
+    the diagnosis. tilt: radians along each tangent, standard deviation of the scan's normals.
+    shown: the model whose normals and light the corrected samples get (None: ``model``): without
+    the variation of the surface where that is to be estimated from them."""
     parts, wide = [], list[BlurredPhoto]()
     model = with_scaled_brdfs(model)  # once: the BRDFs keep tables of their values
     blur = widens_highlights(model)
@@ -66,18 +74,20 @@ def correct_samples(
         done += len(rows)
         here = replace(context, pixels=pixels.select(rows), brdfs=model.brdfs, ray_count=RAY_COUNT)
         local = model_at_pixels(model, here, near.select(rows))
-        *part, good = _correct_chunk(table.select(rows), local, tilt)
-        parts.append(part)
+        light = None if shown is None else model_at_pixels(shown, here, near.select(rows)).shading()
+        *part, good = _correct_chunk(table.select(rows), local, tilt, light)
+        parts.append((*part, rows[good]))
         if blur:
             wide.append(blurred_photo(int(table.photo[rows[0]]), local, good))
     if not parts:
-        return CorrectedSamples(SampleTable.empty(), {}, None)
-    tables, left, whole = zip(*parts, strict=True)
+        return CorrectedSamples(SampleTable.empty(), np.zeros(0, np.intp), {}, None)
+    tables, left, whole, kept = zip(*parts, strict=True)
     found = SampleTable.concatenate(tables)
     of_lamp, of_all = (np.bincount(found.photo, np.concatenate(each)) for each in (left, whole))
     ratio = np.sqrt(of_lamp / np.maximum(of_all, 1e-30))
-    light = {int(photo): float(ratio[photo]) for photo in np.unique(found.photo)}
-    return CorrectedSamples(found, light, HighlightBlur(tuple(wide)) if blur else None)
+    of_photo = {int(photo): float(ratio[photo]) for photo in np.unique(found.photo)}
+    blurred = HighlightBlur(tuple(wide)) if blur else None
+    return CorrectedSamples(found, np.concatenate(kept), of_photo, blurred)
 
 
 def _chunks(
@@ -104,10 +114,11 @@ def model_at_pixels(model: Model, context: DiagnosisContext, near: NearestPixels
 
 
 def _correct_chunk(
-    table: SampleTable, model: Model, tilt: float
+    table: SampleTable, model: Model, tilt: float, shown: ShadingState | None
 ) -> tuple[SampleTable, Array, Array, NDArray[np.intp]]:
     """(samples, weighted squares of the recorded radiance of the lamp, 0 where it is clipped, the
-    same of the whole recorded radiance, indices of the samples in ``table``)."""
+    same of the whole recorded radiance, indices of the samples in ``table``). shown: normals and
+    light of the corrected samples; None: those of the model."""
     now = model.shading()
     lamps = model.lamp_parts(now)
     reflected = model.reflected(lamps)
@@ -138,6 +149,7 @@ def _correct_chunk(
     response = np.where(clipped, 0, response)
     with np.errstate(invalid="ignore"):  # nor here
         lamp = response * radiance
+    now = now if shown is None else shown
     cos_i = dot(now.normal, now.light)
     cos_o = dot(now.normal, table.view)
     good &= (cos_i > MIN_COS) & (cos_o > MIN_COS) & (now.visible > MIN_LIGHT)

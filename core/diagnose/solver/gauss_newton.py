@@ -17,6 +17,7 @@ Array = NDArray[np.floating]
 
 MAX_STEPS, MAX_HALVINGS = 25, 5
 CONVERGED = 1e-4  # relative decrease of the cost
+DAMPINGS = (1e-3, 1e-2, 0.1, 1.0)  # of steps that are tried where a Gauss–Newton step fails
 MAX_BOUND_ROUNDS = 3  # in which further parameters are found to pass a bound
 
 
@@ -35,15 +36,18 @@ def fit(model: Model, deviation: Array, steps: int = MAX_STEPS, longest: float =
 
 
 def _stepped(now: ModelFit, longest: float) -> ModelFit:
-    """One Gauss–Newton step, halved until the cost decreases, or doubled while it does; parameters
-    stay within bounds."""
-    step, length = step_within_bounds(now), 1.0
+    """One Gauss–Newton step, halved until the cost decreases, or doubled while it does, or else
+    damped; parameters stay within bounds."""
+    equations = equations_of(now)
+    step, length = step_within_bounds(now, equations), 1.0
     best = now
     for _ in range(MAX_HALVINGS):
         best = ModelFit.of(_moved(now.model, step, length), now.deviation)
         if best.total_cost < now.total_cost:
             break
         length /= 2
+    if not best.total_cost < now.total_cost:
+        return _damped_step(now, equations, best)
     while 1.0 <= length < longest:
         length *= 2
         farther = ModelFit.of(_moved(now.model, step, length), now.deviation)
@@ -53,10 +57,26 @@ def _stepped(now: ModelFit, longest: float) -> ModelFit:
     return best
 
 
-def step_within_bounds(now: ModelFit) -> Step:
+def _damped_step(now: ModelFit, equations: NormalEquations, failed: ModelFit) -> ModelFit:
+    """The first of several damped steps that decreases the cost (Levenberg–Marquardt); ``failed``
+    if none does. Where coefficients, patches and effects compensate for one another, a step is
+    right only near its start, in a direction along which the cost falls less than in others."""
+    for damping in DAMPINGS:
+        step = step_within_bounds(now, equations.damped(damping))
+        found = ModelFit.of(_moved(now.model, step, 1.0), now.deviation)
+        if found.total_cost < now.total_cost:
+            return found
+    return failed
+
+
+def equations_of(now: ModelFit) -> NormalEquations:
+    """The normal equations of all pixels."""
+    return NormalEquations.of(now, jacobian_of(now), np.arange(len(now.residual)))
+
+
+def step_within_bounds(now: ModelFit, equations: NormalEquations) -> Step:
     """The step in which global parameters that would pass a bound end at it. All others follow
     them: the coefficients of a BRDF would otherwise compensate for a larger change."""
-    equations = NormalEquations.of(now, jacobian_of(now), np.arange(len(now.residual)))
     step, x = solve(equations, now), now.parameters
     low, high = now.joined(lambda n: n.low), now.joined(lambda n: n.high)
     moves = np.full(len(x), np.nan)

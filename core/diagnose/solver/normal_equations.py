@@ -8,7 +8,7 @@ parameters of different patches only through the rest: the matrix is an arrow wi
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,12 @@ class NormalEquations:
     local_coupling: Array
     local_own: Array
     local_pull: Array
+
+    def damped(self, damping: float) -> NormalEquations:
+        """With diagonals increased by a fraction of themselves (Marquardt 1963): a shorter step,
+        which turns towards the steepest descent of the scaled parameters."""
+        names = "blocks", "own", "local"
+        return replace(self, **{name: _damped(getattr(self, name), damping) for name in names})
 
     @classmethod
     def of(cls, fit: ModelFit, jacobian: Jacobian, rows: NDArray[np.intp]) -> NormalEquations:
@@ -134,3 +140,8 @@ def _coupling(x: Array | csr_array, a: Array) -> Array:
 
 def _dense(x: Array | sparray) -> Array:
     return np.asarray(x.toarray() if isinstance(x, sparray) else x)
+
+
+def _damped(matrices: Array, damping: float) -> Array:
+    """Symmetric matrices (..., k, k) with larger diagonals."""
+    return matrices * (1 + damping * np.eye(matrices.shape[-1]))

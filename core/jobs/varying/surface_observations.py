@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from ...concurrency.job import Step
 from ...fit.measured_result import MeasuredResult
 from ...inputs import capture_data
 from ...varying.choice import MIN_NORMAL_ERROR, Nodes
+from ...varying.corrected_observations import ObservationCorrection
 from ...varying.hierarchy import MAX_TILT
 from ...varying.labels import label_pixels
 from ...varying.observations import Observations, observe
@@ -65,10 +67,14 @@ class SurfaceObservations:
 
 
 def observe_surface(
-    fitted: CaptureResult, nodes: int, start: float, share: float
+    fitted: CaptureResult,
+    nodes: int,
+    start: float,
+    share: float,
+    correction: ObservationCorrection | None = None,
 ) -> Generator[Step, None, SurfaceObservations]:
     """Read every photo at the nodes of a grid of about ``nodes`` nodes. start, share: the part of
-    the job that this takes."""
+    the job that this takes. correction: for the causes that a diagnosis named."""
     mesh, count = fitted.scan.mesh, len(fitted.capture.photos)
     grid = yield from in_background(
         lambda: SurfaceGrid.with_nodes(mesh, nodes), Step("dividing the mesh", start)
@@ -76,7 +82,8 @@ def observe_surface(
     parts = []
     for place in range(count):
         step = Step("reading the surface in the photos", start + share * place / count)
-        parts.append((yield from in_background(lambda p=place: _one(fitted, grid, p), step)))  # type: ignore[misc]
+        read = partial(_one, fitted, grid, place, correction)
+        parts.append((yield from in_background(read, step)))
     material = _of_nodes(grid, fitted.face_material)
     return SurfaceObservations(grid, material, Observations.joined(parts))
 
@@ -97,11 +104,16 @@ def _of_nodes(grid: SurfaceGrid, face_material: NDArray[np.integer]) -> NDArray[
     return np.where(face >= 0, face_material[face], -1)
 
 
-def _one(fitted: CaptureResult, grid: SurfaceGrid, place: int) -> Observations:
+def _one(
+    fitted: CaptureResult, grid: SurfaceGrid, place: int, correction: ObservationCorrection | None
+) -> Observations:
     """The observations of one photo."""
     capture, scan = fitted.capture, fitted.scan
     camera = capture_data.camera_of(capture, scan, place)
     photo, light = fitted.photos.read(place), fitted.lights.of(capture, place)
     labels = label_pixels(capture, scan, fitted.rays, camera, place, photo, light)
     surface = SurfacePhoto(fitted.rays, camera, light, photo.radiance, labels)
-    return observe(surface, place, grid)
+    seen = observe(surface, place, grid)
+    if correction is None:
+        return seen
+    return correction(seen, camera, grid.points(seen.node), grid.normals(seen.node))

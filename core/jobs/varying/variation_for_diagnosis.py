@@ -14,7 +14,6 @@ import numpy as np
 
 from ...concurrency.job import Step
 from ...diagnose.selection.baseline import ACROSS
-from ...varying.labels import MAX_MATERIALS
 from ...varying.node_variation import MaterialNodes, NodeVariation
 from ...varying.varying_surface import ALL_VARIATIONS
 from ..fit_job import CaptureResult
@@ -26,32 +25,29 @@ from .node_steps import (
     is_textured,
     model_of,
 )
-from .surface_observations import observe_surface
+from .surface_observations import SurfaceObservations
 
 DIAGNOSIS_CHOICE_NODES = 20_000
 """Of a material, that the choice uses: so many that nodes on a closed surface are half as far apart
 as the patches of a diagnosis are wide."""
-OBSERVED, DECIDED, CHOSEN = 0.3, 0.5, 0.9
-"""Fractions of the time after which the photos are read; whether a material varies is decided; and
-what varies is chosen. The last two are of the time after the first."""
+DECIDED, CHOSEN = 0.5, 0.9
+"""Fractions of the time after which it is decided whether a material varies, and what varies is
+chosen."""
 
 
 def variation_for_diagnosis(
-    result: CaptureResult, start: float, share: float
+    result: CaptureResult, surface: SurfaceObservations, start: float, share: float
 ) -> Generator[Step, None, NodeVariation | None]:
     """The variation of all materials; None where held-out photos find none that varies within the
-    patches of a diagnosis: these know what varies slowly, as causes do that it imitates. start,
-    share: the part of the job that this takes. None too where there are more than MAX_MATERIALS."""
-    if len(result.materials) > MAX_MATERIALS:
-        return None
-    surface = yield from observe_surface(result, CHOICE_NODES, start, OBSERVED * share)
+    patches of a diagnosis: these know what varies slowly, as causes do that it imitates. surface:
+    observations of a grid of CHOICE_NODES. start, share: the part of the job that this takes."""
     found = dict[int, MaterialNodes]()
-    each = (1 - OBSERVED) * share / len(result.materials)
+    each = share / len(result.materials)
     for index, material in enumerate(result.materials):
         few, some = surface.of_material(index, material, DIAGNOSIS_CHOICE_NODES)
         if not len(few):
             continue
-        model, begin = model_of(material), start + OBSERVED * share + index * each
+        model, begin = model_of(material), start + index * each
         size = float(np.ptp(some.points, axis=0).max())
         if not (yield from is_textured(size / ACROSS, model, few, some, begin, DECIDED * each)):
             continue
