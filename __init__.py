@@ -101,6 +101,7 @@ MODULES: tuple[str, ...] = (
     "operators.reset_traits",
     "operators.export",
     "operators.views",
+    "operators.variation",
     "operators.empty_cache",
     "operators.menus",
     "panels.draft_box",

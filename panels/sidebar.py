@@ -20,6 +20,7 @@ from .orientation_row import draw_orientation
 from .photo_rows import PATINA_UL_photos, draw_photos
 from .stage import StagePanel
 from .traits_box import status_label
+from .variation_box import draw_variation
 from .wrapped import wrapped
 
 
@@ -77,6 +78,7 @@ class PATINA_PT_fit(StagePanel, bpy.types.Panel):
         if capture:
             layout.prop(context.scene.patina, "varying")
         draw_measured(layout, stored_result(capture), measured_of(capture))
+        draw_variation(layout, context.scene.patina.mesh)
 
 
 class PATINA_PT_check(StagePanel, bpy.types.Panel):

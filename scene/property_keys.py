@@ -9,6 +9,7 @@ INTERVAL_BAND = "patina_interval"  # on the material: values of a Band
 EARLIER_COEFFICIENTS = "patina_earlier_coefficients"  # on the material: of the previous fit
 EARLIER_BASIS = "patina_earlier_basis"  # on the material: basis of these
 EVIDENCE_COLOURS = "Patina: "  # prefix of colour attributes of the mesh, followed by the cause
+VARIATION_COLOURS = "Patina surface: "  # prefix of colour attributes, followed by the quantity
 OVERLAY = "patina_overlay"  # on the mesh: what is shown; on the screen: also the shading before
 SHOWN_SLOTS = "patina_shown"  # face attribute: slots whose colours were drawn last
 LOBE_GROUP_LAYOUT = "patina_lobe_group"  # on a node group: version of its nodes

@@ -1,4 +1,5 @@
-"""Show the evidence of a check on the mesh, with a legend in the viewport, until it is left."""
+"""Show the evidence of a check, or how the materials vary, on the mesh, with a legend in the
+viewport, until it is left."""
 
 from __future__ import annotations
 
@@ -11,7 +12,9 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ...core.diagnose.effects.labels import cause_label
-from ..property_keys import EVIDENCE_COLOURS
+from ...core.views.surface_view import QUANTITIES
+from ..property_keys import EVIDENCE_COLOURS, VARIATION_COLOURS
+from ..scan.vertex_colours import UNOBSERVED, colours_of
 from ..session.handlers import attach, detach
 from ..session.overlay_shading import (
     enter_overlay,
@@ -20,7 +23,7 @@ from ..session.overlay_shading import (
     overlay_undone,
     shows_overlay,
 )
-from .evidence import BRIGHTER, DARKER, FULL_SCALE, RESIDUAL, SAME, UNOBSERVED, show_evidence
+from .evidence import FULL_SCALE, RESIDUAL
 
 LEFT, BOTTOM, WIDTH, HEIGHT, TEXT, GAP = 24, 40, 280, 14, 12, 6  # pixels at a display scale of 1
 STEPS = 24  # coloured rectangles of the scale
@@ -30,42 +33,57 @@ _handle: Any = None
 def toggle_evidence(mesh: bpy.types.Object, cause: str) -> bool | None:
     """Show the evidence of a cause; leave it if it is shown already. Returns whether it is shown
     now, None if the mesh has no colours for the cause."""
-    if overlay_shown() == cause:
+    return _toggle(mesh, cause, EVIDENCE_COLOURS + cause)
+
+
+def toggle_variation(mesh: bpy.types.Object, kind: str) -> bool | None:
+    """The same for a kind of variation."""
+    return _toggle(mesh, VARIATION_COLOURS + kind, VARIATION_COLOURS + kind)
+
+
+def _toggle(mesh: bpy.types.Object, shown: str, attribute: str) -> bool | None:
+    """shown: identifier of what the overlay shows; attribute: name of its colours."""
+    if overlay_shown() == shown:
         leave_overlay()
         return False
-    if mesh.data.color_attributes.get(EVIDENCE_COLOURS + cause) is None:
+    if attribute not in mesh.data.color_attributes:
         return None
-    enter_overlay(cause, mesh)
-    show_evidence(mesh, cause)
+    enter_overlay(shown, mesh)
+    attributes = mesh.data.color_attributes  # Solid shading shows the active one
+    attributes.active_color = attributes[attribute]
     return True
 
 
-def legend(cause: str) -> tuple[str, tuple[str, str, str]]:
+def legend(shown: str) -> tuple[str, tuple[str, str, str]]:
     """(title, labels of the left end, the middle and the right end) of the colour scale."""
     percent = f"{100 * FULL_SCALE:.0f} %"
-    if cause == RESIDUAL:
+    if shown.startswith(VARIATION_COLOURS):
+        quantity = QUANTITIES[shown.removeprefix(VARIATION_COLOURS)]
+        return quantity.title, quantity.ends
+    if shown == RESIDUAL:
         title = "Residual: photos compared with prediction"
         return title, (f"{percent} darker", "equal", f"{percent} brighter")
-    title = f"{cause_label(cause)}: change of the photos"
+    title = f"{cause_label(shown)}: change of the photos"
     return title, (f"{percent} darker", "none", f"{percent} brighter")
 
 
-def scale_colours(count: int = STEPS) -> np.ndarray:
-    """(count, 3) sRGB colours of the scale from the darkest to the brightest."""
-    part = np.linspace(-1, 1, count)[:, None]
-    return SAME + (np.where(part < 0, DARKER, BRIGHTER) - SAME) * np.abs(part)
+def scale_colours(shown: str, count: int = STEPS) -> np.ndarray:
+    """(count, 3) sRGB colours of the scale from its left end to its right end."""
+    signed = not shown.startswith(VARIATION_COLOURS)
+    signed = signed or QUANTITIES[shown.removeprefix(VARIATION_COLOURS)].signed
+    return colours_of(np.linspace(-1 if signed else 0, 1, count))
 
 
 def _draw() -> None:
-    """Draw the legend into a viewport that shows evidence."""
+    """Draw the legend into a viewport that shows the overlay."""
     context = bpy.context
-    cause = overlay_shown(context.screen) if context.screen else ""
-    if not cause or context.area is None or not shows_overlay(context.area):
+    shown = overlay_shown(context.screen) if context.screen else ""
+    if not shown or context.area is None or not shows_overlay(context.area):
         return
     scale = context.preferences.system.ui_scale
     left = LEFT * scale + _tool_width(context.area)
     low, width, height = BOTTOM * scale, WIDTH * scale, HEIGHT * scale
-    title, (dark, middle, bright) = legend(cause)
+    title, (dark, middle, bright) = legend(shown)
     line = (TEXT + GAP) * scale
     margin = GAP * scale
     _rectangle(
@@ -73,7 +91,7 @@ def _draw() -> None:
         (0.0, 0.0, 0.0, 0.6),
     )  # fmt: skip
     step = width / STEPS
-    for index, colour in enumerate(scale_colours()):
+    for index, colour in enumerate(scale_colours(shown)):
         _rectangle(left + index * step, low, step + 1, height, (*colour, 1.0))
     _text(left, low + height + margin, title, scale)
     _text(left, low - line + margin / 2, dark, scale)
@@ -81,7 +99,10 @@ def _draw() -> None:
     _text(left + width, low - line + margin / 2, bright, scale, 1.0)
     grey = low + height + line + margin / 2
     _rectangle(left, grey, height, height * 0.8, (*UNOBSERVED, 1.0))
-    _text(left + height + margin, grey, "seen by no sampled pixel", scale)
+    missing = (
+        "in no lit photo" if shown.startswith(VARIATION_COLOURS) else "seen by no sampled pixel"
+    )
+    _text(left + height + margin, grey, missing, scale)
 
 
 def _tool_width(area: bpy.types.Area) -> int:

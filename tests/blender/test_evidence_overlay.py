@@ -118,8 +118,7 @@ def test_own_shading_is_kept() -> None:
 
 def test_legend_states_scale_and_unit() -> None:
     overlay = extension("scene.views.evidence_overlay")
-    evidence = extension("scene.views.evidence")
+    colours_of = extension("scene.scan.vertex_colours").colours_of
     title, ends = overlay.legend("camera_pose")
     assert "Wrong Camera Poses" in title and ends == ("10 % darker", "none", "10 % brighter")
-    colours = overlay.scale_colours(3)
-    assert np.allclose(colours, [evidence.DARKER, evidence.SAME, evidence.BRIGHTER])
+    assert np.allclose(overlay.scale_colours("camera_pose", 3), colours_of(np.array([-1, 0, 1])))

@@ -58,6 +58,29 @@ def exported_files_have_the_variation() -> None:
     assert "baseColorTexture" in header["materials"][0]["pbrMetallicRoughness"]
 
 
+def mesh_shows_the_variation() -> None:
+    """Vertices of bright stripes are red, those of dark stripes blue; a second press ends it."""
+    mesh = bpy.context.scene.patina.mesh.data
+    layer = mesh.color_attributes["Patina surface: diffuse"]
+    rgba = np.empty(4 * len(mesh.vertices), np.float32)
+    layer.data.foreach_get("color_srgb", rgba)
+    points = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", points)
+    x = points.reshape(-1, 3)[:, 0] - make_capture_module().CENTRE[0]
+    red, _, blue, _ = rgba.reshape(-1, 4).T
+    seen = red + blue > 0.3
+    inside = seen & (np.abs(np.sin(9 * x)) > 0.5)
+    assert inside.mean() > 0.3
+    assert np.mean((red > blue)[inside] == (np.sin(9 * x) > 0)[inside]) > 0.9
+    assert bpy.ops.patina.show_variation(kind="diffuse") == {"FINISHED"}
+    assert mesh.color_attributes.active_color.name == "Patina surface: diffuse"
+    overlay = extension("scene.views.evidence_overlay")
+    assert overlay.legend("Patina surface: diffuse")[1] == ("half", "typical", "twice")
+    assert len(overlay.scale_colours("Patina surface: error", 3)) == 3
+    assert bpy.ops.patina.show_variation(kind="diffuse") == {"FINISHED"}
+    assert extension("scene.session.overlay_shading").overlay_shown() == ""
+
+
 def test_painted_sphere_gets_maps_and_even_fit_removes_them() -> None:
     imported("bands", brdf=bands)
     settings = bpy.context.scene.patina
@@ -85,6 +108,7 @@ def test_painted_sphere_gets_maps_and_even_fit_removes_them() -> None:
     assert bpy.ops.patina.look_at_photo(kind="comparison") == {"FINISHED"}
     view = extension("scene.views.photo_comparison")._last.value
     assert view.typical < 0.1, "the prediction has the stripes"
+    mesh_shows_the_variation()
     exported_files_have_the_variation()
     blend = str(folder() / "bands.blend")
     bpy.ops.wm.save_as_mainfile(filepath=blend)
@@ -96,6 +120,9 @@ def test_painted_sphere_gets_maps_and_even_fit_removes_them() -> None:
     assert not images(bpy.data.materials["surface"])
     maps = [i for i in bpy.data.images if "patina_map" in i]
     assert not maps, "packed maps of the earlier fit are removed"
+    colours = bpy.context.scene.patina.mesh.data.color_attributes
+    assert not [a.name for a in colours if a.name.startswith("Patina surface")]
+    assert not bpy.ops.patina.show_variation.poll()
 
 
 def test_even_sphere_has_no_maps() -> None:
@@ -113,6 +140,24 @@ def test_maps_are_undone_with_the_fit() -> None:
     assert images(bpy.data.materials["surface"])
     bpy.ops.ed.undo()
     assert "surface" not in bpy.data.materials or not images(bpy.data.materials["surface"])
+
+
+def test_check_keeps_the_variation() -> None:
+    imported("bands", 8, brdf=bands)
+    select = extension("core.diagnose.pixels.pixel_selection").select_pixels
+    # numpy of some Blender versions is slow
+    usual, select.__defaults__ = select.__defaults__, (3000,)
+    try:
+        assert bpy.ops.patina.check() == {"FINISHED"}
+    finally:
+        select.__defaults__ = usual
+    scene = bpy.context.scene
+    assert images(bpy.data.materials["surface"])
+    assert bpy.ops.patina.show_variation.poll()
+    for cause in scene.patina.causes:
+        cause.use = False
+    assert bpy.ops.patina.refit() == {"FINISHED"}
+    assert images(bpy.data.materials["surface"])
 
 
 def test_metal_and_paint_become_two_materials() -> None:

@@ -62,8 +62,9 @@ def correct_samples(
 
     pixels: of the samples (sample_pixels.py). model: with the effects, at its optimum. context: of
     the diagnosis. tilt: radians along each tangent, standard deviation of the scan's normals.
-    shown: the model whose normals and light the corrected samples get (None: ``model``): without
-    the variation of the surface where that is to be estimated from them."""
+    shown: the model whose normals and light the corrected samples get, and whose added light is
+    subtracted (None: ``model``): without the variation of the surface where that is to be estimated
+    from them."""
     parts, wide = [], list[BlurredPhoto]()
     model = with_scaled_brdfs(model)  # once: the BRDFs keep tables of their values
     blur = widens_highlights(model)
@@ -74,8 +75,8 @@ def correct_samples(
         done += len(rows)
         here = replace(context, pixels=pixels.select(rows), brdfs=model.brdfs, ray_count=RAY_COUNT)
         local = model_at_pixels(model, here, near.select(rows))
-        light = None if shown is None else model_at_pixels(shown, here, near.select(rows)).shading()
-        *part, good = _correct_chunk(table.select(rows), local, tilt, light)
+        own = None if shown is None else model_at_pixels(shown, here, near.select(rows))
+        *part, good = _correct_chunk(table.select(rows), local, tilt, own)
         parts.append((*part, rows[good]))
         if blur:
             wide.append(blurred_photo(int(table.photo[rows[0]]), local, good))
@@ -114,16 +115,16 @@ def model_at_pixels(model: Model, context: DiagnosisContext, near: NearestPixels
 
 
 def _correct_chunk(
-    table: SampleTable, model: Model, tilt: float, shown: ShadingState | None
+    table: SampleTable, model: Model, tilt: float, shown: Model | None
 ) -> tuple[SampleTable, Array, Array, NDArray[np.intp]]:
     """(samples, weighted squares of the recorded radiance of the lamp, 0 where it is clipped, the
-    same of the whole recorded radiance, indices of the samples in ``table``). shown: normals and
-    light of the corrected samples; None: those of the model."""
+    same of the whole recorded radiance, indices of the samples in ``table``). shown: the model of
+    the corrected samples; None: ``model``."""
     now = model.shading()
     lamps = model.lamp_parts(now)
     reflected = model.reflected(lamps)
     predicted = model.entering(reflected, now)
-    added = predicted - reflected
+    added = (model if shown is None else shown).entering(reflected, now) - reflected
     plateau = plateau_of(model, now, np.maximum(predicted, table.radiance))
     clipped = table.radiance > (1 - AT_PLATEAU) * plateau
     # where only the prediction is beyond the plateau, the photo determines how much light arrived
@@ -149,7 +150,7 @@ def _correct_chunk(
     response = np.where(clipped, 0, response)
     with np.errstate(invalid="ignore"):  # nor here
         lamp = response * radiance
-    now = now if shown is None else shown
+    now = now if shown is None else shown.shading()
     cos_i = dot(now.normal, now.light)
     cos_o = dot(now.normal, table.view)
     good &= (cos_i > MIN_COS) & (cos_o > MIN_COS) & (now.visible > MIN_LIGHT)
