@@ -144,6 +144,15 @@ def _show(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> I
     operator.report({"INFO"}, f"{counted(len(result.materials), 'material')} fitted, {model}.")
 
 
+def has_scanned_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Whether the scanned mesh is in the scene; of polls."""
+    mesh = context.scene.patina.mesh
+    if mesh is None or mesh.name not in context.scene.objects:
+        cls.poll_message_set("The scanned mesh is not in this scene")
+        return False
+    return True
+
+
 class PATINA_OT_show_evidence(bpy.types.Operator):
     """Colour the scanned mesh by the change that this cause makes in the photos: blue where they \
 get darker, red where they get brighter. Press again to return to the earlier shading"""
@@ -156,11 +165,7 @@ get darker, red where they get brighter. Press again to return to the earlier sh
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        mesh = context.scene.patina.mesh
-        if mesh is None or mesh.name not in context.scene.objects:
-            cls.poll_message_set("The scanned mesh is not in this scene")
-            return False
-        return True
+        return has_scanned_mesh(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if toggle_evidence(context.scene.patina.mesh, self.cause) is None:

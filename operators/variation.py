@@ -7,6 +7,7 @@ import bpy
 from ..core.views.surface_view import QUANTITIES
 from ..scene.scan.variation_colours import painted_kinds
 from ..scene.views.evidence_overlay import toggle_variation
+from .check import has_scanned_mesh
 
 LABELS = {
     "diffuse": "Diffuse", "specular": "Specular", "roughness": "Roughness", "normal": "Normals",
@@ -30,11 +31,9 @@ Press again to return to the earlier shading"""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        mesh = context.scene.patina.mesh
-        if mesh is None or mesh.name not in context.scene.objects:
-            cls.poll_message_set("The scanned mesh is not in this scene")
+        if not has_scanned_mesh(cls, context):
             return False
-        if not painted_kinds(mesh):
+        if not painted_kinds(context.scene.patina.mesh):
             cls.poll_message_set("The materials of the last fit are even")
             return False
         return True

@@ -29,7 +29,7 @@ from ..varying.labels import MAX_MATERIALS
 from .fit_job import CaptureResult, FitJob
 from .varying.node_steps import CHOICE_NODES
 from .varying.separate_materials import SeparatedFit, separate_materials
-from .varying.surface_observations import observe_surface
+from .varying.surface_observations import SurfaceObservations, observe_surface
 from .varying.variation_for_diagnosis import variation_for_diagnosis
 
 Result = TypeVar("Result")
@@ -48,13 +48,15 @@ class DiagnoseJob(Job):
     diagnosis. All are set when the job is done. ``assessment`` of the last joint fit: set by
     CheckJob, after the second fit. separate: whether a single material may be separated into
     several first (VaryingJob); ``parts`` is then the separation, and ``fit`` the fit of its
-    materials."""
+    materials. ``surface``: observations of a grid of CHOICE_NODES; None where there are more than
+    MAX_MATERIALS."""
 
     def __init__(self, fit: FitJob, separate: bool = False) -> None:
         super().__init__()
         self.fit = fit
         self.separate = separate
         self.parts: SeparatedFit | None = None
+        self.surface: SurfaceObservations | None = None
         fit.keep = True
         self.context: DiagnosisContext | None = None
         self.found: Diagnosis | None = None
@@ -91,6 +93,7 @@ class DiagnoseJob(Job):
         if self.parts is not None:
             self.fit, surface = self.parts.fit, self.parts.surface
             result = finished(self.fit.result)
+        self.surface = surface
         return (yield from variation_for_diagnosis(result, surface, start, share))
 
     def _search(self, pool: ThreadPoolExecutor | None) -> Generator[float, None, Diagnosis]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 from ..concurrency.job import Job, Step, finished
 from ..varying.corrected_observations import ObservationCorrection
 from ..varying.labels import check_material_count
 from .check_job import CheckJob
 from .diagnose_job import DiagnoseJob
-from .fit_job import CaptureResult, with_portable
+from .fit_job import CaptureResult
 from .refit_job import RefitJob
 from .varying.node_steps import CHOICE_NODES
 from .varying.surface_observations import observe_surface
@@ -50,16 +49,16 @@ class VaryingSecondFit(Job):
         for step in self.second.run():
             yield Step(step.stage, SECOND_FIT * step.fraction)
         before, correction = finished(self.second.result), self._correction()
-        coarse = yield from observe_surface(
-            before, CHOICE_NODES, SECOND_FIT, OBSERVED - SECOND_FIT, correction
-        )
+        coarse = self.checked.surface
+        if coarse is None or correction is not None:
+            coarse = yield from observe_surface(
+                before, CHOICE_NODES, SECOND_FIT, OBSERVED - SECOND_FIT, correction
+            )
         fit, parts = self.checked.fit, self.checked.parts
-        own = VariationEstimator(fit, before, self.mode, self.nodes, correction, parts)
-        result = yield from own.varied(coarse, OBSERVED, VARIED - OBSERVED)
-        materials = list(result.materials)
-        for index, material in enumerate(materials if self.portable else ()):
-            materials[index] = yield from with_portable(material, VARIED, fit.threads)
-        self.result = replace(result, materials=tuple(materials))
+        own = VariationEstimator(
+            fit, before, self.mode, self.nodes, correction, parts, self.portable
+        )
+        self.result = yield from own.varied(coarse, OBSERVED, VARIED - OBSERVED)
 
     def _correction(self) -> ObservationCorrection | None:
         """For the causes that the second fit takes into account; None where there are none."""

@@ -8,18 +8,18 @@ variation (Lensch et al. 2003 alternate in the same way between clusters and poi
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import half_difference
 from ..samples import SampleTable
 from .node_model import TILT, NodeModel, tilted
+from .observation_samples import MIN_COSINE, samples_of
 from .observations import Observations
 
 MAX_SAMPLES = 60_000  # of a regular subset: more do not change the BRDF
 MIN_FACTOR, MAX_FACTOR = 0.02, 50.0  # of the radiance
-MIN_COSINE = 0.1  # of light and view
-RELATIVE_NOISE = 0.02  # of the converted radiance, that the estimator assumes at least
 
 
 def typical_samples(
@@ -42,28 +42,7 @@ def typical_samples(
     )
     radiance = some.radiance * np.clip(factor, MIN_FACTOR, MAX_FACTOR)
     normal = tilted(normal, own)
-    cos_i, cos_o = (np.einsum("ij,ij->i", normal, v) for v in (some.light, some.view))
-    angles = half_difference(normal, some.light, some.view)
-    irradiance = some.irradiance / np.float32(model.scale)
-    n = len(some)
-    table = SampleTable(
-        photo=some.photo,
-        pixel=np.arange(n, dtype=np.int32),
-        theta_h=angles.theta_h,
-        theta_d=angles.theta_d,
-        phi_d=angles.phi_d,
-        cos_i=cos_i,
-        cos_o=cos_o,
-        rho=radiance / (irradiance * np.maximum(cos_i, MIN_COSINE)[:, None]),
-        radiance=radiance,
-        variance=np.square(RELATIVE_NOISE * radiance),
-        point=points[some.node],
-        normal=normal,
-        view=some.view,
-        curvature=np.zeros(n, np.float32),
-        light=some.light,
-        irradiance=irradiance,
-        weight=np.ones(n, np.float32),
-        response=np.ones((n, 3), np.float32),
-    )
-    return table.select(np.flatnonzero((cos_i > MIN_COSINE) & (cos_o > MIN_COSINE)))
+    pixel = np.arange(len(some), dtype=np.int32)
+    converted = replace(some, radiance=radiance)
+    table = samples_of(converted, pixel, points[some.node], normal, model.scale)
+    return table.select(np.flatnonzero((table.cos_i > MIN_COSINE) & (table.cos_o > MIN_COSINE)))

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import half_difference
 from ..capture import Capture
 from ..concurrency.steps import drained
 from ..diagnose.correction.sample_correction import correct_samples
@@ -22,11 +21,9 @@ from ..diagnose.effects.base.capabilities import NeedsPhoto
 from ..diagnose.forward.diagnosis_context import DiagnosisContext
 from ..diagnose.solver.model import Model
 from ..inputs.photos import LitPhotos
-from ..samples import SampleTable
 from ..scan import Camera, Scan
+from .observation_samples import samples_of
 from .observations import Observations
-
-RELATIVE_NOISE = 0.02  # of the radiance; the correction only passes it on
 
 
 @dataclass(frozen=True)
@@ -69,7 +66,8 @@ class ObservationCorrection:
         if not len(seen):
             return seen
         scale = self.context.scale[seen.material, None]
-        table = _table(seen, camera, points, normals, scale)
+        normal = np.asarray(normals, np.float32)
+        table = samples_of(seen, _pixels_at(camera, points), points, normal, scale)
         read = any(isinstance(effect, NeedsPhoto) for effect in self.model.effects)
         pixels = drained(pixels_of_samples(table, 0, self.capture, self.scan, self.photos, read))
         pixels = replace(pixels, material=seen.material.astype(np.int16))
@@ -86,30 +84,8 @@ class ObservationCorrection:
         )
 
 
-def _table(
-    seen: Observations,
-    camera: Camera,
-    points: NDArray[np.float64],
-    normals: NDArray[np.floating],
-    scale: NDArray[np.float32],
-) -> SampleTable:
-    """The observations as samples, in the unit of the fit. scale: (m, 1) of their materials."""
-    n = len(seen)
+def _pixels_at(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.int32]:
+    """(m,) flat indices of the pixels that show points (m, 3)."""
     across, down = np.floor(camera.project(points)).astype(np.int64).T
-    pixel = np.clip(down, 0, camera.height - 1) * camera.width + np.clip(
-        across, 0, camera.width - 1
-    )
-    normal = np.asarray(normals, np.float32)
-    cos_i, cos_o = (np.einsum("ij,ij->i", normal, v) for v in (seen.light, seen.view))
-    irradiance = seen.irradiance / scale
-    angles = half_difference(normal, seen.light, seen.view)
-    return SampleTable(
-        photo=seen.photo, pixel=pixel.astype(np.int32),
-        theta_h=angles.theta_h, theta_d=angles.theta_d, phi_d=angles.phi_d,
-        cos_i=cos_i, cos_o=cos_o,
-        rho=seen.radiance / np.maximum(irradiance * cos_i[:, None], 1e-30),
-        radiance=seen.radiance, variance=np.square(RELATIVE_NOISE * seen.radiance),
-        point=points, normal=normal, view=seen.view, curvature=np.full(n, np.nan, np.float32),
-        light=seen.light, irradiance=irradiance, weight=np.ones(n, np.float32),
-        response=np.ones((n, 3), np.float32),
-    )  # fmt: skip
+    across, down = np.clip(across, 0, camera.width - 1), np.clip(down, 0, camera.height - 1)
+    return (down * camera.width + across).astype(np.int32)

@@ -77,16 +77,20 @@ def shown_quantities(surface: VaryingSurface) -> list[str]:
     return [kind for kind, one in QUANTITIES.items() if vary.issuperset(one.parameters)]
 
 
-def at_vertices(surface: VaryingSurface, kind: str) -> NDArray[np.float32]:
-    """(v,) values of the scale, clipped to it: means over the nodes around each vertex that photos
-    show; NaN where there are none."""
-    values, grid = QUANTITIES[kind].of(surface), surface.grid
+def at_vertices(surface: VaryingSurface) -> dict[str, NDArray[np.float32]]:
+    """Kind of view that shows anything → (v,) values of its scale, clipped to it: means over the
+    nodes around each vertex that photos show; NaN where there are none."""
+    grid = surface.grid
     face, second, third = grid.places
     rows = np.flatnonzero((surface.photos > 0) & (face >= 0))
     weights = np.stack([1 - second[rows] - third[rows], second[rows], third[rows]], axis=1)
     vertex = grid.mesh.faces[face[rows], weights.argmax(axis=1)]
     count = len(grid.mesh.vertices)
     seen = np.bincount(vertex, minlength=count)
-    total = np.bincount(vertex, values[rows], minlength=count)
-    mean = np.where(seen > 0, total / np.maximum(seen, 1), np.nan)
-    return np.clip(mean, -1.0 if QUANTITIES[kind].signed else 0.0, 1.0).astype(np.float32)
+    found = {}
+    for kind in shown_quantities(surface):
+        total = np.bincount(vertex, QUANTITIES[kind].of(surface)[rows], minlength=count)
+        mean = np.where(seen > 0, total / np.maximum(seen, 1), np.nan)
+        low = -1.0 if QUANTITIES[kind].signed else 0.0
+        found[kind] = np.clip(mean, low, 1.0).astype(np.float32)
+    return found

@@ -14,6 +14,7 @@ from ..material import material_nodes, osl_files
 from ..material.preview import show_sphere
 from ..paint.mesh_paint import COLOUR_ATTRIBUTE
 from ..property_keys import EVIDENCE_COLOURS, MEASURED_NAME, VARIATION_COLOURS
+from ..scan.vertex_colours import drop_vertex_colours
 from .present_result import export_name
 
 RINGS, SEGMENTS = 48, 96  # of a preview sphere
@@ -48,10 +49,11 @@ def open_scan(file: Path, names: Sequence[str]) -> bpy.types.Object | None:
 def _drop_own_colours(mesh: bpy.types.Mesh) -> None:
     """Remove the colours of evidence, of the variation and of painted materials, which are not the
     scan's."""
-    attributes = mesh.color_attributes
-    for name in [a.name for a in attributes]:
-        if name.startswith((EVIDENCE_COLOURS, VARIATION_COLOURS)) or name == COLOUR_ATTRIBUTE:
-            attributes.remove(attributes[name])
+    for prefix in (EVIDENCE_COLOURS, VARIATION_COLOURS):
+        drop_vertex_colours(mesh, prefix)
+    painted = mesh.color_attributes.get(COLOUR_ATTRIBUTE)
+    if painted is not None:
+        mesh.color_attributes.remove(painted)
 
 
 def _show(thing: bpy.types.Object) -> None:

@@ -24,7 +24,7 @@ from . import meshes
 from .apply_maps import remove_unused_maps
 from .apply_variation import apply_variation_steps
 from .face_slots import remove_placeholders
-from .variation_colours import paint_variation
+from .variation_colours import paint_variation_steps
 
 NUMBER_SUFFIX = re.compile(r"\.\d{3}$")  # Blender appends it to make names unique
 
@@ -98,7 +98,7 @@ def apply_result_steps(
     yield
     remove_unused_maps()
     notes += yield from apply_variation_steps(scene, result)
-    paint_variation(mesh, result.varying)
+    yield from paint_variation_steps(mesh, result.varying)
     remove_placeholders(capture)
     for material in made:  # the name is free now; other names were set by the user
         name = material[MEASURED_NAME]

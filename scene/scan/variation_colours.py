@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+
 import bpy
 
+from ...core.concurrency.background import in_background
 from ...core.varying.varying_surface import VaryingSurface
-from ...core.views.surface_view import QUANTITIES, at_vertices, shown_quantities
+from ...core.views.surface_view import QUANTITIES, at_vertices
 from ..property_keys import VARIATION_COLOURS
 from .vertex_colours import drop_vertex_colours, paint_vertices
 
 MIN_VERTICES = 500  # of the mesh, below which its vertices are too far apart to show a surface
 
 
-def paint_variation(thing: bpy.types.Object | None, surface: VaryingSurface | None) -> None:
+def paint_variation_steps(
+    thing: bpy.types.Object | None, surface: VaryingSurface | None
+) -> Generator[None, None, None]:
     """Write the attributes of a fit, in place of those of an earlier one. None are written where
     the mesh no longer has the vertices of the scan, or too few. surface: None where all materials
-    are even."""
+    are even. One piece per step."""
     if thing is None or thing.type != "MESH":
         return
     drop_vertex_colours(thing.data, VARIATION_COLOURS)
     count = len(thing.data.vertices)
     if surface is None or count < MIN_VERTICES or count != len(surface.grid.mesh.vertices):
         return
-    for kind in shown_quantities(surface):
-        paint_vertices(thing.data, VARIATION_COLOURS + kind, at_vertices(surface, kind))
+    found = yield from in_background(lambda: at_vertices(surface), None)
+    for kind, values in found.items():
+        paint_vertices(thing.data, VARIATION_COLOURS + kind, values)
+        yield
 
 
 def painted_kinds(thing: bpy.types.Object | None) -> list[str]:

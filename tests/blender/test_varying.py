@@ -7,7 +7,7 @@ import json
 import bpy
 import numpy as np
 from support import extension
-from test_workflow import folder, make_capture_module
+from test_workflow import check_few_pixels, folder, make_capture_module
 
 FACTORS = {"scale", "roughness scale", "specular scale"}
 DIFFUSE = np.array([0.16, 0.05, 0.04])  # 1/sr, of the material that make_capture uses
@@ -144,13 +144,7 @@ def test_maps_are_undone_with_the_fit() -> None:
 
 def test_check_keeps_the_variation() -> None:
     imported("bands", 8, brdf=bands)
-    select = extension("core.diagnose.pixels.pixel_selection").select_pixels
-    # numpy of some Blender versions is slow
-    usual, select.__defaults__ = select.__defaults__, (3000,)
-    try:
-        assert bpy.ops.patina.check() == {"FINISHED"}
-    finally:
-        select.__defaults__ = usual
+    check_few_pixels()
     scene = bpy.context.scene
     assert images(bpy.data.materials["surface"])
     assert bpy.ops.patina.show_variation.poll()

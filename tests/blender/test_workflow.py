@@ -200,6 +200,16 @@ def test_demo_by_operator_equals_demo_by_api() -> None:
         assert written["held_out"]["typical"] == fitted.held_out.typical
 
 
+def check_few_pixels() -> None:
+    """Check with a part of the pixels: numpy of some Blender versions is slow."""
+    select = extension("core.diagnose.pixels.pixel_selection").select_pixels
+    usual, select.__defaults__ = select.__defaults__, (3000,)
+    try:
+        assert bpy.ops.patina.check() == {"FINISHED"}
+    finally:
+        select.__defaults__ = usual
+
+
 def test_check_names_light_drift_and_fit_can_include_or_skip_it() -> None:
     path = make_capture_module().make_capture(folder() / "ball", photos=4)
     capture_text = path.read_text()
@@ -208,13 +218,7 @@ def test_check_names_light_drift_and_fit_can_include_or_skip_it() -> None:
     )
     bpy.ops.patina.import_capture(filepath=str(path))
     assert not bpy.ops.patina.refit.poll()  # not checked yet
-    select = extension("core.diagnose.pixels.pixel_selection").select_pixels
-    # numpy of some Blender versions is slow
-    usual, select.__defaults__ = select.__defaults__, (3000,)
-    try:
-        assert bpy.ops.patina.check() == {"FINISHED"}
-    finally:
-        select.__defaults__ = usual
+    check_few_pixels()
     stored = extension("scene.session.scene_properties").stored_result
     kind, mine = extension("scene.session.scene_properties").DIAGNOSIS, str(path.resolve())
     diagnosis, fit = stored(mine, kind), stored(mine)

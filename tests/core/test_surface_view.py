@@ -43,7 +43,7 @@ def surface(kind: str = ALL_VARIATIONS, divisions: int = 3) -> VaryingSurface:
 )  # fmt: skip
 def test_values_are_those_of_the_surface(kind: str, expected) -> None:
     shown = surface()
-    values, vertices = at_vertices(shown, kind), shown.grid.mesh.vertices
+    values, vertices = at_vertices(shown)[kind], shown.grid.mesh.vertices
     x, _, z = (vertices - vertices.mean(axis=0)).T
     np.testing.assert_allclose(values[z > -0.45], expected(x[z > -0.45]), atol=0.05)
 
@@ -52,7 +52,7 @@ def test_values_are_those_of_the_surface(kind: str, expected) -> None:
 def test_unseen_vertices_have_no_value(kind: str) -> None:
     shown = surface()
     z = shown.grid.mesh.vertices[:, 2] - shown.grid.mesh.vertices[:, 2].mean()
-    values = at_vertices(shown, kind)
+    values = at_vertices(shown)[kind]
     assert np.isnan(values[z < -0.65]).all() and np.isfinite(values[z > -0.45]).all()
     low = -1 if QUANTITIES[kind].signed else 0
     assert np.nanmin(values) >= low and np.nanmax(values) <= 1

@@ -22,7 +22,7 @@ from ...varying.varying_surface import (
     MaterialVariation,
     VaryingSurface,
 )
-from ..fit_job import CaptureResult, FitJob, MaterialResult
+from ..fit_job import CaptureResult, FitJob, MaterialResult, with_portable
 from .node_steps import CHOICE_NODES, chosen_kind, final_fields, model_of
 from .separate_materials import SeparatedFit
 from .surface_observations import SurfaceObservations, observe_surface, pixel_size
@@ -42,7 +42,8 @@ class VariationEstimator:
     """fit: finished, fits the materials again; before: its result, or that of a second fit.
     mode: "auto", or "always" for all that can vary. nodes: of the fine grid. correction: of the
     observations, for the causes that a second fit takes into account. parts: the separation of a
-    single material that ``fit`` is the fit of."""
+    single material that ``fit`` is the fit of. portable: whether the materials get portable forms.
+    """
 
     fit: FitJob
     before: CaptureResult
@@ -50,14 +51,15 @@ class VariationEstimator:
     nodes: int = MAX_NODES
     correction: ObservationCorrection | None = None
     parts: SeparatedFit | None = None
+    portable: bool = True
 
     def varied(
         self, coarse: SurfaceObservations, start: float, share: float
     ) -> Generator[Step, None, CaptureResult]:
-        """The result with the variation of its materials, which have no portable forms; ``before``
-        where all are even. coarse: observations on a coarse grid, corrected. start, share: the part
+        """The result with the variation of its materials; their BRDFs are those of ``before`` where
+        all are even. coarse: observations on a coarse grid, corrected. start, share: the part
         of the job that this takes."""
-        before, parts = self.before, self.parts
+        before, parts, end = self.before, self.parts, start + share
         materials, kinds = list(before.materials), list[MaterialVariation]()
         each = CHOOSING * share / len(materials)
         for index in range(len(materials)):
@@ -72,6 +74,8 @@ class VariationEstimator:
         if parts is not None and surface is not None:
             surface = replace(surface, separated_from=parts.separated_from)
             notes.insert(0, parts.note)
+        for index, material in enumerate(materials if self.portable else ()):
+            materials[index] = yield from with_portable(material, end, self.fit.threads)
         return replace(
             before, materials=tuple(materials), varying=surface, notes=(*before.notes, *notes)
         )

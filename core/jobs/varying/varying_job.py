@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 from ...concurrency.job import Job, Step, finished
 from ...varying.labels import check_material_count
-from ..fit_job import CaptureResult, FitJob, with_portable
+from ..fit_job import CaptureResult, FitJob
 from .node_steps import CHOICE_NODES
 from .separate_materials import separate_materials
 from .surface_observations import observe_surface
@@ -47,11 +46,8 @@ class VaryingJob(Job):
         )
         if parts is not None:
             self.fit, coarse = parts.fit, parts.surface
+        before = finished(self.fit.result)
         own = VariationEstimator(
-            self.fit, finished(self.fit.result), self.mode, self.nodes, parts=parts
+            self.fit, before, self.mode, self.nodes, parts=parts, portable=self.portable
         )
-        result = yield from own.varied(coarse, SEPARATED, VARIED - SEPARATED)
-        materials = list(result.materials)
-        for index, material in enumerate(materials if self.portable else ()):
-            materials[index] = yield from with_portable(material, VARIED, self.fit.threads)
-        self.result = replace(result, materials=tuple(materials))
+        self.result = yield from own.varied(coarse, SEPARATED, VARIED - SEPARATED)
