@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=[],
         metavar="CAUSE",
-        choices=[kind.cause for kind in EFFECTS],
+        choices=list(dict.fromkeys(kind.cause for kind in EFFECTS)),  # two kinds of near lamp
         help="causes that the second fit ignores even if they are accepted: %(choices)s",
     )
     add_varying(parser)

@@ -17,6 +17,7 @@ from patina.core.diagnose.selection.judgement import (
     confirmed,
     contenders,
     min_gain,
+    underestimated,
 )
 from patina.core.diagnose.selection.one_step import OneStep, joint_step
 from patina.core.diagnose.selection.trial import STRONG_GAIN, Trial
@@ -131,6 +132,16 @@ def test_weak_evidence_does_not_hide_a_flash_elsewhere():
     both = residual_of(p0=2 * min_gain("vignetting"), p1=1.5 * min_gain("vignetting"))
     found = ranked(evidence("vignetting", [0], both), evidence("flash_offset", [1], both))
     assert causes(contenders(found)) == ["flash_offset"]
+
+
+def test_a_step_that_underestimates_is_followed_by_a_joint_fit():
+    """A step towards an anisotropic highlight gains a small part of what a joint fit does."""
+    both = residual_of(p0=0.3 * min_gain("anisotropy"), p1=0.3 * min_gain("vignetting"))
+    found = ranked(evidence("anisotropy", [0], both), evidence("vignetting", [1], both))
+    assert contenders(found) == []
+    assert causes(underestimated(found)) == ["anisotropy"]
+    nothing = ranked(evidence("anisotropy", [0], NOISE), evidence("vignetting", [1], both))
+    assert underestimated(nothing) == []
 
 
 @dataclass(frozen=True)

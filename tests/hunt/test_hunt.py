@@ -23,6 +23,7 @@ CASES = {
     "vignetting": (0.03, 2, "vignetting"),
     "cast_shadow": (0.03, 1, "cast_shadow"),
     "moire": (0.03, 1, "unknown"),
+    "anisotropy": (0.1, 2, "anisotropy"),  # its step is weaker than that of unrelated effects
 }
 """Strength, seed, and the expected cause; moiré is not among the known causes."""
 

@@ -33,7 +33,7 @@ from .effect_trials import (
 )
 from .evidence import Evidence, evidence_for, has_one_step
 from .held_out_error import held_out_errors
-from .judgement import best_of, confirmed, contenders, has_sufficient_evidence
+from .judgement import best_of, confirmed, contenders, has_sufficient_evidence, underestimated
 from .one_step import ProjectedBaseline
 from .residual_structure import residual_structure
 from .scan_quality import ScanQuality
@@ -122,6 +122,8 @@ def _tried(
     """Joint fits of spots and plateaus, and of the effect that the evidence supports best."""
     spots = _spots_and_plateaus(now, remaining, context)
     supported = contenders(evidence)
+    causes = {one.cause for one in supported}
+    supported += [one for one in underestimated(evidence) if one.cause not in causes]
 
     def trial_of(one: Effect | Evidence) -> Trial:
         if isinstance(one, Effect):
