@@ -221,7 +221,7 @@ def _minimum(left: Array, residual: Array, declared: Sequence[Parameters]) -> _M
         weighted = left * weight[..., None].astype(np.float32)
         score = np.einsum("ncq,nc->nq", weighted, residual).astype(np.float64)
         matrix = flat.T @ weighted.reshape(-1, q) + np.diag(1 / prior**2)
-        x, free = _bounded(matrix, score.sum(axis=0), low, high)
+        x, free = bounded_minimum(matrix, score.sum(axis=0), low, high, float(np.min(prior**-2)))
         rest = residual - left @ x.astype(np.float32)
         weight = robust_weights(rest)
     saved = float((robust_cost(residual) - robust_cost(rest)).sum())
@@ -229,15 +229,17 @@ def _minimum(left: Array, residual: Array, declared: Sequence[Parameters]) -> _M
     return _Minimum(x, matrix, score, weight, free, gain)
 
 
-def _bounded(
-    matrix: Array, pull: Vector, low: Vector, high: Vector
+def bounded_minimum(
+    matrix: Array, pull: Vector, low: Vector, high: Vector, least: float
 ) -> tuple[Vector, NDArray[np.bool_]]:
     """(x (q,), whether no bound holds each): the minimum of x · matrix · x / 2 − pull · x within
-    bounds."""
+    bounds. least: that no eigenvalue of the matrix (q, q) is below, except by rounding: of noise-
+    free photos, black pixels weigh so much that it can become indefinite."""
     x = np.linalg.solve(matrix, pull)
     if ((x > low) & (x < high)).all():
         return x, np.ones(len(x), bool)
-    root = np.linalg.cholesky(matrix)
-    target = np.linalg.solve(root, pull)
-    found = lsq_linear(root.T, target, (low, high), method="bvls")
+    eigenvalues, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    root = np.sqrt(np.maximum(eigenvalues, least))
+    target = vectors.T @ pull / root
+    found = lsq_linear(root[:, None] * vectors.T, target, (low, high), method="bvls")
     return found.x, found.active_mask == 0
