@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from patina.core.predict.errors import PhotoErrors
 
 START_ERROR = 2.0  # degrees, median error of the normals of the changed meshes
-GROUPS = 4  # of the bronze's 16 photos, each held out together
 
 
 def run(data: Path) -> None:
@@ -49,13 +48,12 @@ def run(data: Path) -> None:
         print("\nThe three simulated bunnies, each of one even material:\n")
         for label in BUNNIES.values():
             _even(label, data / "scans" / label / "scan.capture.toml")
-        print("\nEach photo predicted from others (bronze: 4 left out at a time; planes: 1):\n")
+        print("\nEach photo predicted from all others:\n")
         _header()
-        count = len(_read(bronze).photos)
-        _held_out("bronze", bronze, [list(range(count))[k::GROUPS] for k in range(GROUPS)])
+        _held_out("bronze", bronze, _each_alone(bronze))
         for label in ("yellow_box", "card_blue"):
             path = real_captures.plane(data, folder, label)
-            _held_out(label, path, [[k] for k in range(len(_read(path).photos))], plain=True)
+            _held_out(label, path, _each_alone(path), plain=True)
 
 
 def _even(label: str, path: Path) -> None:
@@ -114,6 +112,10 @@ def _read(path: Path) -> Capture:
 def _named(path: Path, ends: tuple[str, ...]) -> list[int]:
     """The photos whose names end so."""
     return [k for k, p in enumerate(_read(path).photos) if p.file.stem.endswith(ends)]
+
+
+def _each_alone(path: Path) -> list[list[int]]:
+    return [[k] for k in range(len(_read(path).photos))]
 
 
 @dataclass(frozen=True)
