@@ -71,7 +71,7 @@ def inputs(count: int) -> list[Input]:
         Input("scale", "Reflectance Scale", "float", 1.0),
         Input(BODY, "Body", "vector", (0.0, 0.0, 0.0), hidden=True),
         Input(BODY_SCALE, "Body Scale", "color", (1.0, 1.0, 1.0)),
-        Input(SPECULAR_SCALE, "Specular Scale", "float", 1.0),
+        Input(SPECULAR_SCALE, "Specular Scale", "color", (1.0, 1.0, 1.0)),
         Input(ROUGHNESS_SCALE, "Roughness Scale", "float", 1.0),
         Input(ALPHAS, "Lobes", "vector", (0.02, 0.1, 0.5), hidden=True),
         *coefficient_inputs(count),

@@ -24,7 +24,7 @@ MIN_VOTES = 1e-3  # sum of the votes of a texel; below, its shares come from the
 @dataclass(frozen=True)
 class MaterialMaps:
     """One material at n texels. scale: (n, 3) factor of its diffuse body; gloss: (n,) ln of the
-    factor of α; share: (n,) 0 … 1, share of the surface that has this material; specular: (n,)
+    factor of α; share: (n,) 0 … 1, share of the surface that has this material; specular: (n, 3)
     factor of its specular part."""
 
     scale: NDArray[np.float32]
@@ -82,7 +82,7 @@ def complete_maps(
             total = certain + GLOSS_PRIOR**-2
             shine[rows] = (certain * scales.gloss[rows] + GLOSS_PRIOR**-2 * near) / total
         own_share = share[:, index].astype(np.float32)
-        made.append(MaterialMaps(scale, shine, own_share, np.ones(n, np.float32)))
+        made.append(MaterialMaps(scale, shine, own_share, np.ones((n, 3), np.float32)))
     return TexelMaps(tuple(made), gathered.photos, error, material, np.isfinite(scales.gloss_error))
 
 

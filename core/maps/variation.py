@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scan import Mesh
-from ..varying.node_model import DIFFUSE, GLOSS, SPECULAR, tilted
+from ..varying.node_model import DIFFUSE, GLOSS, specular_factor, tilted
 from ..varying.varying_surface import VaryingSurface
 from .level import MaterialLevel
 from .settle import GLOSS_PRIOR, MaterialMaps, TexelMaps
@@ -24,15 +24,15 @@ def maps_of_variation(
     n, count = len(texels), len(levels)
     share = _shares(texels, surface, count)
     material = share.argmax(axis=1).astype(np.uint8)
-    scale = np.ones((n, 3), np.float32)
-    specular, gloss, error = np.ones(n, np.float32), *np.zeros((2, n), np.float32)
+    scale, specular = np.ones((2, n, 3), np.float32)
+    gloss, error = np.zeros((2, n), np.float32)
     photos, highlight = np.zeros(n, np.uint16), np.zeros(n, bool)
     channels = np.stack([level.channels for level in levels])
     for part in chunks(n):
         node, weight = surface.grid.at(texels.face[part], texels.second[part], texels.third[part])
         found = np.einsum("mk,mkc->mc", weight, surface.parameters[node])
         deviation = np.einsum("mk,mkc->mc", weight, surface.deviation[node])
-        scale[part], specular[part] = np.exp(found[:, DIFFUSE]), np.exp(found[:, SPECULAR])
+        scale[part], specular[part] = np.exp(found[:, DIFFUSE]), specular_factor(found)
         gloss[part] = found[:, GLOSS]
         error[part] = np.sum(deviation[:, DIFFUSE] * channels[material[part]], axis=1)
         photos[part] = surface.photos[node].max(axis=1)
@@ -41,8 +41,8 @@ def maps_of_variation(
     for index in range(count):
         own = material == index
         if not own.any():
-            flat = np.ones(n, np.float32)
-            made.append(MaterialMaps(np.ones_like(scale), flat - 1, share[:, index], flat))
+            even = np.ones_like(scale)
+            made.append(MaterialMaps(even, np.zeros_like(gloss), share[:, index], even))
             continue
         mine = tuple(_elsewhere_median(values, own) for values in (scale, gloss, specular))
         made.append(MaterialMaps(mine[0], mine[1], share[:, index], mine[2]))

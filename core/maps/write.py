@@ -65,11 +65,17 @@ def roughness(result: MapsResult, index: int) -> NDArray[np.float32]:
 
 
 def specular(result: MapsResult, index: int) -> NDArray[np.float32]:
-    """(n,) Specular IOR Level of the fitted Principled BSDF times the factor of the specular
-    part."""
+    """(n,) Specular IOR Level of the fitted Principled BSDF times the factor of the specular part
+    in its brightest channel; the others are darker by specular_tint."""
     fitted = float(result.materials[index].principled.specular_ior_level)
-    factor = result.maps.materials[index].specular
+    factor = result.maps.materials[index].specular.max(axis=1)
     return np.clip(fitted * factor, 0.0, MAX_SPECULAR).astype(np.float32)
+
+
+def specular_tint(result: MapsResult, index: int) -> NDArray[np.float32]:
+    """(n, 3) colour of the specular part, 0 … 1; its brightest channel is 1."""
+    factor = result.maps.materials[index].specular
+    return np.asarray(factor / factor.max(axis=1, keepdims=True), np.float32)
 
 
 def albedo(result: MapsResult, index: int) -> NDArray[np.float32]:
@@ -109,11 +115,13 @@ def _maps(
             level = float(material.principled.specular_ior_level)
             yield named("specular", False), specular(result, index), level
             yield named("specular_scale", False, ending="exr"), own.specular, 1.0
+            if (own.specular != own.specular[:, :1]).any():
+                yield named("specular_tint", True), specular_tint(result, index), 1.0
         if several:
             yield named("mask", False), result.maps.materials[index].share, 0.0
     if several:
         for what, values in _blended(result).items():
-            colour = what == "base_color"
+            colour = values.ndim == 2
             suffix = colours_as if colour else kind
             file = MapFile(BLEND, what, f"{BLEND}_{what}.{suffix}", colour)
             yield file, values, values.mean(axis=0)
@@ -138,7 +146,9 @@ def _blended(result: MapsResult) -> dict[str, NDArray[np.float32]]:
     materials, weighted by their shares."""
     share = [maps.share for maps in result.maps.materials]
     found: dict[str, NDArray[np.float32]] = {}
-    for what in ("base_color", "roughness", "metallic", "specular"):
+    coloured = any((maps.specular != maps.specular[:, :1]).any() for maps in result.maps.materials)
+    also = ("specular_tint",) if coloured else ()
+    for what in ("base_color", "roughness", "metallic", "specular", *also):
         total: Any = 0.0
         for index, own in enumerate(share):
             principled = result.materials[index].principled
@@ -148,6 +158,8 @@ def _blended(result: MapsResult) -> dict[str, NDArray[np.float32]]:
                 total = total + own * roughness(result, index)
             elif what == "metallic":
                 total = total + own * np.float32(principled.metallic)
+            elif what == "specular_tint":
+                total = total + own[:, None] * specular_tint(result, index)
             else:
                 total = total + own * specular(result, index)
         found[what] = np.asarray(total, np.float32)

@@ -51,7 +51,7 @@ class Nodes:
         return solve(model, seen, self.points, self.normals, edges, free, self.mesh_edge, error)
 
     def estimate(self, model: NodeModel, seen: Observations, kind: str) -> NDArray[np.float32]:
-        """(n, 8) parameters of the nodes after the finest level, 0 where nothing can vary."""
+        """(n, 10) parameters of the nodes after the finest level, 0 where nothing can vary."""
         theta = np.zeros((len(self.points), COUNT), np.float32)
         if VARIATIONS[kind] and len(seen):
             for _, fields in self.solve(model, seen, kind):

@@ -43,7 +43,7 @@ BLACK_SHARE = 0.03  # of the median radiance, added before the logarithm
 BISECTIONS = 12  # of the error of the logarithm: to 0.1 %
 EM_ROUNDS = 20
 EM_CELLS = 1_000  # that Σ is estimated from: its standard deviations are then known to 2 %
-FIRST_DEVIATION = np.array([0.4, 0.4, 0.4, 0.4, 0.3, 0.16, 0.16, 0.16])
+FIRST_DEVIATION = np.array([0.4, 0.4, 0.4, 0.4, 0.3, 0.16, 0.16, 0.16, 0.2, 0.2])
 """Standard deviations that the estimate of the first level's Σ starts from; each next level starts
 from LEVEL_RATIO times those of the one before."""
 LEVEL_RATIO = 0.7
@@ -58,15 +58,15 @@ MAX_TILT = 0.04
 the normals of meshes from stereo are off by 3 to 4 degrees at the 95th percentile. In cells n times
 as large it is n times smaller: a tilt over a long way would move the surface, whose position is
 well known."""
-MAX_STEP = np.array([1, 1, 1, 1, 0.5, 0.15, 0.15, 0.15])  # of one level
+MAX_STEP = np.array([1, 1, 1, 1, 0.5, 0.15, 0.15, 0.15, 0.5, 0.5])  # of one level
 CHUNK = 1 << 17  # observations at once, to limit memory
 
 
 @dataclass(frozen=True)
 class NodeFields:
-    """Parameters (n, 8) of n nodes and their variances (n, 8), both float32; the variances are 0
-    before the finest level. deviation: (levels, 8) standard deviations of each level's Σ; error: of
-    the logarithm of the radiance that remains."""
+    """Parameters (n, 10) of n nodes and their variances (n, 10), both float32; the variances are 0
+    before the finest level. deviation: (levels, 10) standard deviations of each level's Σ; error:
+    of the logarithm of the radiance that remains."""
 
     parameters: NDArray[np.float32]
     variance: NDArray[np.float32]
@@ -94,7 +94,7 @@ def solve(
     """Estimate the parameters of n nodes; yields (fraction done, fields so far) after each level.
 
     seen: observations of nodes 0 … n − 1. points, normals: (n, 3), scan frame. edges: of the cells
-    of each level, scan units. free: (8,) parameters that may differ from 0. mesh_edge: mean length
+    of each level, scan units. free: (10,) parameters that may differ from 0. mesh_edge: mean length
     of an edge of the mesh, scan units. normal_error: standard deviation, radians along each
     tangent, of the error of the normals that no tilt corrects.
     """
@@ -323,8 +323,8 @@ def _log_residuals(
     black: float,
     free: NDArray[np.bool_],
 ) -> tuple[Array, NDArray[np.float32]]:
-    """(measured minus predicted logarithm of the radiance (m, 3), derivatives (m, 3, 8) of the
-    prediction by the parameters). free: (8,) parameters whose derivatives are computed."""
+    """(measured minus predicted logarithm of the radiance (m, 3), derivatives (m, 3, 10) of the
+    prediction by the parameters). free: (10,) parameters whose derivatives are computed."""
     node = seen.node
     predicted, slope = model.derivatives(seen.shading, normal[node], theta[node], free)
     predicted += np.float32(black)
@@ -335,7 +335,7 @@ def _log_residuals(
 
 def _steepness(slope: NDArray[np.float32]) -> Array:
     """(m,) squared change of the logarithm for a tilt of the normal of one radian, the mean of the
-    channels. slope: (m, 3, 8) derivatives by the parameters."""
+    channels. slope: (m, 3, 10) derivatives by the parameters."""
     found: Array = np.square(slope[:, :, TILT]).sum(axis=2).mean(axis=1)
     return found
 

@@ -3,14 +3,15 @@
 At a node, the BRDF of the material is split into a diffuse body and a specular part (split.py)
 and changed to
 
-    ρ = exp(a) · body + exp(s − 2 g) · specular(θh'),   tan θh' = tan θh / exp(g)
+    ρ = exp(a) · body + exp(s + c − 2 g) · specular(θh'),   tan θh' = tan θh / exp(g)
 
 with the normal n + t, normalised. A material without a diffuse body (a metal) is scaled as a whole:
-ρ = exp(a − 2 g) · ρ(θh'). The eight parameters of a node are a (three channels: logarithm
-of the factor of the diffuse colour), s (the same of the specular part), g (of the roughness α, with
-the stretch invariance of GGX and Beckmann distributions, Heitz 2014, section 5.3) and t (a vector
-in the scan frame; only its part along the surface matters, and a vector, unlike two angles, can be
-interpolated). All are 0 for the even material.
+ρ = exp(a − 2 g) · ρ(θh'). The ten parameters of a node are a (three channels: logarithm
+of the factor of the diffuse colour), s (the same of the specular part, the mean of its channels), g
+(of the roughness α, with the stretch invariance of GGX and Beckmann distributions, Heitz 2014,
+section 5.3), t (a vector in the scan frame; only its part along the surface matters, and a vector,
+unlike two angles, can be interpolated) and two coordinates of c, the colour of the specular part:
+gold and paint have highlights of different colours. All are 0 for the even material.
 """
 
 from __future__ import annotations
@@ -29,11 +30,15 @@ from .split import EVERYTHING, split_body
 
 Array = NDArray[np.floating]
 
-COUNT = 8  # parameters of a node
-DIFFUSE, SPECULAR, GLOSS, TILT = slice(0, 3), 3, 4, slice(5, 8)
-LIMITS = np.array([3, 3, 3, 2.5, 0.9, 0.4, 0.4, 0.4], np.float32)
+COUNT = 10  # parameters of a node
+DIFFUSE, SPECULAR, GLOSS, TILT, TINT = slice(0, 3), 3, 4, slice(5, 8), slice(8, 10)
+TINTS = np.array([[2, -1, -1], [0, 1, -1]]) / np.sqrt([[6], [2]])
+"""(2, 3) the coordinates of TINT as logarithms of the channels: red against cyan, green against
+blue. Their mean is 0."""
+LIMITS = np.array([3, 3, 3, 2.5, 0.9, 0.4, 0.4, 0.4, 1.5, 1.5], np.float32)
 """Largest size of each parameter: a factor of 20 of the diffuse colour, 12 of the specular part,
-2.5 of the roughness; a tilt of 22 degrees."""
+2.5 of the roughness; a tilt of 22 degrees; a factor of 6 between the channels of the specular part,
+as of gold."""
 GLOSS_STEP, TILT_STEP = 0.1, 0.02  # of the finite differences
 MIN_COSINE = 0.02  # of a tilted normal: a tilt shall not turn a lit node away from the light
 MAX_THETA_H = 1.55  # radians, before the tangent
@@ -68,7 +73,7 @@ class NodeModel:
         return bool(self.body[0] < EVERYTHING)
 
     def reflectance(self, angles: Angles, parameters: Array) -> NDArray[np.float32]:
-        """(m, 3) ρ in 1/sr at angles to the tilted normals of points with parameters (m, 8)."""
+        """(m, 3) ρ in 1/sr at angles to the tilted normals of points with parameters (m, 10)."""
         body, specular = self._parts(angles, parameters)
         return body + specular
 
@@ -80,8 +85,8 @@ class NodeModel:
     def derivatives(
         self, seen: Shading, normal: Array, parameters: Array, free: NDArray[np.bool_]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """(radiance (m, 3), its derivatives (m, 3, 8) by the parameters). free: (8,); others get 0,
-        which saves time."""
+        """(radiance (m, 3), its derivatives (m, 3, 10) by the parameters). free: (10,); others get
+        0, which saves time."""
         turned = tilted(normal, parameters)
         body, specular = self._lit(seen, turned, parameters)
         total = body + specular
@@ -89,6 +94,7 @@ class NodeModel:
         for channel in range(3):
             out[:, channel, channel] = body[:, channel]
         out[:, :, SPECULAR] = specular
+        out[:, :, TINT] = specular[:, :, None] * TINTS.T.astype(np.float32)
         if free[GLOSS]:
             rougher = parameters.copy()
             rougher[:, GLOSS] += GLOSS_STEP
@@ -119,12 +125,18 @@ class NodeModel:
         if not self.has_body:
             return rho * np.exp(parameters[:, DIFFUSE]) * spread, np.zeros_like(rho)
         body = np.minimum(rho, self.body)
-        factor = np.exp(parameters[:, SPECULAR])[:, None] * spread
+        factor = specular_factor(parameters) * spread
         return body * np.exp(parameters[:, DIFFUSE]), (rho - body) * factor
 
 
+def specular_factor(parameters: Array) -> NDArray[np.float32]:
+    """(m, 3) factor of the specular part, roughness apart, of nodes with parameters (m, 10)."""
+    coloured = parameters[:, TINT] @ TINTS.astype(np.float32)
+    return np.asarray(np.exp(parameters[:, SPECULAR, None] + coloured), np.float32)
+
+
 def tilted(normal: Array, parameters: Array) -> NDArray[np.float32]:
-    """(m, 3) unit normals of nodes with smooth normals (m, 3) and parameters (m, 8)."""
+    """(m, 3) unit normals of nodes with smooth normals (m, 3) and parameters (m, 10)."""
     tilt = parameters[:, TILT]
     along = np.einsum("ij,ij->i", tilt, normal)[:, None] * normal
     return _unit(normal + tilt - along)

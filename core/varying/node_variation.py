@@ -24,7 +24,7 @@ CHUNK = 1 << 17  # pixels at once, to limit memory
 @dataclass(frozen=True)
 class MaterialNodes:
     """The nodes of one material. model: of its BRDF in the unit of the diagnosis; parameters:
-    (n, 8)."""
+    (n, 10)."""
 
     nodes: Nodes
     model: NodeModel
@@ -35,7 +35,7 @@ class MaterialNodes:
         return cKDTree(_places(self.nodes.points, self.nodes.normals, self.nodes.spacing))
 
     def at(self, points: NDArray[np.float64], normals: NDArray[np.floating]) -> NDArray[np.float32]:
-        """(m, 8) parameters at points (m, 3) with normals (m, 3), weighted by inverse distances to
+        """(m, 10) parameters at points (m, 3) with normals (m, 3), weighted by inverse distances to
         the nearest nodes of the same side of the surface."""
         unit = self.nodes.spacing
         out = np.empty((len(points), self.parameters.shape[1]), np.float32)

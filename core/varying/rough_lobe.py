@@ -21,7 +21,7 @@ MIN_ALBEDO = 1e-3  # of a node, to limit its relative error
 
 
 def rough_lobe_variance(model: NodeModel, parameters: NDArray[np.floating]) -> NDArray[np.float32]:
-    """(n, 8) variances of the parameters (n, 8) of nodes from a lobe that looks diffuse: those of
+    """(n, 10) variances of the parameters (n, 10) of nodes from a lobe that looks diffuse: those of
     the diffuse colour; 0 for a material without a diffuse part."""
     found = np.zeros((len(parameters), COUNT), np.float32)
     if model.has_body:

@@ -67,7 +67,7 @@ class Division:
 def features(model: NodeModel, points: NDArray[np.float64], parameters: Array) -> Array:
     """(n, 3) logarithms of the ratio of specular and diffuse part (0 where the model has no
     diffuse part), of the roughness and of the specular part, averaged over neighbours. points:
-    (n, 3) of the nodes; parameters: (n, 8)."""
+    (n, 3) of the nodes; parameters: (n, 10)."""
     ratio = parameters[:, SPECULAR] - parameters[:, DIFFUSE].mean(axis=1)
     if not model.has_body:
         ratio = np.zeros_like(ratio)

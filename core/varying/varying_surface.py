@@ -20,7 +20,7 @@ VARIATIONS: dict[str, tuple[int, ...]] = {
     EVEN: (),
     "diffuse": (0, 1, 2),
     "diffuse and normals": (0, 1, 2, 5, 6, 7),
-    "diffuse, specular, gloss and normals": (0, 1, 2, 3, 4, 5, 6, 7),
+    "diffuse, specular, gloss and normals": (0, 1, 2, 3, 4, 5, 6, 7, 8, 9),
 }
 """What may vary over a material → the parameters of its nodes (node_model.py), simplest first."""
 ALL_VARIATIONS = tuple(VARIATIONS)[-1]
@@ -39,7 +39,7 @@ class MaterialVariation:
 
 @dataclass(frozen=True)
 class VaryingSurface:
-    """grid: of the nodes. parameters: (n, 8) float32; deviation: (n, 8) float32, their standard
+    """grid: of the nodes. parameters: (n, 10) float32; deviation: (n, 10) float32, their standard
     errors; photos: (n,) uint16, number of photos that show the node lit. face_material: (f,) uint8,
     index of the material of each face of the mesh. materials: in the order of the capture.
     separated_from: the material of the capture that they are parts of, None where they are those of
@@ -61,7 +61,7 @@ class VaryingSurface:
     def at(
         self, face: NDArray[np.integer], second: NDArray[np.floating], third: NDArray[np.floating]
     ) -> NDArray[np.float32]:
-        """(m, 8) parameters at points of faces, given by barycentric weights of their second and
+        """(m, 10) parameters at points of faces, given by barycentric weights of their second and
         third vertex."""
         node, weight = self.grid.at(face, second, third)
         return np.einsum("mk,mkc->mc", weight, self.parameters[node])

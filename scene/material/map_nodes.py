@@ -37,6 +37,7 @@ SOCKETS = {
     "roughness": "Roughness",
     "metallic": "Metallic",
     "specular": "Specular IOR Level",
+    "specular_tint": "Specular Tint",
 }
 """Kind of map → input of the Principled BSDF."""
 STEP = 300  # distance of two image nodes

@@ -13,9 +13,15 @@ from patina.core.basis import PrincipalBRDF
 from patina.core.maps.maps_result import MapsResult, baked_maps
 from patina.core.maps.material import MapMaterial
 from patina.core.maps.texels import rasterise
-from patina.core.maps.write import base_color, roughness, specular, write_maps
+from patina.core.maps.write import (
+    base_color,
+    roughness,
+    specular,
+    specular_tint,
+    write_maps,
+)
 from patina.core.scan import Mesh
-from patina.core.varying.node_model import COUNT, GLOSS, SPECULAR
+from patina.core.varying.node_model import COUNT, GLOSS, SPECULAR, TINT, TINTS
 from patina.core.varying.surface_grid import SurfaceGrid
 from patina.core.varying.varying_surface import MaterialVariation, VaryingSurface
 from tests.projected import projected
@@ -47,6 +53,7 @@ def surface(mesh: Mesh, materials: int = 1) -> VaryingSurface:
     parameters[:, 0], parameters[:, 1], parameters[:, 2] = 0.4 * x, -0.2 * y, 0.1
     parameters[:, SPECULAR], parameters[:, GLOSS] = 0.5 * y, 0.3 * x - 0.1
     parameters[:, 5] = 0.1  # towards +x
+    parameters[:, TINT.start] = 0.2 * x  # red highlights
     deviation = np.full((len(grid), COUNT), 0.07, np.float32)
     centre = mesh.vertices[mesh.faces].mean(axis=1)
     side = (centre[:, 0] > 0.5) if materials > 1 else np.zeros(len(centre), bool)
@@ -74,7 +81,10 @@ def test_maps_have_the_parameters_of_each_place(brdf):
     x, y, _ = result.texels.points(mesh, slice(None)).T
     expected = FITTED.base_color * np.exp(np.stack([0.4 * x, -0.2 * y, 0.1 + 0 * x], axis=1))
     assert base_color(result, 0) == pytest.approx(expected, rel=2e-3)
-    assert specular(result, 0) == pytest.approx(0.4 * np.exp(0.5 * y), rel=2e-3)
+    red, green, blue = (TINTS[0] * 0.2 * x[:, None]).T
+    assert specular(result, 0) == pytest.approx(0.4 * np.exp(0.5 * y + red), rel=2e-3)
+    tint = np.exp(np.stack([0 * red, green - red, blue - red], axis=1))
+    assert specular_tint(result, 0) == pytest.approx(tint, rel=2e-3)
     assert roughness(result, 0) == pytest.approx(0.5 * np.exp(0.5 * (0.3 * x - 0.1)), rel=2e-3)
     assert result.maps.error == pytest.approx(0.07, rel=1e-3)
     assert (result.maps.photos == 5).all()
@@ -104,7 +114,14 @@ def test_materials_keep_to_their_faces(brdf):
 def test_files_hold_the_factors_of_the_shader(brdf, tmp_path):
     files = write_maps(tmp_path, baked(square(), brdf), "exr")
     kinds = {file.kind for file in files}
-    assert {"scale", "specular_scale", "roughness_scale", "specular", "normal"} <= kinds
+    assert {
+        "scale",
+        "specular_scale",
+        "roughness_scale",
+        "specular",
+        "specular_tint",
+        "normal",
+    } <= kinds
     assert all((tmp_path / file.file).is_file() for file in files)
     record = json.loads((tmp_path / "maps.json").read_text())
     assert record["normals_turned"]["median"] == pytest.approx(np.degrees(np.arctan(0.1)), abs=0.05)

@@ -8,9 +8,23 @@ import pytest
 from patina.core.concurrency.steps import drained
 from patina.core.varying.choice import Nodes, choose
 from patina.core.varying.hierarchy import NodeFields
-from patina.core.varying.node_model import COUNT, DIFFUSE, TILT, Shading, tilted
+from patina.core.varying.node_model import (
+    COUNT,
+    DIFFUSE,
+    TILT,
+    Shading,
+    specular_factor,
+    tilted,
+)
 from patina.core.varying.varying_surface import VARIATIONS
-from tests.core.varying_scene import ALBEDO, SPACING, VaryingScene, fitted_model, scene
+from tests.core.varying_scene import (
+    ALBEDO,
+    GOLD,
+    SPACING,
+    VaryingScene,
+    fitted_model,
+    scene,
+)
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +70,20 @@ def test_colour_and_normals_are_found(model):
     assert np.median(angle(normal, made.true_normals)) < 0.4 * np.median(
         angle(made.normals, made.true_normals)
     )
+
+
+def test_coloured_highlights_are_found(model):
+    """Gold beside white: the colour of the highlight changes, and not that of the diffuse part."""
+    made = scene(16, 4, vary=False, gold=True)
+    fields = solved(model, made)
+    found = np.log(specular_factor(fields.parameters))
+    red_to_blue = found[:, 0] - found[:, 2]
+    gold, white = made.points[:, 0] > 0.1, made.points[:, 0] < -0.1
+    true = np.log(GOLD[0] / GOLD[2])
+    assert np.median(red_to_blue[gold]) == pytest.approx(true, rel=0.25)
+    assert abs(np.median(red_to_blue[white])) < 0.15 * true
+    colour = fields.parameters[gold][:, DIFFUSE]
+    assert abs(np.median(colour[:, 0] - colour[:, 2])) < 0.05 * true
 
 
 def test_standard_errors_cover_the_errors_of_the_colour(model):

@@ -15,6 +15,7 @@ from patina.core.varying.observations import Observations
 
 SPACING = 0.02
 ALBEDO = 0.3 * np.array([1.0, 0.8, 0.6])
+GOLD = np.array([1.6, 1.0, 0.5])  # colour of highlights
 
 
 @dataclass(frozen=True)
@@ -52,9 +53,12 @@ def fitted_model() -> NodeModel:
     return NodeModel.of(brdf)
 
 
-def scene(photos: int, seed: int, vary: bool = True, tilt: float = 0.0) -> VaryingScene:
+def scene(
+    photos: int, seed: int, vary: bool = True, tilt: float = 0.0, gold: bool = False
+) -> VaryingScene:
     """A bumpy square of side 2 with albedo 0.3 in stripes of ± 40 %, photographed from above with a
-    distant lamp each. tilt: degrees, error of the scan's normals."""
+    distant lamp each. tilt: degrees, error of the scan's normals. gold: whether highlights have the
+    colour GOLD where x is positive."""
     rng = np.random.default_rng(seed)
     x, y = np.mgrid[-1:1:SPACING, -1:1:SPACING].reshape(2, -1)
     points = np.stack([x, y, 0.05 * np.sin(5 * x) * np.cos(4 * y)], axis=1)
@@ -66,10 +70,11 @@ def scene(photos: int, seed: int, vary: bool = True, tilt: float = 0.0) -> Varyi
     scan /= np.linalg.norm(scan, axis=1, keepdims=True)
     stripes = 1 + 0.4 * np.sin(9 * x) * np.cos(8 * y) if vary else np.ones_like(x)
     colour = stripes[:, None] * ALBEDO
+    shine = np.where((x > 0)[:, None] & gold, GOLD, 1.0)
     parts = []
     for photo in range(photos):
         light, view = (_direction(rng) for _ in range(2))
-        rho = colour / np.pi + ggx(true, light, view)[:, None]
+        rho = colour / np.pi + shine * ggx(true, light, view)[:, None]
         cosine = np.maximum(true @ light, 0)
         radiance = rho * cosine[:, None] * (1 + 0.01 * rng.normal(size=rho.shape))
         n = len(points)

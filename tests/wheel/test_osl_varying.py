@@ -17,7 +17,14 @@ import bpy  # noqa: E402
 from patina.core.angles import Angles, half_difference  # noqa: E402
 from patina.core.appearance.principled import Principled  # noqa: E402
 from patina.core.basis import PrincipalBRDF  # noqa: E402
-from patina.core.varying.node_model import COUNT, GLOSS, SPECULAR, NodeModel  # noqa: E402
+from patina.core.varying.node_model import (  # noqa: E402
+    COUNT,
+    GLOSS,
+    SPECULAR,
+    TINT,
+    NodeModel,
+    specular_factor,
+)
 from patina.scene.material import material_nodes  # noqa: E402
 from tests.projected import projected  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
@@ -39,6 +46,7 @@ FACTORS = pytest.mark.parametrize(
     ("specular", "roughness"), [(1.0, 2.0), (1.0, 0.6), (2.5, 1.0), (0.3, 1.5)]
 )
 PAINT = np.array([0.3, 1.0, 1.5])
+HIGHLIGHT = 0.4, -0.3  # colour of the specular part
 
 
 @dataclass(frozen=True)
@@ -57,7 +65,7 @@ def changed(brdf: PrincipalBRDF, paint: np.ndarray, specular: float, roughness: 
     """The BRDF as the model of a node changes it."""
     parameters = np.zeros(COUNT, np.float32)
     parameters[:3], parameters[SPECULAR] = np.log(paint), np.log(specular)
-    parameters[GLOSS] = np.log(roughness)
+    parameters[GLOSS], parameters[TINT] = np.log(roughness), HIGHLIGHT
     return Changed(NodeModel.of(brdf), parameters)
 
 
@@ -67,7 +75,7 @@ def assign(expected: Changed, brdf: PrincipalBRDF, sphere: bpy.types.Object) -> 
     found = np.exp(expected.parameters)
     sockets["body"].default_value = tuple(expected.model.body)
     sockets["body_scale"].default_value = (*found[:3], 1.0)
-    sockets["specular_scale"].default_value = found[SPECULAR]
+    sockets["specular_scale"].default_value = (*specular_factor(expected.parameters[None])[0], 1.0)
     sockets["roughness_scale"].default_value = found[GLOSS]
 
 
