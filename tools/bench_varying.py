@@ -115,6 +115,7 @@ def _named(path: Path, ends: tuple[str, ...]) -> list[int]:
 
 
 def _each_alone(path: Path) -> list[list[int]]:
+    """Groups of one photo each."""
     return [[k] for k in range(len(_read(path).photos))]
 
 

@@ -32,6 +32,11 @@ class MaterialMaps:
     share: NDArray[np.float32]
     specular: NDArray[np.float32]
 
+    @property
+    def has_coloured_highlights(self) -> bool:
+        """Whether the channels of the specular part differ anywhere."""
+        return bool((self.specular != self.specular[:, :1]).any())
+
 
 @dataclass(frozen=True)
 class TexelMaps:
@@ -44,6 +49,11 @@ class TexelMaps:
     error: NDArray[np.float32]
     material: NDArray[np.uint8]
     highlight: NDArray[np.bool_]
+
+
+def even_factor(n: int) -> NDArray[np.float32]:
+    """(n, 3) ones, which take no memory."""
+    return np.broadcast_to(np.float32(1), (n, 3))
 
 
 def complete_maps(
@@ -82,7 +92,7 @@ def complete_maps(
             total = certain + GLOSS_PRIOR**-2
             shine[rows] = (certain * scales.gloss[rows] + GLOSS_PRIOR**-2 * near) / total
         own_share = share[:, index].astype(np.float32)
-        made.append(MaterialMaps(scale, shine, own_share, np.ones((n, 3), np.float32)))
+        made.append(MaterialMaps(scale, shine, own_share, even_factor(n)))
     return TexelMaps(tuple(made), gathered.photos, error, material, np.isfinite(scales.gloss_error))
 
 

@@ -10,7 +10,7 @@ from ..scan import Mesh
 from ..varying.node_model import DIFFUSE, GLOSS, specular_factor, tilted
 from ..varying.varying_surface import VaryingSurface
 from .level import MaterialLevel
-from .settle import GLOSS_PRIOR, MaterialMaps, TexelMaps
+from .settle import GLOSS_PRIOR, MaterialMaps, TexelMaps, even_factor
 from .texels import Texels
 
 CHUNK = 1 << 18  # texels processed at once, to limit memory
@@ -41,7 +41,7 @@ def maps_of_variation(
     for index in range(count):
         own = material == index
         if not own.any():
-            even = np.ones_like(scale)
+            even = even_factor(n)
             made.append(MaterialMaps(even, np.zeros_like(gloss), share[:, index], even))
             continue
         mine = tuple(_elsewhere_median(values, own) for values in (scale, gloss, specular))

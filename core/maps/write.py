@@ -115,7 +115,7 @@ def _maps(
             level = float(material.principled.specular_ior_level)
             yield named("specular", False), specular(result, index), level
             yield named("specular_scale", False, ending="exr"), own.specular, 1.0
-            if (own.specular != own.specular[:, :1]).any():
+            if own.has_coloured_highlights:
                 yield named("specular_tint", True), specular_tint(result, index), 1.0
         if several:
             yield named("mask", False), result.maps.materials[index].share, 0.0
@@ -146,7 +146,7 @@ def _blended(result: MapsResult) -> dict[str, NDArray[np.float32]]:
     materials, weighted by their shares."""
     share = [maps.share for maps in result.maps.materials]
     found: dict[str, NDArray[np.float32]] = {}
-    coloured = any((maps.specular != maps.specular[:, :1]).any() for maps in result.maps.materials)
+    coloured = any(maps.has_coloured_highlights for maps in result.maps.materials)
     also = ("specular_tint",) if coloured else ()
     for what in ("base_color", "roughness", "metallic", "specular", *also):
         total: Any = 0.0

@@ -32,7 +32,7 @@ Array = NDArray[np.floating]
 
 COUNT = 10  # parameters of a node
 DIFFUSE, SPECULAR, GLOSS, TILT, TINT = slice(0, 3), 3, 4, slice(5, 8), slice(8, 10)
-TINTS = np.array([[2, -1, -1], [0, 1, -1]]) / np.sqrt([[6], [2]])
+TINTS = (np.array([[2, -1, -1], [0, 1, -1]]) / np.sqrt([[6], [2]])).astype(np.float32)
 """(2, 3) the coordinates of TINT as logarithms of the channels: red against cyan, green against
 blue. Their mean is 0."""
 LIMITS = np.array([3, 3, 3, 2.5, 0.9, 0.4, 0.4, 0.4, 1.5, 1.5], np.float32)
@@ -94,7 +94,7 @@ class NodeModel:
         for channel in range(3):
             out[:, channel, channel] = body[:, channel]
         out[:, :, SPECULAR] = specular
-        out[:, :, TINT] = specular[:, :, None] * TINTS.T.astype(np.float32)
+        out[:, :, TINT] = specular[:, :, None] * TINTS.T
         if free[GLOSS]:
             rougher = parameters.copy()
             rougher[:, GLOSS] += GLOSS_STEP
@@ -131,8 +131,8 @@ class NodeModel:
 
 def specular_factor(parameters: Array) -> NDArray[np.float32]:
     """(m, 3) factor of the specular part, roughness apart, of nodes with parameters (m, 10)."""
-    coloured = parameters[:, TINT] @ TINTS.astype(np.float32)
-    return np.asarray(np.exp(parameters[:, SPECULAR, None] + coloured), np.float32)
+    logarithm = parameters[:, SPECULAR, None] + parameters[:, TINT] @ TINTS
+    return np.asarray(np.exp(logarithm), np.float32)
 
 
 def tilted(normal: Array, parameters: Array) -> NDArray[np.float32]:

@@ -16,7 +16,10 @@ def test_it_is_the_minimum_that_a_general_solver_finds():
     matrix, pull = root @ root.T + np.eye(4), 3 * RNG.normal(size=4)
     low, high = np.full(4, -0.3), np.full(4, 0.3)
     x, free = bounded_minimum(matrix, pull, low, high, 1.0)
-    cost = lambda v: 0.5 * v @ matrix @ v - pull @ v  # noqa: E731
+
+    def cost(v: np.ndarray) -> float:
+        return 0.5 * v @ matrix @ v - pull @ v
+
     expected = minimize(cost, np.zeros(4), bounds=list(zip(low, high, strict=True)), tol=1e-12).x
     assert x == pytest.approx(expected, abs=1e-4)
     assert (free == (np.abs(x) < 0.3 - 1e-9)).all()

@@ -215,13 +215,13 @@ def _minimum(left: Array, residual: Array, declared: Sequence[Parameters]) -> _M
         np.concatenate([getattr(one, name) for one in declared])
         for name in ("low", "high", "deviation")
     )
-    q = left.shape[2]
+    q, precision = left.shape[2], prior**-2.0
     flat, weight = left.reshape(-1, q).astype(np.float64), robust_weights(residual)
     for _ in range(REWEIGHTINGS):
         weighted = left * weight[..., None].astype(np.float32)
         score = np.einsum("ncq,nc->nq", weighted, residual).astype(np.float64)
-        matrix = flat.T @ weighted.reshape(-1, q) + np.diag(1 / prior**2)
-        x, free = bounded_minimum(matrix, score.sum(axis=0), low, high, float(np.min(prior**-2)))
+        matrix = flat.T @ weighted.reshape(-1, q) + np.diag(precision)
+        x, free = bounded_minimum(matrix, score.sum(axis=0), low, high, float(precision.min()))
         rest = residual - left @ x.astype(np.float32)
         weight = robust_weights(rest)
     saved = float((robust_cost(residual) - robust_cost(rest)).sum())
