@@ -78,8 +78,8 @@ def compare(path: Path, count: int) -> None:
     surface = drained(observe_surface(_of_all(even, capture), NODES, 0.0, 1.0))
     known = surface.seen.photo >= HELD_OUT
     known &= surface.seen.photo < HELD_OUT + count
-    seen = surface.seen.select(np.flatnonzero(known))
-    held = surface.seen.select(np.flatnonzero(surface.seen.photo < HELD_OUT))
+    seen = surface.seen.select(np.flatnonzero(known)).measured()
+    held = surface.seen.select(np.flatnonzero(surface.seen.photo < HELD_OUT)).measured()
     normals = surface.grid.normals(np.arange(len(surface.grid)))
     rows = [ours("even", even, surface, held, even_seconds)]
     ways = {"Lambert and GGX": plain.lambert_ggx, "basis weights": plain.basis_weights}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -62,6 +62,11 @@ class MaterialLevel:
         """normal_deviation: standard deviation of the normals in degrees, from the fit."""
         error = max(float(np.radians(normal_deviation)), MIN_NORMAL_ERROR)
         return cls(name, brdf, split_body(brdf.evaluate), scale, error)
+
+    @property
+    def divided(self) -> MaterialLevel:
+        """The same, with a specular part that is scaled apart from the body."""
+        return replace(self, split=self.split.divided)
 
     def at(self, angles: Angles) -> Parts:
         """Body and specular part at n directions.

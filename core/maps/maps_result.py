@@ -51,7 +51,7 @@ def baked_maps(
 ) -> MapsResult:
     """The maps of materials whose variation was estimated with the fit. scan: its mesh with texture
     coordinates; texels: of that mesh."""
-    levels = levels_of(materials)
+    levels = tuple(level.divided for level in levels_of(materials))
     normal = None
     if surface.parameters[:, TILT].any():
         normal = tangent_normals(

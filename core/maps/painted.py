@@ -31,7 +31,7 @@ HIGH = np.array([1, 1, 1, 1, 1, 1.0])
 def painted_principled(level: MaterialLevel, fitted: Principled) -> Principled:
     """``fitted``, or the best-fitting dielectric if ``fitted`` is partly metallic and only the
     diffuse body varies."""
-    if level.split.whole or fitted.metallic == 0:
+    if level.split.mostly_specular or fitted.metallic == 0:
         return fitted
     goal = Target.of(level.brdf.evaluate, COARSE)
 

@@ -7,7 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scan import Mesh
-from ..varying.node_model import DIFFUSE, GLOSS, specular_factor, tilted
+from ..varying.node_model import (
+    COUNT,
+    DIFFUSE,
+    GLOSS,
+    SPECULAR,
+    diffuse_factor,
+    specular_factor,
+    tilted,
+)
 from ..varying.varying_surface import VaryingSurface
 from .level import MaterialLevel
 from .settle import GLOSS_PRIOR, MaterialMaps, TexelMaps, even_factor
@@ -27,14 +35,19 @@ def maps_of_variation(
     scale, specular = np.ones((2, n, 3), np.float32)
     gloss, error = np.zeros((2, n), np.float32)
     photos, highlight = np.zeros(n, np.uint16), np.zeros(n, bool)
-    channels = np.stack([level.channels for level in levels])
+    channels = np.zeros((count, COUNT))  # parameters that the standard error is of
+    for index, level in enumerate(levels):
+        if level.split.mostly_specular:
+            channels[index, SPECULAR] = 1.0
+        else:
+            channels[index, DIFFUSE] = level.channels
     for part in chunks(n):
         node, weight = surface.grid.at(texels.face[part], texels.second[part], texels.third[part])
         found = np.einsum("mk,mkc->mc", weight, surface.parameters[node])
         deviation = np.einsum("mk,mkc->mc", weight, surface.deviation[node])
-        scale[part], specular[part] = np.exp(found[:, DIFFUSE]), specular_factor(found)
+        scale[part], specular[part] = diffuse_factor(found), specular_factor(found)
         gloss[part] = found[:, GLOSS]
-        error[part] = np.sum(deviation[:, DIFFUSE] * channels[material[part]], axis=1)
+        error[part] = np.sum(deviation * channels[material[part]], axis=1)
         photos[part] = surface.photos[node].max(axis=1)
         highlight[part] = (deviation[:, GLOSS] > 0) & (deviation[:, GLOSS] < GLOSS_PRIOR)
     made = []

@@ -16,6 +16,7 @@ from ..photo import write_png
 from ..photo.image import write_exr
 from ..photo.transfer import srgb_encoded
 from .dilate import dilated, margin_of
+from .level import MaterialLevel
 from .maps_result import MapsResult
 from .settle import MaterialMaps
 
@@ -52,10 +53,15 @@ def write_maps(
 
 
 def base_color(result: MapsResult, index: int) -> NDArray[np.float32]:
-    """(n, 3) base colour of the fitted Principled BSDF times the scale: linear, 0 … 1."""
-    fitted = result.materials[index].principled.base_color
-    scale = result.maps.materials[index].scale
-    return np.clip(np.asarray(fitted, np.float32) * scale, 0.0, 1.0)
+    """(n, 3) base colour of the fitted Principled BSDF, linear, 0 … 1, times the scale of the
+    diffuse body. Of a metal, the base colour is that of all light that it reflects."""
+    fitted, own = result.materials[index].principled, result.maps.materials[index]
+    factor, split = own.scale, result.levels[index].split
+    if not split.whole and fitted.metallic > 0:
+        share = np.float32(split.share)
+        all_light = share * own.scale + (1 - share) * own.specular
+        factor = factor + np.float32(fitted.metallic) * (all_light - factor)
+    return np.clip(np.asarray(fitted.base_color, np.float32) * factor, 0.0, 1.0)
 
 
 def roughness(result: MapsResult, index: int) -> NDArray[np.float32]:
@@ -73,9 +79,12 @@ def specular(result: MapsResult, index: int) -> NDArray[np.float32]:
 
 
 def specular_tint(result: MapsResult, index: int) -> NDArray[np.float32]:
-    """(n, 3) colour of the specular part, 0 … 1; its brightest channel is 1."""
+    """(n, 3) colour of the specular part, 0 … 1; its brightest channel is 1. That of a metal is in
+    its base colour."""
     factor = result.maps.materials[index].specular
-    return np.asarray(factor / factor.max(axis=1, keepdims=True), np.float32)
+    tint = factor / factor.max(axis=1, keepdims=True)
+    metallic = float(result.materials[index].principled.metallic)
+    return np.asarray(tint + metallic * (1 - tint), np.float32)
 
 
 def albedo(result: MapsResult, index: int) -> NDArray[np.float32]:
@@ -230,7 +239,7 @@ def _material(result: MapsResult, index: int) -> dict[str, Any]:
         "name": level.name,
         "texels": int(own.sum()),
         "seen": int(seen.sum()),
-        "varies": "the whole reflectance" if level.split.whole else "its diffuse part",
+        "varies": _varying_parts(level, maps.materials[index]),
         "diffuse_share": level.split.share,
         "diffuse_albedo": None if level.split.whole else (np.pi * level.split.body).tolist(),
         "base_color": np.asarray(result.materials[index].principled.base_color).tolist(),
@@ -240,6 +249,13 @@ def _material(result: MapsResult, index: int) -> dict[str, Any]:
             "percentile_95": high.tolist(),
         },
     }
+
+
+def _varying_parts(level: MaterialLevel, maps: MaterialMaps) -> str:
+    """What the maps of a material scale."""
+    if level.split.whole:
+        return "the whole reflectance"
+    return "its diffuse part" if (maps.specular == 1).all() else "its diffuse and specular parts"
 
 
 def _turned(normal: NDArray[np.float32]) -> dict[str, float]:

@@ -17,7 +17,8 @@ from .varying_surface import EVEN, VARIATIONS, MaterialVariation
 FOLDS = 3  # groups of photos, each held out once
 MAX_SINGLE_PHOTOS = 6  # up to so many, each photo is a group: two are too many to leave out
 MIN_PHOTOS = 3  # with fewer, one photo cannot be predicted from the others
-STANDARD_ERRORS = 2.0  # over photos, of the gain by which a more varied kind must be better
+STANDARD_ERRORS = 2.0  # over photos, of the gain by which another kind than the first is better
+FURTHER_STANDARD_ERRORS = 1.0  # by which a still more varied one is (Breiman et al. 1984)
 MIN_GAIN = 0.1  # relative decrease of the error of held-out photos that makes a surface uneven
 MIN_VARIATION = 0.03  # relative, explained by what varies: about one step of L*, hardly visible
 MIN_NORMAL_ERROR = float(np.radians(0.5))  # that remains with tilts, or of a very good scan
@@ -43,9 +44,10 @@ class Nodes:
     def solve(
         self, model: NodeModel, seen: Observations, kind: str
     ) -> Iterator[tuple[float, NodeFields]]:
-        """The fields of what a key of VARIATIONS lets vary; see hierarchy.solve."""
+        """The fields of what a key of VARIATIONS lets vary, always with the colour of the surface;
+        see hierarchy.solve."""
         free = np.zeros(COUNT, bool)
-        free[list(VARIATIONS[kind])] = True
+        free[[*VARIATIONS[kind], *model.colour]] = True
         edges = edges_of_levels(self.points, self.spacing)
         error = MIN_NORMAL_ERROR if free[TILT].any() else self.normal_error
         return solve(model, seen, self.points, self.normals, edges, free, self.mesh_edge, error)
@@ -69,23 +71,25 @@ def choose(
 
     candidates: (kind, model with which it is estimated), simplest first. The simplest is kept
     unless a more varied one predicts held-out photos better: by STANDARD_ERRORS over photos of the
-    logarithm of the cost; with ``highlights`` by a factor that is larger than that by which the RMS
-    error of the radiance grows, which is mostly that of highlights; and for an even material by
-    MIN_GAIN and MIN_VARIATION. The error is the mean absolute one of the logarithm (the median does
-    not show a second material on less than half of the surface). Only nodes count that a fitted
-    photo shows too: of others, the photos say nothing. With fewer than MIN_PHOTOS it is the first.
+    logarithm of the cost (FURTHER_STANDARD_ERRORS better than a kind that is already preferred to
+    the simplest); with ``highlights`` by a factor that is larger than that by which the RMS error
+    of the radiance grows, which is mostly that of highlights; and for an even material by MIN_GAIN
+    and MIN_VARIATION. The error is the mean absolute one of the logarithm (the median does not show
+    a second material on less than half of the surface). Only nodes count that a fitted photo shows
+    too: of others, the photos say nothing. With fewer than MIN_PHOTOS it is the first.
     """
     photos = np.unique(seen.photo)
     first, even = candidates[0]
     if len(photos) < MIN_PHOTOS:
         return MaterialVariation(first)
-    errors = yield from _held_out([(nodes, *each) for each in candidates], even, seen)
-    found = {kind: one for (kind, _), one in zip(candidates, errors, strict=True)}
+    held = yield from _held_out([(nodes, *each) for each in candidates], even, seen)
+    found = {kind: one for (kind, _), one in zip(candidates, held, strict=True)}
     if len(found[first].cost) < MIN_PHOTOS:
         return MaterialVariation(first)
     chosen = first
     for kind, _ in candidates[1:]:
-        if found[kind].better(found[chosen], chosen == EVEN, highlights):
+        errors = STANDARD_ERRORS if chosen == first else FURTHER_STANDARD_ERRORS
+        if found[kind].better(found[chosen], chosen == EVEN, highlights, errors):
             chosen = kind
     return MaterialVariation(
         chosen,
@@ -213,13 +217,14 @@ def log_errors(
     black: float,
 ) -> tuple[NDArray[np.floating], NDArray[np.floating], NDArray[np.floating]]:
     """(measured minus predicted logarithm of the radiance, relative error, error of the radiance),
-    each (m, 3)."""
+    each (m, 3), 0 where a channel is clipped and predicted to be."""
     log, relative, error = np.empty((3, len(seen), 3), np.float32)
     for begin in range(0, len(seen), CHUNK):
         part = slice(begin, begin + CHUNK)
         some = seen.select(part)
         predicted = model.radiance(some.shading, nodes.normals[some.node], theta[some.node])
         measured = np.maximum(some.radiance, 0)
+        predicted = np.where(some.clipped, np.minimum(predicted, measured), predicted)
         log[part] = np.log(measured + black) - np.log(predicted + black)
         error[part] = predicted - measured
         relative[part] = np.abs(error[part]) / np.maximum(measured, black)

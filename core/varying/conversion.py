@@ -29,8 +29,8 @@ def typical_samples(
     normals: NDArray[np.float32],
     parameters: NDArray[np.float32],
 ) -> SampleTable:
-    """Samples of the typical material, in the scale of ``model``. points, normals: (n, 3) of the
-    nodes; parameters: (n, 10)."""
+    """Samples of the typical material, in the scale of ``model``. seen: without clipped ones;
+    points, normals: (n, 3) of the nodes; parameters: (n, 10)."""
     step = -(-len(seen) // MAX_SAMPLES)
     some = seen.select(np.arange(0, len(seen), max(step, 1)))
     own = parameters[some.node]

@@ -24,10 +24,11 @@ MAX_MATERIALS = 250  # labels are uint8, 0 means no material
 class PixelLabels:
     """shown: (h, w) uint8, 1 + index of the material that a pixel shows, 0 for none. trusted: the
     same where the pixel is lit, not clipped, and away from outlines, shadow edges and the borders
-    of masks; 0 elsewhere."""
+    of masks; 0 elsewhere. clipped: the same where it is all of that, but clipped."""
 
     shown: NDArray[np.uint8]
     trusted: NDArray[np.uint8]
+    clipped: NDArray[np.uint8]
 
 
 def check_material_count(capture: Capture) -> None:
@@ -55,7 +56,7 @@ def label_pixels(
     margins = capture.fit.margins
     lines = PixelRays.of(camera)
     shown = np.zeros(camera.height * camera.width, np.uint8)
-    trusted = np.zeros_like(shown)
+    reliable = np.zeros_like(shown)
     usable = photo.usable.ravel()
     for window in bands(camera, halo(margins), rays.cover.columns(camera)):
         view = view_window(rays, lines, window)
@@ -66,12 +67,12 @@ def label_pixels(
         lighting = light_surface(rays, view, light, camera)
         where, in_shadow = material_pixels(capture, scan, view, masks)
         good = trusted_pixels(view, lighting, margins) & ~in_shadow & wanted
-        good &= usable.take(view.pixel)
         for index, material in enumerate(capture.materials):
             pixels = where[material.name]
             shown[view.pixel[pixels & wanted]] = index + 1
             inner = inner_pixels(view, pixels, margins)
-            trusted[view.pixel[good & inner]] = index + 1
-    trusted[trusted != shown] = 0  # overlapping masks: the material is ambiguous
+            reliable[view.pixel[good & inner]] = index + 1
+    reliable[reliable != shown] = 0  # overlapping masks: the material is ambiguous
+    trusted = reliable * usable
     shape = camera.height, camera.width
-    return PixelLabels(shown.reshape(shape), trusted.reshape(shape))
+    return PixelLabels(*(a.reshape(shape) for a in (shown, trusted, reliable - trusted)))

@@ -5,13 +5,13 @@ and changed to
 
     ρ = exp(a) · body + exp(s + c − 2 g) · specular(θh'),   tan θh' = tan θh / exp(g)
 
-with the normal n + t, normalised. A material without a diffuse body (a metal) is scaled as a whole:
-ρ = exp(a − 2 g) · ρ(θh'). The ten parameters of a node are a (three channels: logarithm
+with the normal n + t, normalised. The ten parameters of a node are a (three channels: logarithm
 of the factor of the diffuse colour), s (the same of the specular part, the mean of its channels), g
 (of the roughness α, with the stretch invariance of GGX and Beckmann distributions, Heitz 2014,
 section 5.3), t (a vector in the scan frame; only its part along the surface matters, and a vector,
 unlike two angles, can be interpolated) and two coordinates of c, the colour of the specular part:
-gold and paint have highlights of different colours. All are 0 for the even material.
+gold and paint have highlights of different colours. All are 0 for the even material. The specular
+part has the colour of a metal.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ..angles import Angles, half_difference
 from ..angles.vectors import tangents
 from ..basis import PrincipalBRDF
 from ..basis.log_table import LogTable
-from .split import EVERYTHING, split_body
+from .split import MIN_BODY_SHARE, split_body
 
 Array = NDArray[np.floating]
 
@@ -56,21 +56,41 @@ class Shading(NamedTuple):
 @dataclass(frozen=True)
 class NodeModel:
     """The BRDF of one material as its nodes need it. table: of the BRDF; body: (3,)
-    diffuse level in 1/sr; scale: factor of the photos' reflectance in the fit."""
+    diffuse level in 1/sr; scale: factor of the photos' reflectance in the fit; share: of the
+    diffuse body in the reflected light, where all parameters are 0."""
 
     table: LogTable
     body: NDArray[np.float32]
     scale: float
+    share: float
 
     @classmethod
     def of(cls, brdf: PrincipalBRDF, scale: float = 1.0) -> NodeModel:
-        """The model of a fitted material. One without a diffuse body is scaled as a whole."""
-        return cls(brdf.log_table, split_body(brdf.evaluate).body.astype(np.float32), scale)
+        """The model of a fitted material."""
+        split = split_body(brdf.evaluate)
+        return cls(brdf.log_table, split.level.astype(np.float32), scale, split.share)
 
     @property
-    def has_body(self) -> bool:
-        """Whether there is a diffuse part; a metal is scaled as a whole."""
-        return bool(self.body[0] < EVERYTHING)
+    def mostly_specular(self) -> bool:
+        """Whether the diffuse part reflects almost nothing, as that of a metal."""
+        return self.share < MIN_BODY_SHARE
+
+    def albedo_factor(self, parameters: Array) -> NDArray[np.float32]:
+        """(m, 3) factor of the reflected light of nodes with parameters (m, 10), roughness apart:
+        that of the diffuse part, unless it reflects almost nothing."""
+        diffuse = diffuse_factor(parameters)
+        if not self.mostly_specular:
+            return diffuse
+        share = np.float32(self.share)
+        return share * diffuse + (1 - share) * specular_factor(parameters)
+
+    @property
+    def colour(self) -> tuple[int, ...]:
+        """The parameters that are the colour of the surface: those of the part that reflects most
+        of the light."""
+        if self.mostly_specular:
+            return (SPECULAR, *range(TINT.start, TINT.stop))
+        return tuple(range(DIFFUSE.start, DIFFUSE.stop))
 
     def reflectance(self, angles: Angles, parameters: Array) -> NDArray[np.float32]:
         """(m, 3) ρ in 1/sr at angles to the tilted normals of points with parameters (m, 10)."""
@@ -122,11 +142,14 @@ class NodeModel:
         stretched = np.arctan(tangent).astype(np.float32)
         rho = self.table.evaluate(Angles(stretched, angles.theta_d, angles.phi_d))
         spread = np.exp(-2 * gloss)[:, None]  # a rougher surface spreads the same light
-        if not self.has_body:
-            return rho * np.exp(parameters[:, DIFFUSE]) * spread, np.zeros_like(rho)
         body = np.minimum(rho, self.body)
         factor = specular_factor(parameters) * spread
-        return body * np.exp(parameters[:, DIFFUSE]), (rho - body) * factor
+        return body * diffuse_factor(parameters), (rho - body) * factor
+
+
+def diffuse_factor(parameters: Array) -> NDArray[np.float32]:
+    """(m, 3) factor of the diffuse part of nodes with parameters (m, 10)."""
+    return np.asarray(np.exp(parameters[:, DIFFUSE]), np.float32)
 
 
 def specular_factor(parameters: Array) -> NDArray[np.float32]:

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from ..diagnose.forward.known_variation import KnownVariation, VariationAtPixels
 from ..diagnose.forward.pixels import Pixels
 from .choice import Nodes
-from .node_model import DIFFUSE, TILT, NodeModel, Shading, tilted
+from .node_model import TILT, NodeModel, Shading, tilted
 
 NEAREST = 3  # nodes that a pixel's parameters are interpolated from, as in a triangle
 NORMAL_SCALE = 0.05  # spacings a unit of the normal: separates the sides of a thin wall
@@ -71,7 +71,7 @@ class NodeVariation(KnownVariation):
             with np.errstate(divide="ignore", invalid="ignore"):
                 ratio = own.model.radiance(shading, scan, parameters)
                 ratio /= own.model.radiance(shading, scan, typical)
-            albedo[rows] = np.exp(parameters[:, DIFFUSE])
+            albedo[rows] = own.model.albedo_factor(parameters)
             reflectance[rows] = np.where(np.isfinite(ratio), ratio, albedo[rows])
             normal[rows] = tilted(scan, parameters)
         return VariationAtPixels(reflectance, albedo, normal)

@@ -65,11 +65,11 @@ class Division:
 
 
 def features(model: NodeModel, points: NDArray[np.float64], parameters: Array) -> Array:
-    """(n, 3) logarithms of the ratio of specular and diffuse part (0 where the model has no
+    """(n, 3) logarithms of the ratio of specular and diffuse part (0 where the model has almost no
     diffuse part), of the roughness and of the specular part, averaged over neighbours. points:
     (n, 3) of the nodes; parameters: (n, 10)."""
     ratio = parameters[:, SPECULAR] - parameters[:, DIFFUSE].mean(axis=1)
-    if not model.has_body:
+    if model.mostly_specular:
         ratio = np.zeros_like(ratio)
     each = np.stack([ratio, parameters[:, GLOSS], parameters[:, SPECULAR]], axis=1)
     near = cKDTree(points).query(points, k=min(NEIGHBOURS, len(points)))[1]

@@ -10,14 +10,14 @@ within LIMIT of the normal: a diffuse surface under a coat has one value in near
 tails of the lobe raise some, and few are so grazing that they are below it.
 
 A metal has no diffuse body: away from its highlight there is only the tail of the lobe. If the body
-reflects less than MIN_BODY_SHARE of the light, the whole BRDF is scaled instead, as the base colour
-of a Principled BSDF scales a metal.
+reflects less than MIN_BODY_SHARE of the light, maps of one colour scale the whole BRDF instead, as
+the base colour of a Principled BSDF scales a metal.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,15 +34,27 @@ EVERYTHING = 1e9  # 1/sr: D of a material that is scaled as a whole
 @dataclass(frozen=True)
 class BodySplit:
     """body: (3,) the level D in 1/sr, EVERYTHING if the material is scaled as a whole. share: the
-    body's share of the light reflected at normal incidence and at 45°."""
+    body's share of the light reflected at normal incidence and at 45°. level: (3,) D of any
+    material."""
 
     body: NDArray[np.float64]
     share: float
+    level: NDArray[np.float64]
 
     @property
     def whole(self) -> bool:
         """True if the whole BRDF is scaled, because it has no diffuse body."""
         return bool(self.body[0] >= EVERYTHING)
+
+    @property
+    def mostly_specular(self) -> bool:
+        """True if the diffuse body reflects less than MIN_BODY_SHARE of the light."""
+        return self.share < MIN_BODY_SHARE
+
+    @property
+    def divided(self) -> BodySplit:
+        """The split of a material whose body and specular part are scaled apart."""
+        return replace(self, body=self.level)
 
     def parts(self, rho: NDArray[np.floating]) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
         """(body, specular), each (n, 3) in 1/sr, of reflectances ρ (n, 3)."""
@@ -52,32 +64,27 @@ class BodySplit:
 
 def split_body(evaluate: Callable[[Angles], NDArray[np.floating]]) -> BodySplit:
     """The split of ``evaluate(angles) -> (n, 3)`` in 1/sr."""
-    angles, weight = _directions()
+    light, view = directions()
+    normal = np.broadcast_to([0.0, 0.0, 1.0], light.shape)
+    angles = half_difference(normal, light, view)
     rho = np.maximum(np.asarray(evaluate(angles), np.float64), 0.0)
-    level = np.array([_quantile(channel, weight) for channel in rho.T])
+    level = np.quantile(rho, QUANTILE, axis=0, method="inverted_cdf")
     share = _share(evaluate, level)
     if share < MIN_BODY_SHARE:
-        return BodySplit(np.full(3, EVERYTHING), share)
-    return BodySplit(level, share)
+        return BodySplit(np.full(3, EVERYTHING), share, level)
+    return BodySplit(level, share, level)
 
 
-def _directions() -> tuple[Angles, NDArray[np.float64]]:
-    """(light and view within LIMIT of the normal, (n,) weights: projected solid angles)."""
+def directions() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(light, view), unit (n, 3), within LIMIT of the normal (0, 0, 1), each of the same projected
+    solid angle."""
     edges = np.linspace(0.0, np.sin(np.radians(LIMIT)) ** 2, POLAR + 1)
     polar = np.arcsin(np.sqrt(0.5 * (edges[1:] + edges[:-1])))  # equal projected solid angles
     azimuth = np.pi * (np.arange(AZIMUTH) + 0.5) / AZIMUTH
     i, o, phi = (a.ravel() for a in np.meshgrid(polar, polar, azimuth, indexing="ij"))
     light = np.stack([np.sin(i) * np.cos(phi), np.sin(i) * np.sin(phi), np.cos(i)], axis=1)
     view = np.stack([np.sin(o), np.zeros_like(o), np.cos(o)], axis=1)
-    normal = np.broadcast_to([0.0, 0.0, 1.0], light.shape)
-    return half_difference(normal, light, view), np.ones(len(i))
-
-
-def _quantile(values: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
-    """Weighted QUANTILE of values (n,)."""
-    order = np.argsort(values)
-    below = np.cumsum(weight[order])
-    return float(values[order[np.searchsorted(below, QUANTILE * below[-1])]])
+    return light, view
 
 
 def _share(evaluate: Callable[[Angles], NDArray[np.floating]], level: NDArray[np.float64]) -> float:

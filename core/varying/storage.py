@@ -22,7 +22,7 @@ from .surface_grid import MAX_DIVISIONS, SurfaceGrid
 from .varying_surface import VARIATIONS, MaterialVariation, VaryingSurface
 
 NAME = "varying.npz"
-FORMAT = 3
+FORMAT = 4
 MAX_NODES = 1 << 26
 MAX_OTHER_BYTES = 1 << 20  # of the archive's headers and of the list of materials
 

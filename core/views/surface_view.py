@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..varying.node_model import DIFFUSE, GLOSS, SPECULAR, TILT
-from ..varying.varying_surface import EVEN, VARIATIONS, VaryingSurface
+from ..varying.varying_surface import VaryingSurface
 
 FULL_FACTOR, FULL_ROUGHNESS = 2.0, 1.5  # factors with the full colour
 FULL_TILT = 10.0  # degrees
@@ -20,7 +20,7 @@ FULL_ERROR = 0.5  # relative standard error
 class SurfaceQuantity:
     """title: of the legend; ends: labels of the left end, the middle and the right end of the
     scale. signed: the scale goes from −1 to 1, else from 0 to 1. parameters: of the nodes
-    (node_model.py) that have to vary. of: the surface → (n,) values at its nodes."""
+    (node_model.py), of which one has to vary. of: the surface → (n,) values at its nodes."""
 
     title: str
     ends: tuple[str, str, str]
@@ -73,8 +73,8 @@ QUANTITIES: Mapping[str, SurfaceQuantity] = {
 
 def shown_quantities(surface: VaryingSurface) -> list[str]:
     """The kinds of view that show anything of a surface."""
-    vary = {k for one in surface.materials if one.kind != EVEN for k in VARIATIONS[one.kind]}
-    return [kind for kind, one in QUANTITIES.items() if vary.issuperset(one.parameters)]
+    vary = set(np.flatnonzero(surface.parameters.any(axis=0)).tolist())
+    return [kind for kind, one in QUANTITIES.items() if vary.intersection(one.parameters)]
 
 
 def at_vertices(surface: VaryingSurface) -> dict[str, NDArray[np.float32]]:

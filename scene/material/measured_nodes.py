@@ -14,11 +14,11 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.appearance import osl_source
 from ...core.appearance.osl_atlas import is_own_name
 from ...core.basis import PrincipalBRDF
+from ...core.varying.split import BodySplit
 from ..property_keys import AS_MEASURED, LOBE_GROUP_LAYOUT
 from . import osl_files
 from .lobe_group import NAME as LOBE_STACK
@@ -76,18 +76,20 @@ def set_sampling(
     material: bpy.types.Material,
     path: Path,
     alphas: tuple[float, float, float],
-    body: NDArray[np.floating],
+    split: BodySplit,
 ) -> None:
     """Write the inputs for importance sampling into the shaders.
 
     path: EXR of the table that half vectors are sampled from; alphas: widths of the GGX lobes;
-    body: (3,) level of the diffuse body, for shaders with maps.
+    split: of the BRDF, for shaders with maps.
     """
     for node in osl_files.script_nodes(material):
         sockets = {socket.identifier: socket for socket in node.inputs}
         sockets[osl_source.SAMPLING].default_value = path.resolve().as_posix()
         sockets[osl_source.ALPHAS].default_value = alphas
         if sockets[osl_source.BODY_SCALE].is_linked:  # there are maps
+            both = sockets[osl_source.SPECULAR_SCALE].is_linked
+            body = split.level if both else split.body
             sockets[osl_source.BODY].default_value = tuple(float(v) for v in body)
     material[osl_files.PROPERTIES[osl_source.SAMPLING]] = path.name
 

@@ -132,7 +132,7 @@ def _next() -> tuple[str, str, Callable[[], Any]] | None:
 def _sampling(brdf: PrincipalBRDF) -> Any:
     made = osl_files.shader_tables(brdf)
     alphas = tuple(float(a) for a in made.parts.alpha)
-    return osl_atlas.sampling_name(brdf), made.texels, alphas, split_body(brdf.evaluate).body
+    return osl_atlas.sampling_name(brdf), made.texels, alphas, split_body(brdf.evaluate)
 
 
 _WORK: dict[str, Callable[[PrincipalBRDF], Callable[[], Any]]] = {
@@ -162,13 +162,13 @@ def _write(material: bpy.types.Material, piece: str, found: Any) -> None:
     if piece == SPHERE:
         set_preview(material, found)
     elif piece == SAMPLING:
-        name, texels, alphas, body = found
+        name, texels, alphas, split = found
         # not next to the .blend: the file is written there on save, and most states are never saved
         path = Path(bpy.app.tempdir) / name
         if not path.is_file():
             osl_atlas.write_picture(path, texels)
         osl_files.pack(path)
-        set_sampling(material, path, alphas, body)
+        set_sampling(material, path, alphas, split)
         osl_files.drop_unused()
     elif piece == LOBES:
         material_nodes.show_lobes(lobe_node(material), found)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -67,8 +68,10 @@ def brdf() -> PrincipalBRDF:
     return projected(FITTED.evaluate, 20)
 
 
-def baked(mesh: Mesh, brdf: PrincipalBRDF, materials: int = 1) -> MapsResult:
-    own = tuple(MapMaterial(f"m{i}", brdf, FITTED, 1.0, 0.0) for i in range(materials))
+def baked(
+    mesh: Mesh, brdf: PrincipalBRDF, materials: int = 1, fitted: Principled = FITTED
+) -> MapsResult:
+    own = tuple(MapMaterial(f"m{i}", brdf, fitted, 1.0, 0.0) for i in range(materials))
     texels = rasterise(mesh, 64)
     scan = SimpleNamespace(mesh=mesh)
     capture = SimpleNamespace(file="square.capture.toml")
@@ -88,6 +91,21 @@ def test_maps_have_the_parameters_of_each_place(brdf):
     assert roughness(result, 0) == pytest.approx(0.5 * np.exp(0.5 * (0.3 * x - 0.1)), rel=2e-3)
     assert result.maps.error == pytest.approx(0.07, rel=1e-3)
     assert (result.maps.photos == 5).all()
+
+
+def test_base_colour_of_a_metal_is_that_of_its_highlights():
+    mesh, copper = square(), replace(FITTED, metallic=1.0, roughness=0.4)
+    metal = projected(copper.evaluate, 20)
+    result = baked(mesh, metal, fitted=copper)
+    level = result.levels[0]
+    assert level.split.mostly_specular and not level.split.whole
+    x, y, _ = result.texels.points(mesh, slice(None)).T
+    tint = TINTS[0] * 0.2 * x[:, None]
+    highlights = copper.base_color * np.exp(0.5 * y[:, None] + tint)
+    assert result.materials[0].principled.metallic == 1
+    # a small part of the light is in the tail of the lobe, which counts as diffuse
+    assert base_color(result, 0) == pytest.approx(np.clip(highlights, 0, 1), rel=0.1)
+    assert specular_tint(result, 0) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.7])

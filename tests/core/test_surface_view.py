@@ -11,6 +11,7 @@ from patina.core.varying.surface_grid import SurfaceGrid
 from patina.core.varying.varying_surface import (
     ALL_VARIATIONS,
     EVEN,
+    VARIATIONS,
     MaterialVariation,
     VaryingSurface,
 )
@@ -28,6 +29,8 @@ def surface(kind: str = ALL_VARIATIONS, divisions: int = 3) -> VaryingSurface:
     parameters[:, SPECULAR] = -np.log(2.0) * x
     parameters[:, GLOSS] = 3.0
     parameters[:, TILT] = np.array([np.tan(np.radians(5.0)), 0, 0])
+    even = [k for k in range(COUNT) if k not in VARIATIONS[kind]]
+    parameters[:, even] = 0.0
     deviation = np.full_like(parameters, np.log(1.25))
     photos = np.where(z > -0.5, 3, 0).astype(np.uint16)
     return VaryingSurface(

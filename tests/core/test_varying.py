@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -84,6 +86,27 @@ def test_coloured_highlights_are_found(model):
     assert abs(np.median(red_to_blue[white])) < 0.15 * true
     colour = fields.parameters[gold][:, DIFFUSE]
     assert abs(np.median(colour[:, 0] - colour[:, 2])) < 0.05 * true
+
+
+def test_clipped_highlights_are_at_least_white(model):
+    """Highlights of gold that are clipped in all photos but one, which is predicted."""
+    made = scene(10, 4, vary=False, gold=True)
+    white = np.float32(np.quantile(made.seen.radiance, 0.9))
+    clipped = made.seen.radiance > white
+    gold = made.points[made.seen.node, 0] > 0
+    brightest = np.bincount(made.seen.photo, clipped.any(axis=1) & gold).argmax()
+    held = made.seen.photo == brightest
+    limited = np.minimum(made.seen.radiance, white)
+    limited = replace(made.seen, radiance=limited, clipped=clipped).select(~held)
+    out, bright = made.seen.select(held & gold), clipped[held & gold]
+
+    def shortfall(observations):
+        fields = solved(model, replace(made, seen=observations))
+        theta = fields.parameters[out.node]
+        predicted = model.radiance(out.shading, made.normals[out.node], theta)
+        return np.median(np.log(out.radiance / predicted)[bright])
+
+    assert shortfall(limited) < 0.7 * shortfall(limited.measured())
 
 
 def test_standard_errors_cover_the_errors_of_the_colour(model):

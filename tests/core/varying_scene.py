@@ -83,6 +83,7 @@ def scene(
                 np.arange(n, dtype=np.int32), np.full(n, photo, np.int16), np.zeros(n, np.uint8),
                 radiance.astype(np.float32), np.tile(light, (n, 1)).astype(np.float32),
                 np.tile(view, (n, 1)).astype(np.float32), np.ones((n, 3), np.float32),
+                np.zeros((n, 3), bool),
             )
         )  # fmt: skip
     return VaryingScene(points, scan.astype(np.float32), true, colour, Observations.joined(parts))

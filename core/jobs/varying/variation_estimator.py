@@ -30,7 +30,7 @@ from .surface_observations import SurfaceObservations, observe_surface, pixel_si
 MODES = ("auto", "never", "always")
 _, DIFFUSE, *FURTHER = VARIATIONS
 MAX_NODES = 1_000_000  # of the grid: the texels that a mesh covers in a texture of 1400 × 1400
-MAX_OBSERVATIONS = 40_000_000  # nodes times photos, 60 bytes each
+MAX_OBSERVATIONS = 40_000_000  # nodes times photos, 63 bytes each
 NODES_PER_PIXEL = 4.0  # at most: half a pixel apart, photos are interpolated without loss
 REFITS = 2  # of the BRDF, without the variation found so far
 CHOOSING = 0.6  # fraction of the time that the choice takes
@@ -118,9 +118,10 @@ class VariationEstimator:
     ) -> Generator[Step, None, MaterialResult]:
         """The material, fitted to samples without the variation of its diffuse colour."""
         step, model = Step("fitting without the variation", start), model_of(material)
-        fields = yield from final_fields(nodes, model, seen, DIFFUSE, step, 0.0)
+        exact = seen.measured()
+        fields = yield from final_fields(nodes, model, exact, DIFFUSE, step, 0.0)
         table = yield from in_background(
-            lambda: typical_samples(model, seen, nodes.points, nodes.normals, fields.parameters),
+            lambda: typical_samples(model, exact, nodes.points, nodes.normals, fields.parameters),
             step,
         )
         capture = self.fit.capture
