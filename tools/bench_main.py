@@ -19,6 +19,7 @@ BENCHES = (
     "find_light",
     "real",
     "varying",
+    "large",
     "objects",
     "renders",
     "solve",
@@ -29,7 +30,7 @@ BENCHES = (
     "traits",
     "steps",
 )
-WITHOUT_DATA = ("renders", "speed", "traits", "steps")  # need no reference data
+WITHOUT_DATA = ("renders", "large", "speed", "traits", "steps")  # need no reference data
 
 
 def main() -> int:

@@ -14,6 +14,8 @@ DISTANCE, FILLS = (
 ALBEDO = np.array([0.16, 0.06, 0.04])
 IRRADIANCE = 3.0
 ASPECT = (3, 2)
+PAINT, PAINT_WAVES = 0.5, 25.0  # share of the colour that changes, waves a radius along each axis
+WHITE, JPEG_QUALITY = 1.5, 92  # radiance that a JPEG shows as white
 DISTORTION = (-0.08, 0.03)  # k1, k2 of a typical zoom lens
 
 
@@ -23,13 +25,14 @@ def photo_size(megapixels: float) -> tuple[int, int]:
     return ASPECT[0] * unit, ASPECT[1] * unit
 
 
-def make_capture(folder: Path, megapixels: float, triangles: int, photos: int = 8) -> Path:
-    """Write mesh (binary PLY), cameras (COLMAP text) and photos (half-float EXR).
+def make_capture(
+    folder: Path, megapixels: float, triangles: int, photos: int = 8, painted: bool = False
+) -> Path:
+    """Write mesh (binary PLY), cameras (COLMAP text) and photos (half-float EXR; JPEG of a surface
+    in changing colours if ``painted``).
 
     Returns the path of the capture file.
     """
-    from patina.core.photo.image import write_exr
-
     folder.mkdir(parents=True, exist_ok=True)
     write_mesh(folder / "mesh.ply", triangles)
     width, height = photo_size(megapixels)
@@ -41,6 +44,7 @@ def make_capture(folder: Path, megapixels: float, triangles: int, photos: int = 
     (cameras / "cameras.txt").write_text(f"1 RADIAL {width} {height} {lens}\n")
     (cameras / "points3D.txt").write_text("")
     images, lights, shots = [], [], []
+    ending = "jpg" if painted else "exr"
     for i in range(photos):
         rotation, translation, light = _view(i, photos)
         w, x, y, z = _quaternion(rotation)
@@ -49,15 +53,36 @@ def make_capture(folder: Path, megapixels: float, triangles: int, photos: int = 
         towards = ", ".join(f"{v:.12g}" for v in light)
         lights.append(f'[[light]]\nname = "lamp{i}"\ndirection = [{towards}]\n')
         lights.append(f"irradiance = [{IRRADIANCE}, {IRRADIANCE}, {IRRADIANCE}]\n\n")
-        shots.append(f'[[photo]]\nfile = "lit_{i}.exr"\ncamera = "view_{i}.jpg"\n')
+        shots.append(f'[[photo]]\nfile = "lit_{i}.{ending}"\ncamera = "view_{i}.jpg"\n')
         shots.append(f'light = "lamp{i}"\n\n')
-        pixels = _photo(width, height, focal, rotation, translation, light, seed=i)
-        write_exr(folder / f"lit_{i}.exr", pixels, half=True)
+        pixels = _photo(width, height, focal, rotation, translation, light, i, painted)
+        _write(folder / f"lit_{i}.{ending}", pixels)
     (cameras / "images.txt").write_text("".join(images))
     path = folder / "ball.capture.toml"
     scan = '[scan]\ncameras = "cameras"\nmesh = "mesh.ply"\n\n'
     path.write_text("".join([scan, *lights, *shots]))
     return path
+
+
+def _write(path: Path, pixels: np.ndarray) -> None:
+    """Write linear radiance (h, w, 3) as half-float EXR, or as JPEG that shows up to WHITE."""
+    import OpenImageIO as oiio
+
+    from patina.core.photo.image import write_exr
+    from patina.core.photo.transfer import srgb_encoded
+
+    if path.suffix == ".exr":
+        write_exr(path, pixels, half=True)
+        return
+    shown = np.empty(pixels.shape, np.uint8)
+    for row in range(len(pixels)):  # a whole photo in double precision takes 600 MB
+        shown[row] = np.round(255 * srgb_encoded(np.clip(pixels[row] / WHITE, 0, 1)))
+    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "uint8")
+    spec.attribute("Compression", f"jpeg:{JPEG_QUALITY}")
+    file = oiio.ImageOutput.create(str(path))
+    file.open(str(path), spec)
+    file.write_image(shown)
+    file.close()
 
 
 def write_mesh(path: Path, triangles: int) -> None:
@@ -117,6 +142,7 @@ def _photo(
     translation: np.ndarray,
     light: np.ndarray,
     seed: int,
+    painted: bool,
 ) -> np.ndarray:
     """Render (h, w, 3) float32: matte body, Blinn lobe, 1 % noise. Bumps change only the
     normals, and the lens has only the first distortion term."""
@@ -153,7 +179,10 @@ def _photo(
         lobe = 0.8 * np.maximum((normal * half).sum(-1), 0) ** 60
         cosine = np.maximum(normal @ light, 0)
         noise = 1 + 0.01 * rng.standard_normal(cosine.shape, np.float32)
-        shade = (IRRADIANCE * cosine * noise)[:, None] * (ALBEDO.astype(np.float32) + lobe[:, None])
+        albedo = ALBEDO.astype(np.float32)
+        if painted:
+            albedo = albedo * (1 + np.float32(PAINT) * np.sin(np.float32(PAINT_WAVES) * point))
+        shade = (IRRADIANCE * cosine * noise)[:, None] * (albedo + lobe[:, None])
         out[top : top + len(rows)][hit] = shade
     return out
 
