@@ -48,8 +48,8 @@ def _jobs(folder: Path) -> None:
     comparisons = []
     for megapixels, triangles, photos in (*((*size, PHOTOS) for size in SIZES), MANY_PHOTOS):
         where = folder / f"{megapixels}_{triangles}_{photos}"
-        _case("make", where, megapixels, triangles, photos)
-        found = _case("job", where, 2, "measured")
+        case("make", where, megapixels, triangles, photos)
+        found = case("job", where, 2, "measured")
         s = found["seconds"]
         print(
             f"| {photos} of {megapixels} MP | {triangles:,} | {found['samples']:,} | "
@@ -66,7 +66,7 @@ def _jobs(folder: Path) -> None:
 
 
 def _threads(where: Path, two: dict[str, Any]) -> str:
-    one = _case("job", where, 1, "measured")
+    one = case("job", where, 1, "measured")
     same = "the same" if one["digest"] == two["digest"] else "NOT the same"
     return (
         f"- on 1 thread {sum(one['seconds'].values()):.1f} s, on 2 "
@@ -75,7 +75,7 @@ def _threads(where: Path, two: dict[str, Any]) -> str:
 
 
 def _plain_way(where: Path) -> str:
-    ours, plain = _case("job", where, 2, "paper"), _case("plain", where)
+    ours, plain = case("job", where, 2, "paper"), case("plain", where)
     seconds = sum(ours["seconds"].values())
     return (
         f"- the paper's fit, {SMALL[0]} MP and {SMALL[1]:,} triangles: simple implementation "
@@ -90,8 +90,8 @@ def _selections() -> None:
     print("| candidates | n | condition number | by Nielsen's search | selection | peak memory |")
     print("|---|---|---|---|---|---|")
     for candidates, count in SELECTIONS:
-        found = _case("select", candidates, count)
-        nielsen = _case("nielsen", candidates, count)
+        found = case("select", candidates, count)
+        nielsen = case("nielsen", candidates, count)
         print(
             f"| {candidates:,} | {count} | {found['condition']:.2f} | {nielsen['condition']:.2f} "
             f"(with Patina's bounds in {nielsen['seconds']:.0f} s) | {found['seconds']:.1f} s | "
@@ -100,7 +100,7 @@ def _selections() -> None:
         )
     print()
     for candidates, count in PLAIN_SELECTIONS:
-        found = _case("compare", candidates, count)
+        found = case("compare", candidates, count)
         print(
             f"- {candidates:,} candidates, n = {count}: simple search {found['plain']:.2f} s "
             f"(condition number {found['plain_condition']:.3f}), Patina {found['ours']:.3f} s "
@@ -110,7 +110,8 @@ def _selections() -> None:
     print()
 
 
-def _case(*words: object) -> dict[str, Any]:
+def case(*words: object) -> dict[str, Any]:
+    """Run one of the cases in a separate process."""
     command = [sys.executable, "-m", "tools.bench_speed", *map(str, words)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     if done.returncode:
@@ -131,11 +132,11 @@ def _peak() -> float:
 
 
 def _make(
-    folder: str, megapixels: str, triangles: str, photos: str = str(PHOTOS)
+    folder: str, megapixels: str, triangles: str, photos: str = str(PHOTOS), painted: str = ""
 ) -> dict[str, Any]:
     from .bench_speed_scene import make_capture
 
-    make_capture(Path(folder), float(megapixels), int(triangles), int(photos))
+    make_capture(Path(folder), float(megapixels), int(triangles), int(photos), bool(painted))
     return {}
 
 
@@ -190,6 +191,25 @@ def _job(folder: str, threads: str, method: str) -> dict[str, Any]:
         "sampling_mb": sampling, "processor": processor[0],
         "report": time.perf_counter() - start, "report_mb": _peak(),
         "digest": hashlib.sha256(material.fit.brdf.coefficients.tobytes()).hexdigest(),
+    }  # fmt: skip
+
+
+def _varying(folder: str) -> dict[str, Any]:
+    """Seconds and peak memory of a fit, and of all with the variation of the surface."""
+    from patina.core.capture import read_capture
+    from patina.core.jobs import FitJob, finished
+    from patina.core.jobs.varying.varying_job import VaryingJob
+
+    since = time.perf_counter()
+    job = FitJob(read_capture(Path(folder) / "ball.capture.toml"), portable=False)
+    job.drain()
+    fitted, fit_mb = time.perf_counter() - since, _peak()
+    more = VaryingJob(job)
+    more.drain()
+    varying = finished(more.result).varying
+    return {
+        "fit": fitted, "all": time.perf_counter() - since, "fit_mb": fit_mb, "all_mb": _peak(),
+        "nodes": 0 if varying is None else len(varying.grid),
     }  # fmt: skip
 
 
@@ -307,6 +327,6 @@ if __name__ == "__main__":
     load_patina()
     cases: dict[str, Callable[..., dict[str, Any]]] = {
         "make": _make, "job": _job, "plain": _plain, "select": _select, "nielsen": _nielsen,
-        "compare": _compare,
+        "compare": _compare, "varying": _varying,
     }  # fmt: skip
     print(json.dumps(cases[sys.argv[1]](*sys.argv[2:])))

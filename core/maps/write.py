@@ -58,8 +58,7 @@ def base_color(result: MapsResult, index: int) -> NDArray[np.float32]:
     fitted, own = result.materials[index].principled, result.maps.materials[index]
     factor, split = own.scale, result.levels[index].split
     if not split.whole and fitted.metallic > 0:
-        share = np.float32(split.share)
-        all_light = share * own.scale + (1 - share) * own.specular
+        all_light = split.all_light(own.scale, own.specular)
         factor = factor + np.float32(fitted.metallic) * (all_light - factor)
     return np.clip(np.asarray(fitted.base_color, np.float32) * factor, 0.0, 1.0)
 

@@ -26,7 +26,7 @@ from ..angles import Angles, half_difference
 from ..angles.vectors import tangents
 from ..basis import PrincipalBRDF
 from ..basis.log_table import LogTable
-from .split import MIN_BODY_SHARE, split_body
+from .split import BodySplit, split_body
 
 Array = NDArray[np.floating]
 
@@ -55,25 +55,27 @@ class Shading(NamedTuple):
 
 @dataclass(frozen=True)
 class NodeModel:
-    """The BRDF of one material as its nodes need it. table: of the BRDF; body: (3,)
-    diffuse level in 1/sr; scale: factor of the photos' reflectance in the fit; share: of the
-    diffuse body in the reflected light, where all parameters are 0."""
+    """The BRDF of one material as its nodes need it. table, split: of the BRDF; scale: factor of
+    the photos' reflectance in the fit."""
 
     table: LogTable
-    body: NDArray[np.float32]
+    split: BodySplit
     scale: float
-    share: float
 
     @classmethod
     def of(cls, brdf: PrincipalBRDF, scale: float = 1.0) -> NodeModel:
         """The model of a fitted material."""
-        split = split_body(brdf.evaluate)
-        return cls(brdf.log_table, split.level.astype(np.float32), scale, split.share)
+        return cls(brdf.log_table, split_body(brdf.evaluate).divided, scale)
+
+    @property
+    def body(self) -> NDArray[np.float32]:
+        """(3,) diffuse level in 1/sr."""
+        return self.split.level.astype(np.float32)
 
     @property
     def mostly_specular(self) -> bool:
         """Whether the diffuse part reflects almost nothing, as that of a metal."""
-        return self.share < MIN_BODY_SHARE
+        return self.split.mostly_specular
 
     def albedo_factor(self, parameters: Array) -> NDArray[np.float32]:
         """(m, 3) factor of the reflected light of nodes with parameters (m, 10), roughness apart:
@@ -81,8 +83,7 @@ class NodeModel:
         diffuse = diffuse_factor(parameters)
         if not self.mostly_specular:
             return diffuse
-        share = np.float32(self.share)
-        return share * diffuse + (1 - share) * specular_factor(parameters)
+        return self.split.all_light(diffuse, specular_factor(parameters))
 
     @property
     def colour(self) -> tuple[int, ...]:
@@ -142,9 +143,9 @@ class NodeModel:
         stretched = np.arctan(tangent).astype(np.float32)
         rho = self.table.evaluate(Angles(stretched, angles.theta_d, angles.phi_d))
         spread = np.exp(-2 * gloss)[:, None]  # a rougher surface spreads the same light
-        body = np.minimum(rho, self.body)
+        body, specular = self.split.parts(rho)
         factor = specular_factor(parameters) * spread
-        return body * diffuse_factor(parameters), (rho - body) * factor
+        return body * diffuse_factor(parameters), specular * factor
 
 
 def diffuse_factor(parameters: Array) -> NDArray[np.float32]:

@@ -33,18 +33,18 @@ EVERYTHING = 1e9  # 1/sr: D of a material that is scaled as a whole
 
 @dataclass(frozen=True)
 class BodySplit:
-    """body: (3,) the level D in 1/sr, EVERYTHING if the material is scaled as a whole. share: the
-    body's share of the light reflected at normal incidence and at 45°. level: (3,) D of any
-    material."""
+    """level: (3,) D in 1/sr. share: the body's share of the light reflected at normal incidence and
+    at 45°. whole: True if the whole BRDF is scaled, because it has almost no diffuse body."""
 
-    body: NDArray[np.float64]
-    share: float
     level: NDArray[np.float64]
+    share: float
+    whole: bool
 
     @property
-    def whole(self) -> bool:
-        """True if the whole BRDF is scaled, because it has no diffuse body."""
-        return bool(self.body[0] >= EVERYTHING)
+    def body(self) -> NDArray[np.float64]:
+        """(3,) the level up to which ρ is scaled: EVERYTHING if the material is scaled as a
+        whole."""
+        return np.full(3, EVERYTHING) if self.whole else self.level
 
     @property
     def mostly_specular(self) -> bool:
@@ -54,7 +54,15 @@ class BodySplit:
     @property
     def divided(self) -> BodySplit:
         """The split of a material whose body and specular part are scaled apart."""
-        return replace(self, body=self.level)
+        return replace(self, whole=False)
+
+    def all_light(
+        self, body: NDArray[np.floating], specular: NDArray[np.floating]
+    ) -> NDArray[np.float32]:
+        """(n, 3) factor of all reflected light for factors (n, 3) of the body and of the specular
+        part."""
+        share = np.float32(self.share)
+        return np.asarray(share * body + (1 - share) * specular, np.float32)
 
     def parts(self, rho: NDArray[np.floating]) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
         """(body, specular), each (n, 3) in 1/sr, of reflectances ρ (n, 3)."""
@@ -70,9 +78,7 @@ def split_body(evaluate: Callable[[Angles], NDArray[np.floating]]) -> BodySplit:
     rho = np.maximum(np.asarray(evaluate(angles), np.float64), 0.0)
     level = np.quantile(rho, QUANTILE, axis=0, method="inverted_cdf")
     share = _share(evaluate, level)
-    if share < MIN_BODY_SHARE:
-        return BodySplit(np.full(3, EVERYTHING), share, level)
-    return BodySplit(level, share, level)
+    return BodySplit(level, share, whole=share < MIN_BODY_SHARE)
 
 
 def directions() -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -159,7 +159,7 @@ def test_pixels_have_the_parameters_of_their_side_of_a_wall(side):
     )  # fmt: skip
     found = variation.at(pixels)
     own = (front, back)[side]
-    share = NodeModel.of(brdf).share  # of the diffuse part of a metal
+    share = NodeModel.of(brdf).split.share  # of the diffuse part of a metal
     albedo = share * np.exp(own[DIFFUSE]) + (1 - share) * np.exp(own[SPECULAR])
     assert found.albedo == pytest.approx(np.tile(albedo, (60, 1)), rel=1e-4)
     normal = away + own[TILT]

@@ -7,12 +7,13 @@ import pytest
 
 from patina.core.varying.node_model import COUNT, DIFFUSE, NodeModel
 from patina.core.varying.rough_lobe import rough_lobe_albedo, rough_lobe_variance
+from patina.core.varying.split import BodySplit
 
 BODY = np.array([0.1, 0.02, 0.01], np.float32)  # 1/sr
 
 
 def model_with(body, scale=1.0, share=0.5):
-    return NodeModel(None, np.asarray(body, np.float32), scale, share)
+    return NodeModel(None, BodySplit(np.asarray(body), share, whole=False), scale)
 
 
 def test_albedo_is_the_mean_of_a_ggx_lobe_as_rough_as_can_be():
