@@ -9,6 +9,7 @@ from typing import TypeVar
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+CHUNKS_AHEAD = 4  # chunks computed in advance: enough for MAX_THREADS, and little memory
 
 
 def ordered_map(
@@ -33,3 +34,14 @@ def ordered_map(
     finally:
         for future in pending:
             future.cancel()
+
+
+def map_chunks(
+    pool: ThreadPoolExecutor | None,
+    function: Callable[[slice], Result],
+    count: int,
+    size: int,
+) -> Generator[Result, None, None]:
+    """Results in order for ``count`` rows, in slices of ``size``; one empty slice for no rows."""
+    slices = (slice(begin, min(begin + size, count)) for begin in range(0, max(count, 1), size))
+    yield from ordered_map(pool, function, slices, CHUNKS_AHEAD)

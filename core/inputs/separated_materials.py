@@ -39,6 +39,15 @@ def with_separated(capture: Capture, names: Sequence[str]) -> Capture:
     return replace(capture, materials=materials, photos=photos)
 
 
+def without_separated(capture: Capture, whole: Capture) -> Capture:
+    """The capture with the only material of ``whole``, the capture before ``with_separated``."""
+    photos = tuple(
+        replace(photo, masks=before.masks)
+        for photo, before in zip(capture.photos, whole.photos, strict=True)
+    )
+    return replace(capture, materials=whole.materials, photos=photos)
+
+
 def _masks(masks: dict[str, Path], only: str, names: Sequence[str]) -> dict[str, Path]:
     """The masks of a photo, that of the material ``only`` for all ``names``."""
     others = {name: file for name, file in masks.items() if name != only}

@@ -84,7 +84,9 @@ class DiagnoseJob(Job):
         MAX_MATERIALS."""
         if len(result.materials) > MAX_MATERIALS:
             return None
-        surface = yield from observe_surface(result, CHOICE_NODES, FITTED, OBSERVED - FITTED)
+        surface = yield from observe_surface(
+            result, CHOICE_NODES, FITTED, OBSERVED - FITTED, threads=self.fit.threads
+        )
         start, share = OBSERVED, VARIED - OBSERVED
         if self.separate:
             part = SEPARATING * share

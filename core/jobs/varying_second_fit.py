@@ -12,7 +12,7 @@ from .diagnose_job import DiagnoseJob
 from .fit_job import CaptureResult
 from .refit_job import RefitJob
 from .varying.node_steps import CHOICE_NODES
-from .varying.surface_observations import observe_surface
+from .varying.separate_materials import observe_whole
 from .varying.variation_estimator import MAX_NODES, VariationEstimator
 
 SECOND_FIT, OBSERVED, VARIED = 0.6, 0.63, 0.97
@@ -49,12 +49,13 @@ class VaryingSecondFit(Job):
         for step in self.second.run():
             yield Step(step.stage, SECOND_FIT * step.fraction)
         before, correction = finished(self.second.result), self._correction()
+        fit, parts = self.checked.fit, self.checked.parts
         coarse = self.checked.surface
         if coarse is None or correction is not None:
-            coarse = yield from observe_surface(
-                before, CHOICE_NODES, SECOND_FIT, OBSERVED - SECOND_FIT, correction
+            share = OBSERVED - SECOND_FIT
+            coarse = yield from observe_whole(
+                before, parts, CHOICE_NODES, SECOND_FIT, share, correction, fit.threads
             )
-        fit, parts = self.checked.fit, self.checked.parts
         own = VariationEstimator(
             fit, before, self.mode, self.nodes, correction, parts, self.portable
         )

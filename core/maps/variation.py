@@ -42,7 +42,9 @@ def maps_of_variation(
         else:
             channels[index, DIFFUSE] = level.channels
     for part in chunks(n):
-        node, weight = surface.grid.at(texels.face[part], texels.second[part], texels.third[part])
+        node, weight = surface.interpolation(
+            texels.face[part], texels.second[part], texels.third[part]
+        )
         found = np.einsum("mk,mkc->mc", weight, surface.parameters[node])
         deviation = np.einsum("mk,mkc->mc", weight, surface.deviation[node])
         scale[part], specular[part] = diffuse_factor(found), specular_factor(found)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
+
+from ..concurrency.ordered_map import map_chunks
 
 NEIGHBOUR_CELLS = 6  # that a node's value is interpolated from
 KERNEL_WIDTH = 0.6  # of the Gaussian weights of these, in edge lengths of a cell
@@ -36,18 +40,22 @@ class Cells:
         sums = [np.bincount(cell, axis, count) for axis in points.T]
         return cls(cell.astype(np.int32), count, np.stack(sums, axis=1) / size[:, None], edge)
 
-    def interpolated(
-        self, values: NDArray[np.floating], points: NDArray[np.float64]
-    ) -> NDArray[np.float32]:
-        """(n, c) values (count, c) of the cells at points (n, 3), without steps at borders."""
+    def weights(
+        self, points: NDArray[np.float64], pool: ThreadPoolExecutor | None = None
+    ) -> csr_array:
+        """(n, count) weights of the cells that interpolate at points (n, 3), without steps at
+        borders: NEIGHBOUR_CELLS of a point are not 0, and their sum is 1."""
         tree = cKDTree(self.centre)
         neighbours = min(NEIGHBOUR_CELLS, self.count)
-        out = np.empty((len(points), values.shape[1]), np.float32)
-        for begin in range(0, len(points), CHUNK):
-            part = slice(begin, begin + CHUNK)
+
+        def of_chunk(part: slice) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
             away, near = tree.query(points[part], k=neighbours)
             away, near = away.reshape(-1, neighbours), near.reshape(-1, neighbours)
             weight = np.exp(-0.5 * (away / (KERNEL_WIDTH * self.edge)) ** 2) + MIN_WEIGHT
             weight /= weight.sum(axis=1, keepdims=True)
-            out[part] = np.einsum("nk,nkc->nc", weight, values[near])
-        return out
+            return near.astype(np.int32).ravel(), weight.astype(np.float32).ravel()
+
+        parts = zip(*map_chunks(pool, of_chunk, len(points), CHUNK), strict=True)
+        cell, weight = (np.concatenate(part) for part in parts)
+        starts = np.arange(len(points) + 1) * neighbours
+        return csr_array((weight, cell, starts), shape=(len(points), self.count))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..concurrency.thread_pool import thread_count, thread_pool
 from ..statistics.student_t import robust_cost
 from .hierarchy import MIN_ERROR, NodeFields, edges_of_levels, near_black, robust_deviation, solve
 from .node_model import COUNT, TILT, NodeModel
@@ -29,13 +30,15 @@ CHUNK = 1 << 17
 class Nodes:
     """n nodes of one material. points, normals: (n, 3), scan frame; spacing: distance of
     neighbouring nodes; mesh_edge: mean length of an edge of the mesh; both in scan units;
-    normal_error: standard deviation of the error of the normals, radians along each tangent."""
+    normal_error: standard deviation of the error of the normals, radians along each tangent.
+    threads: that estimate, None for one a core."""
 
     points: NDArray[np.float64]
     normals: NDArray[np.float32]
     spacing: float
     mesh_edge: float
     normal_error: float = MIN_NORMAL_ERROR
+    threads: int | None = None
 
     def select(self, rows: NDArray[np.intp]) -> Nodes:
         """Some of the nodes."""
@@ -50,7 +53,10 @@ class Nodes:
         free[[*VARIATIONS[kind], *model.colour]] = True
         edges = edges_of_levels(self.points, self.spacing)
         error = MIN_NORMAL_ERROR if free[TILT].any() else self.normal_error
-        return solve(model, seen, self.points, self.normals, edges, free, self.mesh_edge, error)
+        with thread_pool(thread_count(self.threads)) as pool:
+            yield from solve(
+                model, seen, self.points, self.normals, edges, free, self.mesh_edge, error, pool
+            )
 
     def estimate(self, model: NodeModel, seen: Observations, kind: str) -> NDArray[np.float32]:
         """(n, 10) parameters of the nodes after the finest level, 0 where nothing can vary."""

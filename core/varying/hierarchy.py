@@ -23,11 +23,14 @@ pixel says that the radiance is at least the photo's white (a censored observati
 from __future__ import annotations
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_array, csr_array
 
+from ..concurrency.ordered_map import map_chunks
 from ..statistics.student_t import weights_of_squares
 from .cells import Cells
 from .node_model import COUNT, LIMITS, TILT, NodeModel
@@ -96,13 +99,15 @@ def solve(
     free: NDArray[np.bool_],
     mesh_edge: float,
     normal_error: float,
+    pool: ThreadPoolExecutor | None = None,
 ) -> Iterator[tuple[float, NodeFields]]:
     """Estimate the parameters of n nodes; yields (fraction done, fields so far) after each level.
 
     seen: observations of nodes 0 … n − 1. points, normals: (n, 3), scan frame. edges: of the cells
     of each level, scan units. free: (10,) parameters that may differ from 0. mesh_edge: mean length
     of an edge of the mesh, scan units. normal_error: standard deviation, radians along each
-    tangent, of the error of the normals that no tilt corrects.
+    tangent, of the error of the normals that no tilt corrects. pool: for the work; the result is
+    the same, to the last bit, with any number of threads.
     """
     normal = np.asarray(normals, np.float32)
     theta = np.zeros((len(points), COUNT), np.float32)
@@ -110,7 +115,7 @@ def solve(
     black = near_black(seen)
     noise = _Noise.of(model, seen, normal, theta, black, normal_error)
     levels = [
-        _Level.of(points, edge, FIRST_DEVIATION[which] * LEVEL_RATIO**number)
+        _Level.of(points, edge, FIRST_DEVIATION[which] * LEVEL_RATIO**number, pool)
         for number, edge in enumerate(edges)
     ]
     colour = np.flatnonzero(np.isin(which, model.colour))
@@ -120,20 +125,20 @@ def solve(
     for done, (number, some) in enumerate(rounds, 1):
         level, own = levels[number], which[some]
         part = level.subset(seen)
-        equations = _Equations.of(model, part, normal, theta, level.cells, own, black, noise)
+        equations = _Equations.of(model, part, normal, theta, level.cells, own, black, noise, pool)
         tilt = MAX_TILT * min(1.0, mesh_edge / level.cells.edge)
         before = level.change[:, some]
         found, spread, sigma = equations.around(before).posterior(
-            level.sigma[np.ix_(some, some)], tilt
+            level.sigma[np.ix_(some, some)], tilt, pool
         )
         found = np.clip(found, -MAX_STEP[own], MAX_STEP[own])
-        theta[:, own] += level.cells.interpolated(found - before, points)
+        theta[:, own] += level.at_nodes(found - before)
         np.clip(theta, -LIMITS, LIMITS, out=theta)
         levels[number] = level.with_estimate(some, found, spread, sigma, noise.error)
         noise = _Noise.of(model, seen, normal, theta, black, normal_error)
         variance, deviation = np.zeros_like(theta), np.zeros((len(levels), COUNT))
         if done == len(rounds):
-            variance[:, which] = _summed_variance(levels, points, noise.error)
+            variance[:, which] = _summed_variance(levels, noise.error)
         deviation[:, which] = [np.sqrt(np.diag(one.sigma)) for one in levels]
         yield done / len(rounds), NodeFields(theta, variance, deviation, noise.error)
 
@@ -142,20 +147,32 @@ def solve(
 class _Level:
     """One field of the sum. change: (c, k) its values in the cells; spread: (c, k) their variances;
     sigma: (k, k) covariance over the surface; error: (k,) of the logarithm of the radiance that
-    spread assumes."""
+    spread assumes. weights: (n, c) of the cells at the nodes."""
 
     cells: Cells
+    weights: csr_array
     change: Array
     spread: Array
     sigma: Array
     error: Array
 
     @classmethod
-    def of(cls, points: NDArray[np.float64], edge: float, deviation: Array) -> _Level:
+    def of(
+        cls,
+        points: NDArray[np.float64],
+        edge: float,
+        deviation: Array,
+        pool: ThreadPoolExecutor | None,
+    ) -> _Level:
         """A field that is 0, with a first guess of its standard deviations (k,)."""
         cells = Cells.group(points, edge)
-        empty = np.zeros((cells.count, len(deviation)))
-        return cls(cells, empty, empty, np.diag(deviation**2), np.full(len(deviation), MAX_ERROR))
+        weights, empty = cells.weights(points, pool), np.zeros((cells.count, len(deviation)))
+        error = np.full(len(deviation), MAX_ERROR)
+        return cls(cells, weights, empty, empty, np.diag(deviation**2), error)
+
+    def at_nodes(self, values: Array) -> NDArray[np.float32]:
+        """(n, k) values (c, k) of the cells at the nodes, without steps at borders."""
+        return np.asarray(self.weights @ values.astype(np.float32), np.float32)
 
     def with_estimate(
         self, some: NDArray[np.intp], change: Array, spread: Array, sigma: Array, error: float
@@ -164,7 +181,7 @@ class _Level:
         new = [a.copy() for a in (self.change, self.spread, self.sigma, self.error)]
         new[0][:, some], new[1][:, some] = change, spread
         new[2][np.ix_(some, some)], new[3][some] = sigma, error
-        return _Level(self.cells, *new)
+        return _Level(self.cells, self.weights, *new)
 
     def subset(self, seen: Observations) -> Observations:
         """A random part of the observations with enough pixels in each cell."""
@@ -175,19 +192,17 @@ class _Level:
         return seen.select(np.flatnonzero(kept))
 
 
-def _summed_variance(
-    levels: list[_Level], points: NDArray[np.float64], error: float
-) -> NDArray[np.float32]:
+def _summed_variance(levels: list[_Level], error: float) -> NDArray[np.float32]:
     """(n, k) variances of the sum of all levels.
 
     error: that remains at the end. A level that assumes a larger one counted finer variation as
     noise; the information of its data is scaled to the one that remains, and to CHANNEL_SHARE."""
-    found = np.zeros((len(points), levels[0].spread.shape[1]), np.float32)
+    found = np.zeros((levels[0].weights.shape[0], len(levels[0].sigma)), np.float32)
     for level in levels:
         prior = np.diag(level.sigma)
         data = np.maximum(1 / np.maximum(level.spread, 1e-12) - 1 / prior, 0)
         data *= (level.error / error) ** 2 * CHANNEL_SHARE / PHOTO_WEIGHT
-        found += level.cells.interpolated(1 / (1 / prior + data), points)
+        found += level.at_nodes(1 / (1 / prior + data))
     return np.asarray(MODEL_ERROR_RATIO**2 * found + INTERPOLATION_ERROR**2, np.float32)
 
 
@@ -211,32 +226,38 @@ class _Equations:
         which: NDArray[np.intp],
         black: float,
         noise: _Noise,
+        pool: ThreadPoolExecutor | None,
     ) -> _Equations:
         k, free = len(which), np.isin(np.arange(COUNT), which)
         free[TILT] = True  # for the effect of errors of the normals
-        matrix, right = np.zeros((k, k, cells.count)), np.zeros((k, cells.count))
         cell = cells.of[seen.node]
+        order = np.argsort(cell, kind="stable")
         photos = int(seen.photo.max(initial=0)) + 1
         together = np.bincount(cell.astype(np.int64) * photos + seen.photo)
-        for part in _chunks(len(seen)):
-            some, at = seen.select(part), cell[part]
+
+        def sums(part: slice) -> tuple[slice, Array, Array]:
+            """(cells, right-hand sides (c, k), matrices (c, k·k)) of a part of the observations."""
+            rows = order[part]
+            some, at = seen.select(rows), cell[rows]
             residual, slope = _log_residuals(model, some, normal, theta, black, free)
             variance = noise.variance(_steepness(slope))
             slope = slope[:, :, which]
             alike = together[at.astype(np.int64) * photos + some.photo]
             weight = weights_of_squares(np.square(residual).mean(axis=1) / variance)
             weight *= PHOTO_WEIGHT / (alike * variance)
-            weighted = slope * weight[:, None, None].astype(np.float32)
-            each = np.einsum("mci,mc->im", weighted, residual)
-            product = np.einsum("mci,mcj->ijm", weighted, slope)
-            for i in range(k):
-                right[i] += np.bincount(at, each[i], cells.count)
-                for j in range(i, k):
-                    matrix[i, j] += np.bincount(at, product[i, j], cells.count)
-        for i in range(k):
-            matrix[i, :i] = matrix[:i, i]
+            weighted = (slope * weight[:, None, None].astype(np.float32)).transpose(0, 2, 1)
+            each = np.matmul(weighted, residual[:, :, None])[:, :, 0]
+            product = np.matmul(weighted, slope).reshape(len(rows), k * k)
+            into = slice(int(at[0]), int(at[-1]) + 1) if len(at) else slice(0, 0)
+            own = _sum_by_cell(at - into.start, into.stop - into.start)
+            return into, own @ each, own @ product
+
+        matrix, right = np.zeros((cells.count, k * k)), np.zeros((cells.count, k))
+        for into, each, product in map_chunks(pool, sums, len(seen), CHUNK):
+            right[into] += each
+            matrix[into] += product
         tied = (which >= TILT.start) & (which < TILT.stop)
-        return cls(np.moveaxis(matrix, 2, 0), right.T, tied)
+        return cls(matrix.reshape(-1, k, k), right, tied)
 
     def around(self, change: Array) -> _Equations:
         """The equations of the whole field instead of its increment. change: (c, k) its present
@@ -244,7 +265,9 @@ class _Equations:
         moved = np.einsum("cij,cj->ci", self.normal, change)
         return replace(self, right=self.right + moved)
 
-    def posterior(self, sigma: Array, max_tilt: float) -> tuple[Array, Array, Array]:
+    def posterior(
+        self, sigma: Array, max_tilt: float, pool: ThreadPoolExecutor | None
+    ) -> tuple[Array, Array, Array]:
         """(mean (c, k), variance (c, k) of the cells, Σ (k, k)), Σ estimated from ``sigma`` on.
         max_tilt: largest standard deviation of a component of the tilt."""
         sigma = self._tied(sigma, max_tilt)
@@ -257,10 +280,13 @@ class _Equations:
             sigma[np.diag_indices(len(sigma))] += MIN_DEVIATION**2
         mean = np.zeros((len(self.right), len(sigma)))
         variance = np.tile(np.diag(sigma), (len(self.right), 1))
-        for part in _chunks(len(seen)):
-            rows = seen[part]
-            mean[rows], covariance = self._posterior(rows, sigma)
-            variance[rows] = np.diagonal(covariance, axis1=1, axis2=2)
+
+        def diagonal(part: slice) -> tuple[Array, Array]:
+            found, covariance = self._posterior(seen[part], sigma)
+            return found, np.diagonal(covariance, axis1=1, axis2=2).copy()
+
+        parts = list(map_chunks(pool, diagonal, len(seen), CHUNK))
+        mean[seen], variance[seen] = (np.concatenate(values) for values in zip(*parts, strict=True))
         return mean, variance, sigma
 
     def _tied(self, sigma: Array, max_tilt: float) -> Array:
@@ -342,6 +368,12 @@ def _log_residuals(
     return residual, slope
 
 
+def _sum_by_cell(cell: NDArray[np.int32], count: int) -> csc_array:
+    """The matrix (count, m) that sums values of m observations over the cells (m,) they are in."""
+    starts = np.arange(len(cell) + 1, dtype=np.int32)
+    return csc_array((np.ones(len(cell), np.float32), cell, starts), shape=(count, len(cell)))
+
+
 def _steepness(slope: NDArray[np.float32]) -> Array:
     """(m,) squared change of the logarithm for a tilt of the normal of one radian, the mean of the
     channels. slope: (m, 3, 10) derivatives by the parameters."""
@@ -357,7 +389,3 @@ def near_black(seen: Observations) -> float:
 def robust_deviation(residual: Array) -> float:
     """Standard deviation by the median of the absolute values: outliers do not matter."""
     return float(np.median(np.abs(residual)) / 0.6745)
-
-
-def _chunks(count: int) -> list[slice]:
-    return [slice(i, min(i + CHUNK, count)) for i in range(0, count, CHUNK)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ from ..samples.take import halo, inner_pixels, light_surface, trusted_pixels
 from ..scan import Camera, Scan
 
 MAX_MATERIALS = 250  # labels are uint8, 0 means no material
+COMPRESSION = 1  # level of zlib: 24 megapixels in about 0.1 s
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,26 @@ class PixelLabels:
     shown: NDArray[np.uint8]
     trusted: NDArray[np.uint8]
     clipped: NDArray[np.uint8]
+
+    def packed(self) -> PackedLabels:
+        """The same in a few per cent of the memory."""
+        each = (self.shown, self.trusted, self.clipped)
+        return PackedLabels(
+            self.shown.shape, tuple(zlib.compress(a.tobytes(), COMPRESSION) for a in each)
+        )
+
+
+@dataclass(frozen=True)
+class PackedLabels:
+    """shape: (h, w); parts: the three arrays of PixelLabels, compressed."""
+
+    shape: tuple[int, ...]
+    parts: tuple[bytes, ...]
+
+    def unpacked(self) -> PixelLabels:
+        """The labels."""
+        arrays = (np.frombuffer(zlib.decompress(part), np.uint8) for part in self.parts)
+        return PixelLabels(*(a.reshape(self.shape) for a in arrays))
 
 
 def check_material_count(capture: Capture) -> None:

@@ -121,9 +121,10 @@ class NodeModel:
             rougher[:, GLOSS] += GLOSS_STEP
             out[:, :, GLOSS] = (sum(self._lit(seen, turned, rougher)) - total) / GLOSS_STEP
         for way in tangents(turned) if free[TILT].any() else ():
-            further = _unit(turned + np.float32(TILT_STEP) * way)
+            along = way.astype(np.float32)
+            further = _unit(turned + np.float32(TILT_STEP) * along)
             change = (sum(self._lit(seen, further, parameters)) - total) / TILT_STEP
-            out[:, :, TILT] += change[:, :, None] * way[:, None, :].astype(np.float32)
+            out[:, :, TILT] += change[:, :, None] * along[:, None, :]
         return total, out
 
     def _lit(

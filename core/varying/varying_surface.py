@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from ..scan import Mesh
 from .node_model import NodeModel, Shading, tilted
 from .surface_grid import SurfaceGrid
 
+MIN_WEIGHT = 1e-3  # of the nodes of a face's own material, at a point that they determine
 EVEN = "even"
 VARIATIONS: dict[str, tuple[int, ...]] = {
     EVEN: (),
@@ -63,8 +65,27 @@ class VaryingSurface:
     ) -> NDArray[np.float32]:
         """(m, 10) parameters at points of faces, given by barycentric weights of their second and
         third vertex."""
-        node, weight = self.grid.at(face, second, third)
+        node, weight = self.interpolation(face, second, third)
         return np.einsum("mk,mkc->mc", weight, self.parameters[node])
+
+    def interpolation(
+        self, face: NDArray[np.integer], second: NDArray[np.floating], third: NDArray[np.floating]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        """(nodes (m, 3), weights (m, 3)) that interpolate at points of faces, as of SurfaceGrid.at.
+        A node between faces of two materials has parameters of one of them, so nodes of another
+        material than the face's have no weight where there is one of its own."""
+        node, weight = self.grid.at(face, second, third)
+        if len(self.materials) > 1:
+            own = self._node_material[node] == self.face_material[face][:, None]
+            kept = weight * own
+            total = kept.sum(axis=1, keepdims=True)
+            weight = np.where(total > MIN_WEIGHT, kept / np.maximum(total, MIN_WEIGHT), weight)
+        return node, weight
+
+    @cached_property
+    def _node_material(self) -> NDArray[np.uint8]:
+        """(n,) material of each node, that of one of its faces."""
+        return self.face_material[np.maximum(self.grid.places[0], 0)]
 
 
 def predict_varying(

@@ -129,6 +129,21 @@ def test_materials_keep_to_their_faces(brdf):
     assert second.scale[x < 0.3, 0] == pytest.approx(np.exp(0.3), rel=0.02)
 
 
+def test_parameters_do_not_cross_the_border_of_materials():
+    mesh = square()
+    made = surface(mesh, materials=2)
+    rows = made.face_material[np.maximum(made.grid.places[0], 0)]
+    parameters = np.where(rows[:, None] == 1, 2.0, -1.0) * np.ones((1, COUNT))
+    made = replace(made, parameters=parameters.astype(np.float32))
+    rng = np.random.default_rng(0)
+    face = rng.integers(0, len(mesh.faces), 2000)
+    second = rng.random(len(face))
+    third = rng.random(len(face)) * (1 - second)
+    expected = np.where(made.face_material[face] == 1, 2.0, -1.0)
+    found = made.at(face, second, third)[:, 0]
+    assert found == pytest.approx(expected)
+
+
 def test_files_hold_the_factors_of_the_shader(brdf, tmp_path):
     files = write_maps(tmp_path, baked(square(), brdf), "exr")
     kinds = {file.kind for file in files}

@@ -16,6 +16,7 @@ from patina.core.inputs.separated_materials import (
     can_separate,
     separated_names,
     with_separated,
+    without_separated,
 )
 from patina.core.jobs import FitJob, finished
 from patina.core.jobs.select_photos import select_photos
@@ -131,6 +132,13 @@ def test_separated_materials_are_written_and_used_again(halves, tmp_path, monkey
     assert command_line.main(["predict", str(capture.file), str(out), "--out", str(predicted)]) == 0
     errors = json.loads((predicted / "errors.json").read_text("utf-8"))
     assert errors["fitted"]["typical"] < 0.1
+
+
+def test_separated_capture_becomes_the_one_before(tmp_path):
+    capture = read_capture(made.make_capture(tmp_path, photos=3))
+    separated = with_separated(capture, ("one", "two"))
+    assert [m.name for m in separated.materials] == ["one", "two"]
+    assert without_separated(separated, capture) == capture
 
 
 def test_mask_of_the_only_material_becomes_that_of_all_parts(tmp_path):

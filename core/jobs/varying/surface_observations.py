@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -11,26 +11,33 @@ from numpy.typing import NDArray
 
 from ...concurrency.background import in_background
 from ...concurrency.job import Step
+from ...concurrency.ordered_map import ordered_map
+from ...concurrency.thread_pool import thread_count, thread_pool
 from ...fit.measured_result import MeasuredResult
 from ...inputs import capture_data
 from ...varying.choice import MIN_NORMAL_ERROR, Nodes
 from ...varying.corrected_observations import ObservationCorrection
 from ...varying.hierarchy import MAX_TILT
-from ...varying.labels import label_pixels
+from ...varying.labels import PackedLabels, label_pixels
 from ...varying.observations import Observations, observe
 from ...varying.surface_grid import SurfaceGrid
 from ...varying.surface_photo import SurfacePhoto
 from ..fit_job import CaptureResult, MaterialResult
 
+PHOTOS_AT_ONCE = 2  # that are read: each of 24 megapixels takes some 0.5 GB
+
 
 @dataclass(frozen=True)
 class SurfaceObservations:
     """grid: on the mesh; material: (n,) index of the material of each node, −1 for vertices without
-    a face; seen: observations of all nodes in all photos."""
+    a face; seen: observations of all nodes in all photos; threads: for estimates from them, None
+    for one a core; labels: of the pixels of each photo."""
 
     grid: SurfaceGrid
     material: NDArray[np.integer]
     seen: Observations
+    threads: int | None = None
+    labels: tuple[PackedLabels, ...] = ()
 
     def rows(self, index: int) -> NDArray[np.intp]:
         """The nodes of one material."""
@@ -51,14 +58,15 @@ class SurfaceObservations:
         error = MIN_NORMAL_ERROR
         if isinstance(material.fit, MeasuredResult):
             error = float(np.clip(np.radians(material.fit.normal_deviation), error, MAX_TILT))
-        nodes = Nodes(grid.points(rows), normals, spacing, grid.mesh_edge, error)
+        points = grid.points(rows)
+        nodes = Nodes(points, normals, spacing, grid.mesh_edge, error, self.threads)
         return own.at_nodes(rows, len(grid)), nodes
 
     def with_materials(self, face_material: NDArray[np.integer]) -> SurfaceObservations:
         """The same with other materials, of the nodes too. face_material: (f,) index."""
         material = _of_nodes(self.grid, face_material)
         seen = replace(self.seen, material=material[self.seen.node].astype(np.uint8))
-        return SurfaceObservations(self.grid, material, seen)
+        return replace(self, material=material, seen=seen)
 
     @property
     def photos(self) -> NDArray[np.uint16]:
@@ -72,20 +80,26 @@ def observe_surface(
     start: float,
     share: float,
     correction: ObservationCorrection | None = None,
+    threads: int | None = None,
+    labels: Sequence[PackedLabels] = (),
 ) -> Generator[Step, None, SurfaceObservations]:
     """Read every photo at the nodes of a grid of about ``nodes`` nodes. start, share: the part of
-    the job that this takes. correction: for the causes that a diagnosis named."""
+    the job that this takes. correction: for the causes that a diagnosis named. threads: None for
+    one a core. labels: of the pixels of each photo, if they are known: they take most of the
+    time."""
     mesh, count = fitted.scan.mesh, len(fitted.capture.photos)
     grid = yield from in_background(
         lambda: SurfaceGrid.with_nodes(mesh, nodes), Step("dividing the mesh", start)
     )
-    parts = []
-    for place in range(count):
-        step = Step("reading the surface in the photos", start + share * place / count)
-        read = partial(_one, fitted, grid, place, correction)
-        parts.append((yield from in_background(read, step)))
+    parts, read = [], partial(_one, fitted, grid, correction, labels)
+    with thread_pool(min(thread_count(threads), PHOTOS_AT_ONCE)) as pool:
+        found = ordered_map(pool, read, range(count), ahead=PHOTOS_AT_ONCE - 1)
+        for place in range(count):
+            step = Step("reading the surface in the photos", start + share * place / count)
+            parts.append((yield from in_background(partial(next, found), step)))
     material = _of_nodes(grid, fitted.face_material)
-    return SurfaceObservations(grid, material, Observations.joined(parts))
+    seen = Observations.joined([own for own, _ in parts])
+    return SurfaceObservations(grid, material, seen, threads, tuple(own for _, own in parts))
 
 
 def pixel_size(fitted: CaptureResult) -> float:
@@ -105,15 +119,24 @@ def _of_nodes(grid: SurfaceGrid, face_material: NDArray[np.integer]) -> NDArray[
 
 
 def _one(
-    fitted: CaptureResult, grid: SurfaceGrid, place: int, correction: ObservationCorrection | None
-) -> Observations:
-    """The observations of one photo."""
+    fitted: CaptureResult,
+    grid: SurfaceGrid,
+    correction: ObservationCorrection | None,
+    known: Sequence[PackedLabels],
+    place: int,
+) -> tuple[Observations, PackedLabels]:
+    """The observations of one photo, and the labels of its pixels."""
     capture, scan = fitted.capture, fitted.scan
     camera = capture_data.camera_of(capture, scan, place)
     photo, light = fitted.photos.read(place), fitted.lights.of(capture, place)
-    labels = label_pixels(capture, scan, fitted.rays, camera, place, photo, light)
+    if known:
+        packed = known[place]
+        labels = packed.unpacked()
+    else:
+        labels = label_pixels(capture, scan, fitted.rays, camera, place, photo, light)
+        packed = labels.packed()
     surface = SurfacePhoto(fitted.rays, camera, light, photo.radiance, labels)
     seen = observe(surface, place, grid)
-    if correction is None:
-        return seen
-    return correction(seen, camera, grid.points(seen.node), grid.normals(seen.node))
+    if correction is not None:
+        seen = correction(seen, camera, grid.points(seen.node), grid.normals(seen.node))
+    return seen, packed

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from ...concurrency.job import Step
 from ...varying.choice import Nodes
 from ...varying.conversion import typical_samples
 from ...varying.corrected_observations import ObservationCorrection
+from ...varying.labels import PackedLabels
 from ...varying.node_model import COUNT
 from ...varying.observations import Observations
 from ...varying.rough_lobe import rough_lobe_variance
@@ -24,8 +25,8 @@ from ...varying.varying_surface import (
 )
 from ..fit_job import CaptureResult, FitJob, MaterialResult, with_portable
 from .node_steps import CHOICE_NODES, chosen_kind, final_fields, model_of
-from .separate_materials import SeparatedFit
-from .surface_observations import SurfaceObservations, observe_surface, pixel_size
+from .separate_materials import SeparatedFit, observe_whole
+from .surface_observations import SurfaceObservations, pixel_size
 
 MODES = ("auto", "never", "always")
 _, DIFFUSE, *FURTHER = VARIATIONS
@@ -69,7 +70,7 @@ class VariationEstimator:
         surface = None
         if parts is not None or any(kind.kind != EVEN for kind in kinds):
             start, share = start + CHOOSING * share, (1 - CHOOSING) * share
-            surface = yield from self._surface(materials, kinds, start, share)
+            surface = yield from self._surface(materials, kinds, coarse.labels, start, share)
         notes = [_sentence(m.name, k) for m, k in zip(materials, kinds, strict=True)]
         if parts is not None and surface is not None:
             surface = replace(surface, separated_from=parts.separated_from)
@@ -139,15 +140,18 @@ class VariationEstimator:
         self,
         materials: list[MaterialResult],
         kinds: list[MaterialVariation],
+        labels: Sequence[PackedLabels],
         start: float,
         share: float,
     ) -> Generator[Step, None, VaryingSurface]:
-        """The variation on a fine grid."""
+        """The variation on a fine grid. labels: of the pixels of each photo."""
         before = self.before
         pixels = NODES_PER_PIXEL * before.scan.mesh.area / pixel_size(before) ** 2
         count = int(min(self.nodes, MAX_OBSERVATIONS / len(before.capture.photos), pixels))
         reading = READING * share
-        fine = yield from observe_surface(before, count, start, reading, self.correction)
+        fine = yield from observe_whole(
+            before, self.parts, count, start, reading, self.correction, self.fit.threads, labels
+        )
         n = len(fine.grid)
         parameters, variance = (np.zeros((n, COUNT), np.float32) for _ in range(2))
         start, share = start + reading, (share - reading) / len(materials)

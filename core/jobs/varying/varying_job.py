@@ -40,7 +40,9 @@ class VaryingJob(Job):
             for step in self.fit.run():
                 yield Step(step.stage, FITTED * step.fraction)
         before = finished(self.fit.result)
-        coarse = yield from observe_surface(before, CHOICE_NODES, FITTED, OBSERVED - FITTED)
+        coarse = yield from observe_surface(
+            before, CHOICE_NODES, FITTED, OBSERVED - FITTED, threads=self.fit.threads
+        )
         parts = yield from separate_materials(
             self.fit, coarse, CHOICE_NODES, OBSERVED, SEPARATED - OBSERVED
         )
