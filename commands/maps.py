@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..core.brdf import merl_file
 from ..core.capture import read_capture
+from ..core.errors import InputError
 from ..core.jobs import finished
 from ..core.maps import MapsJob, MapsSettings
 from ..core.maps.maps_job import REFITS, MapsResult
@@ -16,10 +17,14 @@ from ..core.maps.write import write_maps
 from ..core.output_folder import check_out, staged_folder
 from ..core.report import result_json
 from ..core.result import read_result
+from ..core.scan.mesh_formats.write_ply import write_ply
+from ..core.varying import storage
+from ..core.varying.displacement import displaced_mesh
 from .fit import NO_SCENE, timed
 from .needs_blender import has_blender
 from .progress import Progress
 
+DISPLACED = "displaced.ply"
 HELP = "compute maps of base colour (without lighting), roughness and coverage over the UVs"
 
 
@@ -44,6 +49,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also write a normal map that corrects the errors of the mesh normals",
     )
     parser.add_argument(
+        "--displaced",
+        action="store_true",
+        help="also write displaced.ply, a finer mesh with the relief of the normals of a result of "
+        "`fit --varying`",
+    )
+    parser.add_argument(
         "--format",
         choices=("exr", "png"),
         default="exr",
@@ -55,6 +66,13 @@ def run(arguments: argparse.Namespace) -> None:
     check_size(arguments.size)
     out = check_out(arguments.out)
     capture, fitted = read_capture(arguments.capture), read_result(arguments.result)
+    varying = fitted.varying
+    if arguments.displaced and varying is None:
+        raise InputError(
+            "its materials are even, so there is no relief; expected a result of `fit --varying`",
+            file=arguments.result,
+            key="--displaced",
+        )
     blender = has_blender()
     if blender:
         from ..scene.scan.unwrap import unwrapped  # needs bpy
@@ -69,6 +87,11 @@ def run(arguments: argparse.Namespace) -> None:
         stages = [*job.stages]
         with timed(stages, "maps", progress, 0.92):
             files = write_maps(folder, result, arguments.format)
+        if arguments.displaced and varying is not None:
+            with timed(stages, DISPLACED, progress, 0.95):
+                surface = storage.read(varying, result.scan.mesh, len(result.materials))
+                made = displaced_mesh(surface)
+                write_ply(folder / DISPLACED, made.vertices, made.faces, made.uv)
         scene = folder / "scene.blend"
         notes: Sequence[str] = (NO_SCENE,)
         if blender:
@@ -86,7 +109,12 @@ def run(arguments: argparse.Namespace) -> None:
     for note in (*result.notes, *notes):
         print(f"  note: {note}")
     print(f"wrote {len(files)} maps and {out / 'maps.json'}")
-    for name in ("scene.blend",) * written + ("result.json",) * (result.refit is not None):
+    also = (
+        (DISPLACED, arguments.displaced),
+        ("scene.blend", written),
+        ("result.json", result.refit is not None),
+    )
+    for name in (name for name, is_written in also if is_written):
         print(f"      {out / name}")
 
 

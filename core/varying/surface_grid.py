@@ -109,6 +109,42 @@ class SurfaceGrid:
         )
         return node, weight.astype(np.float32)
 
+    def small_faces(self) -> NDArray[np.int64]:
+        """(f·n², 3) nodes of the small triangles of all faces, face after face, counter-clockwise
+        from outside."""
+        face = np.arange(len(self.mesh.faces))
+        corners = [
+            self.nodes(np.repeat(face, len(j)), np.tile(j, len(face)), np.tile(k, len(face)))
+            for j, k in self._small_corners()
+        ]
+        return np.stack(corners, axis=1)
+
+    def small_uv(self) -> NDArray[np.float32] | None:
+        """(f·n², 3, 2) texture coordinates of their corners; None for a mesh without any."""
+        uv = self.mesh.uv
+        if uv is None:
+            return None
+        found = []
+        for j, k in self._small_corners():
+            second, third = (a[None, :, None] / self.n for a in (j, k))
+            a, b, c = (uv[:, None, side].astype(np.float64) for side in range(3))
+            found.append((a * (1 - second - third) + b * second + c * third).reshape(-1, 2))
+        return np.stack(found, axis=1).astype(np.float32)
+
+    def _small_corners(self) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+        """Lattice positions j, k (n²,) of the three corners of the small triangles of a face."""
+        n = self.n
+        j, k = (a.ravel() for a in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
+        up, down = j + k < n, j + k < n - 1  # the triangle at j, k, and the one beyond its diagonal
+        shifts = (((0, 0), (1, 0)), ((1, 0), (1, 1)), ((0, 1), (0, 1)))
+        return [
+            (
+                np.concatenate([j[up] + first[0], j[down] + second[0]]),
+                np.concatenate([k[up] + first[1], k[down] + second[1]]),
+            )
+            for first, second in shifts
+        ]
+
     @cached_property
     def places(self) -> tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]]:
         """(face, weight of its second vertex, of its third) of every node, one face of those that

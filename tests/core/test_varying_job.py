@@ -21,9 +21,12 @@ from patina.core.jobs.varying.variation_for_diagnosis import variation_for_diagn
 from patina.core.jobs.varying.varying_job import VaryingJob
 from patina.core.predict.errors import PhotoErrors
 from patina.core.result import read_result
+from patina.core.scan.mesh import read_mesh
+from patina.core.scan.mesh_formats.write_ply import write_ply
 from patina.core.varying.node_model import DIFFUSE, NodeModel
 from patina.core.varying.rough_lobe import rough_lobe_variance
 from tests import make_capture as made
+from tests import make_result
 
 DIFFUSE_BRDF = np.array([0.16, 0.05, 0.04])  # 1/sr, of the material that make_capture uses
 NODES = 20_000
@@ -143,10 +146,32 @@ def test_fit_writes_the_variation_and_predict_uses_it(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_library_exports_the_variation(tmp_path):
-    capture = patina.load_capture(made.make_capture(tmp_path, photos=8, brdf=painted))
+def test_library_exports_the_variation(tmp_path, monkeypatch):
+    monkeypatch.setattr("patina.commands.maps.has_blender", lambda: False)
+    file = made.make_capture(tmp_path, photos=8, brdf=painted)
+    vertices, faces = made.sphere_mesh()
+    turn = np.arctan2(*(vertices - made.CENTRE).T[:2]) / (2 * np.pi) + 0.5
+    uv = np.stack([turn, 0.5 + 0.4 * (vertices - made.CENTRE)[:, 2]], axis=1)
+    write_ply(tmp_path / "mesh.ply", vertices, faces, uv[faces])
+    capture = patina.load_capture(file)
     found = patina.fit(capture, varying="always")
     assert found.details.varying.varies
-    patina.export(found, tmp_path / "out", ["json"])
-    assert (tmp_path / "out" / "varying.npz").is_file()
-    assert read_result(tmp_path / "out").varying == tmp_path / "out" / "varying.npz"
+    out = tmp_path / "out"
+    patina.export(found, out, ["json"])
+    assert (out / "varying.npz").is_file()
+    assert read_result(out).varying == out / "varying.npz"
+    words = ["maps", str(file), str(out), "--out", str(tmp_path / "maps"), "--size", "64"]
+    assert command_line.main([*words, "--displaced"]) == 0
+    relief = read_mesh(tmp_path / "maps" / "displaced.ply")
+    assert len(relief.faces) > 4 * len(faces)
+    radius = np.linalg.norm(relief.vertices - made.CENTRE, axis=1)
+    assert np.abs(radius - 1).max() < 0.05  # of a sphere without relief
+
+
+def test_relief_of_even_materials_is_refused(tmp_path, capsys):
+    file = made.make_capture(tmp_path, photos=1)
+    content = make_result.description(make_result.material("surface", make_result.BRONZE))
+    result = make_result.write_result(tmp_path / "result", content)
+    words = ["maps", str(file), str(result), "--out", str(tmp_path / "maps"), "--displaced"]
+    assert command_line.main(words) == 2
+    assert "so there is no relief" in capsys.readouterr().err
