@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from ..core.brdf import TabulatedBRDF, merl_file, metrics, nbrdf
 from ..core.errors import InputError
+from ..core.files import read_regular
 
+MAX_TRUTH_BYTES = 1 << 20  # of a truth.json: 675 numbers are 20 kB
 HELP = "print the differences between two BRDFs: relative L2, log-relative and cube-root RMS"
 
 
@@ -48,7 +50,7 @@ def read_truth(path: Path) -> TabulatedBRDF:
 def truth_weights(path: Path) -> NDArray[np.float32]:
     """Return the weights (675,) of the neural encoding in a truth.json. Raises InputError."""
     try:
-        weights = np.array(json.loads(path.read_text("utf-8"))["weights"], np.float32)
+        weights = np.array(json.loads(read_regular(path, MAX_TRUTH_BYTES))["weights"], np.float32)
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError(f"contains no neural encoding ({error})", file=path) from error
     if weights.shape != (nbrdf.WEIGHTS,):

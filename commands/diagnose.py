@@ -16,8 +16,8 @@ from ..core.jobs.varying_second_fit import VaryingSecondFit
 from ..core.output_folder import check_out, staged_folder
 from ..core.report import diagnosis, diagnosis_json
 from . import capture_arguments
-from .fit import add_varying, print_summary, write_results
-from .progress import Progress
+from .fit import FIT, add_varying, print_summary, write_results
+from .progress import Progress, print_note
 from .solve import check_threads
 
 MATERIALS = "report/materials"  # report of the second fit
@@ -61,7 +61,7 @@ def diagnose_to_folder(
     progress.share = 1.0
     checked, after = job.checked, finished(job.result)
     found, before = finished(checked.found), finished(checked.result)
-    with staged_folder(out) as folder:
+    with staged_folder(out, FIT, print_note) as folder:
         report = folder / "report"
         assessment = finished(checked.assessment)
         context = finished(checked.context)

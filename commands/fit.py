@@ -23,9 +23,10 @@ from ..core.varying import storage
 from ..core.varying.varying_surface import EVEN
 from . import capture_arguments
 from .needs_blender import has_blender
-from .progress import Progress
+from .progress import Progress, print_note
 from .solve import check_threads
 
+FIT = "fit"  # owner of the files of a fit, and of the second fit of a diagnosis
 NO_SCENE = "scene.blend was not written, because it needs Blender. All other files are complete."
 HELP = "fit every material of a capture and write the results"
 
@@ -62,7 +63,7 @@ def fit_to_folder(
     job.drain(progress)
     result, stages = finished(job.result), job.stages
     progress.share = 1.0
-    with staged_folder(out) as folder:
+    with staged_folder(out, FIT, print_note) as folder:
         write_results(folder, out, result, stages, progress)
     print_summary(out, result)
     return result

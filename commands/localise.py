@@ -13,7 +13,7 @@ from ..core.scan.formats import read_reconstruction
 from ..core.scan.readers.colmap import is_colmap
 from ..core.scan.scan import read_scan
 from ..core.solve import LocaliseJob, find_photos
-from .progress import Progress
+from .progress import Progress, print_note
 from .solve import check_threads
 
 HELP = "compute camera poses of lit photos that are not part of the scan"
@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> None:
     for note in (*notes, *result.notes):
         print(f"  note: {note}")
     if result.placed:
-        with staged_folder(out) as folder:
+        with staged_folder(out, "localise", print_note) as folder:
             name = result.write(folder).name
         for found in result.placed:
             print(f"  {found.sentence()}")

@@ -22,7 +22,7 @@ from ..core.varying import storage
 from ..core.varying.displacement import displaced_mesh
 from .fit import NO_SCENE, timed
 from .needs_blender import has_blender
-from .progress import Progress
+from .progress import Progress, print_note
 
 DISPLACED = "displaced.ply"
 HELP = "compute maps of base colour (without lighting), roughness and coverage over the UVs"
@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> None:
     job.drain(progress)
     result = finished(job.result)
     progress.share = 1.0
-    with staged_folder(out) as folder:
+    with staged_folder(out, "maps", print_note) as folder:
         stages = [*job.stages]
         with timed(stages, "maps", progress, 0.92):
             files = write_maps(folder, result, arguments.format)

@@ -11,7 +11,7 @@ from ..core.jobs import finished
 from ..core.masks.proposal import MOST_MATERIALS
 from ..core.masks.write_masks import MasksJob, MasksSettings, check_final
 from ..core.output_folder import check_out, staged_folder
-from .progress import Progress
+from .progress import Progress, print_note
 
 HELP = "propose shadow masks and material masks of a capture, which you can repaint"
 
@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> None:
     out = check_out(arguments.out)
     capture = read_capture(arguments.capture)
     check_final(capture, out)
-    with staged_folder(out) as folder:
+    with staged_folder(out, "masks", print_note) as folder:
         job = MasksJob(capture, wanted, folder, out)
         job.drain(Progress())
         done = finished(job.result)

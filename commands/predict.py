@@ -19,7 +19,7 @@ from ..core.report.errors_json import PredictedPhoto
 from ..core.result import FittedResult, read_result
 from ..core.views.prediction_pictures import PredictionPictures
 from . import capture_arguments
-from .progress import Progress
+from .progress import Progress, print_note
 from .solve import check_threads
 
 HELP = "predict the photos of a capture from a result, and compare them"
@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> None:
     check_threads(arguments.threads)
     out = check_out(arguments.out)
     capture, result = read_capture(arguments.capture), read_result(arguments.result)
-    with staged_folder(out) as folder:
+    with staged_folder(out, "predict", print_note) as folder:
         photos: list[PredictedPhoto] = []
 
         def take(found: PhotoPrediction) -> None:

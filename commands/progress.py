@@ -25,3 +25,8 @@ class Progress:
                 flush=True,
             )
             self.stage, self.printed_at = step.stage, now
+
+
+def print_note(sentence: str) -> None:
+    """Print a sentence for the user."""
+    print(f"  note: {sentence}")

@@ -12,7 +12,7 @@ from ..core.output_folder import check_out, staged_folder
 from ..core.report.relit import Picture, write_page
 from ..core.result import read_result
 from .needs_blender import check_blender
-from .progress import Progress
+from .progress import Progress, print_note
 
 HELP = "render the materials of a result, and the scanned object, under world images"
 
@@ -76,7 +76,7 @@ def render_to_folder(
     subjects = [Subject(material) for material in result.materials]
     progress, found = Progress(), []
     quality = Quality(size, samples, turns, denoise)
-    with staged_folder(out) as folder:
+    with staged_folder(out, "render", print_note) as folder:
         for fraction, picture in relight(folder, result, subjects, worlds, quality):
             progress(Step("rendering", 0.98 * fraction))
             if picture is not None:

@@ -9,7 +9,7 @@ from ..core.errors import InputError
 from ..core.output_folder import check_out, staged_folder
 from ..core.solve import SolveJob
 from ..core.solve.solve import LENSES
-from .progress import Progress
+from .progress import Progress, print_note
 
 HELP = "compute cameras and sparse points from a folder of photos (structure from motion)"
 
@@ -36,7 +36,7 @@ def run(arguments: argparse.Namespace) -> None:
         job.drain(Progress())
     finally:
         job.cancel()
-    with staged_folder(out) as folder:
+    with staged_folder(out, "solve", print_note) as folder:
         capture = job.solution.write(folder, out, arguments.photos)
     print(job.solution.report(), end="")
     print(f"wrote {out}: sparse, report.txt, {capture.name}")

@@ -1,12 +1,16 @@
-"""Atomic writing of files: a file appears completely or not at all."""
+"""Atomic writing of files: a file appears completely or not at all. Reading of regular files only:
+a pipe or a device at an input path could block for ever or have no end."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import secrets
+import stat
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 
 @contextlib.contextmanager
@@ -32,3 +36,26 @@ def write_text_atomic(path: Path, text: str) -> None:
     """Write a text as UTF-8, atomically. Raises OSError."""
     with atomic_path(path) as partial:
         partial.write_text(text, "utf-8")
+
+
+def regular_size(path: Path) -> int:
+    """Size of a regular file in bytes. Raises OSError, also for a pipe, a device or a folder."""
+    found = os.stat(path)
+    if stat.S_ISDIR(found.st_mode):
+        raise IsADirectoryError(errno.EISDIR, "a folder; expected a file", str(path))
+    if not stat.S_ISREG(found.st_mode):
+        raise OSError(errno.EINVAL, "a pipe or device; expected a regular file", str(path))
+    return found.st_size
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Open a regular file to read its bytes. Raises OSError as ``regular_size``."""
+    regular_size(path)
+    return path.open("rb")
+
+
+def read_regular(path: Path, max_bytes: int) -> bytes:
+    """The bytes of a regular file, at most ``max_bytes`` of them. Raises OSError as
+    ``regular_size``."""
+    with open_regular(path) as file:
+        return file.read(max_bytes)

@@ -103,11 +103,12 @@ class _StagedMasks(Job):
     def __init__(self, capture: Capture, out: Path) -> None:
         super().__init__()
         self.capture, self.out = capture, out
+        self.notes: list[str] = []
         self.result: WrittenMasks | None = None
 
     def run(self) -> Iterator[Step]:
         """Run a MasksJob in a temporary folder, then move the files into place."""
-        with staged_folder(self.out) as folder:
+        with staged_folder(self.out, "masks", self.notes.append) as folder:
             job = MasksJob(self.capture, MasksSettings(), folder, self.out)
             yield from job.run()
         self.result = job.result
@@ -123,7 +124,7 @@ excluded from the fit"""
 
     replace: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Replace",
-        description="Recompute existing masks; what was painted on them is lost",
+        description="Recompute existing masks. Painted ones are kept in a folder of their own",
         options={"SKIP_SAVE"},
     )
 
@@ -138,6 +139,8 @@ excluded from the fit"""
         files = [out / name for name in self._job.result.shadows]
         names = [photo.file.name for photo in self._photos]
         show_shadow_masks(scene, self._capture, names, files)
+        for note in self._job.notes:
+            self.report({"WARNING"}, note)
         self.report({"INFO"}, f"Shadow masks written: {len(files)}, in {out}")
 
 

@@ -94,9 +94,12 @@ class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
             self._job.cancel()
         super()._stop(context)
 
+    def _note(self, sentence: str) -> None:
+        self.report({"INFO"}, sentence)
+
     def _finish(self, context: bpy.types.Context) -> None:
         solution = self._job.solution
-        with staged_folder(self._out) as folder:
+        with staged_folder(self._out, "solve", self._note) as folder:
             capture = solution.write(folder, self._out, self._photos)
         self.report({"INFO"}, f"{solution.summary()}. Written: {self._out / capture.name}")
         missing = solution.photos - solution.placed

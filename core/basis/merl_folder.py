@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..angles import Angles, merl_grid
 from ..brdf import merl_file
 from ..errors import InputError
+from ..files import regular_size
 from . import storage
 from .basis import Basis, Progress
 from .training import BLOCK, train
@@ -92,7 +93,7 @@ def check_files(
     for done, (name, digest) in enumerate(expected.items()):
         progress("checking the MERL files", done / len(expected))
         path = folder / name
-        size = os.path.getsize(path)
+        size = regular_size(path)
         if size != merl_file.SIZE:
             raise InputError(
                 f"{size} bytes; expected {merl_file.SIZE}: the download is incomplete", file=path

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UNREADABLE_NPZ, InputError
-from ..files import atomic_path
+from ..files import atomic_path, open_regular
 from .basis import Basis
 from .grid import AngleGrid
 
@@ -53,7 +53,7 @@ def load(path: Path) -> Basis:
     """Read a basis written by :func:`save`, also by earlier versions (which kept no training
     coefficients). Raises InputError for anything else."""
     try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
+        with open_regular(path) as file, np.load(file, allow_pickle=False) as data:
             version = int(data["format"])
             if version not in (1, FORMAT):
                 raise InputError(f"basis format {version}; expected {FORMAT} or 1", file=path)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..angles import Angles
 from ..errors import UNREADABLE_NPZ, InputError, PatinaError
-from ..files import atomic_path
+from ..files import atomic_path, open_regular
 from . import components, mapping
 from .basis import Basis, Progress
 from .grid import AngleGrid
@@ -142,7 +142,7 @@ class TrainingSet:
     def load(path: Path) -> TrainingSet:
         """Read a set written by :meth:`save`. Raises InputError for anything else."""
         try:
-            with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
+            with open_regular(path) as file, np.load(file, allow_pickle=False) as data:
                 if int(data["format"]) != FORMAT:
                     raise InputError(f"format {int(data['format'])}; expected {FORMAT}", file=path)
                 n_h, n_d, n_p, knee = (float(x) for x in data["grid"])

@@ -5,14 +5,13 @@ Stored numbers are scaled per channel; negative values mark invalid cells (Matus
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 
 from ..angles import merl_grid
 from ..errors import InputError
-from ..files import atomic_path
+from ..files import atomic_path, regular_size
 from .table import TabulatedBRDF
 
 SCALE = np.array([1.0, 1.15, 1.66]) / 1500.0  # stored numbers → 1/sr, for R, G, B
@@ -25,7 +24,7 @@ SIZE = 12 + 3 * CELLS * 8  # bytes of a file
 def read(path: Path) -> TabulatedBRDF:
     """The table in a ``.binary`` file, in 1/sr. Raises InputError for anything else."""
     try:
-        size = os.path.getsize(path)
+        size = regular_size(path)
         with open(path, "rb") as file:
             head = file.read(12)
             if len(head) < 12:

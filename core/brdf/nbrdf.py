@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..angles import Angles
 from ..errors import UNREADABLE_NPZ, InputError
+from ..files import open_regular
 
 WEIGHTS = 675  # 6·21 + 21 + 21·21 + 21 + 21·3 + 3
 
@@ -18,7 +19,7 @@ WEIGHTS = 675  # 6·21 + 21 + 21·21 + 21 + 21·3 + 3
 def load(path: Path) -> tuple[list[str], NDArray[np.float32]]:
     """(names, weights (n, 675)) from an .npz of encodings. Raises InputError for anything else."""
     try:
-        with open(path, "rb") as file, np.load(file) as data:
+        with open_regular(path) as file, np.load(file) as data:
             names = [str(n) for n in data["names"]]
             weights = np.asarray(data["weights"]).astype(np.float32)
     except UNREADABLE_NPZ as error:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..errors import InputError
+from ..files import regular_size
 from ..fit import PaperSettings
 from ..samples import Margins
 from .entries import FitOptions, LightEntry, MaterialEntry, ToneEntry
@@ -155,7 +156,7 @@ def _scan(section: Section) -> ScanEntry:
 
 def _text(path: Path) -> str:
     try:
-        if path.stat().st_size > MAX_FILE_BYTES:
+        if regular_size(path) > MAX_FILE_BYTES:
             raise InputError("is too large for a capture file; expected at most 1 MB", file=path)
         text = path.read_text("utf-8-sig")
     except (OSError, ValueError) as error:

@@ -12,8 +12,10 @@ import tomlkit
 
 from ..capture import Capture
 from ..capture.model import EXCLUDED_MASKS, SHADOW_MASK
+from ..capture.reader import MAX_FILE_BYTES
 from ..counted import counted
 from ..errors import InputError
+from ..files import read_regular
 
 PATHS: tuple[tuple[str, ...], ...] = (
     ("scan", "cameras"),
@@ -48,7 +50,7 @@ def capture_with_masks(
     meanwhile.
     """
     try:
-        document = tomlkit.parse(capture.file.read_text("utf-8-sig"))
+        document = tomlkit.parse(read_regular(capture.file, MAX_FILE_BYTES).decode("utf-8-sig"))
     except (OSError, ValueError) as error:
         raise InputError(
             f"cannot be read ({error}); expected the capture file that was read before; restore it",

@@ -43,7 +43,7 @@ class SolveDraftJob(Job):
             yield Step(step.stage, SOLVE_SHARE * step.fraction)
         solution = self._solve.solution
         self.summary = solution.summary()
-        with staged_folder(self.out) as staging:
+        with staged_folder(self.out, "solve") as staging:
             solution.write(staging, self.out, self.folder)
         files = [photo.file for photo in self.before.photos]
         others = [file for file in files if file.parent != self.folder]

@@ -10,6 +10,7 @@ import numpy as np
 from ..appearance.principled import Principled
 from ..basis import Basis, PrincipalBRDF
 from ..errors import InputError
+from ..output_folder import complete_publication
 from ..scan.parsing.json_file import read_json
 from ..scan.parsing.json_record import Record, root_record, shown
 from .bases import basis_of_version
@@ -36,6 +37,7 @@ def read_result(path: Path, cache: Path | None = None) -> FittedResult:
     for anything that is not a result that this version can read.
     """
     file = path / NAME if path.is_dir() else path
+    complete_publication(file.parent)
     record = root_record(read_json(_checked(file), MAX_BYTES, "a result.json"), file)
     version = record.whole("format")
     if version not in FORMATS:

@@ -105,8 +105,8 @@ def _equations(
     row, column = np.repeat(faces, 3, axis=1).ravel(), np.tile(faces, (1, 3)).ravel()
     stiffness = csr_array((product.ravel(), (row, column)), shape=(n, n))
     pull = -np.einsum("fac,fc->fa", slope, tilt[faces].mean(axis=1)) * area[:, None]
-    right = np.bincount(faces.ravel(), pull.ravel(), n)
-    mass = np.bincount(faces.ravel(), np.repeat(area / 3, 3), n)
+    right = np.bincount(faces.ravel(), pull.ravel(), n).astype(float)
+    mass = np.bincount(faces.ravel(), np.repeat(area / 3, 3), n).astype(float)
     return stiffness, np.maximum(mass, 1e-300), right
 
 
@@ -121,4 +121,4 @@ def _slopes(points: Array, faces: NDArray[np.integer]) -> tuple[Array, Array]:
     safe = np.where(thin, np.inf, double)[:, None, None]
     # the opposite edge turned inwards, over twice the area
     slope = np.cross(normal[:, None] / safe, opposite) / safe
-    return slope, np.where(thin, 0.0, 0.5 * double)
+    return np.asarray(slope), np.asarray(np.where(thin, 0.0, 0.5 * double))

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..files import regular_size
 from ..scan import Mesh
 from .node_model import COUNT, LIMITS
 from .surface_grid import MAX_DIVISIONS, SurfaceGrid
@@ -47,6 +48,7 @@ def read(path: Path, mesh: Mesh, materials: int) -> VaryingSurface:
     """Read the file for the mesh of its fit, with so many materials. Raises InputError where it is
     not such a file, or of another mesh."""
     try:
+        regular_size(path)
         with zipfile.ZipFile(path) as archive:
             declared = sum(entry.file_size for entry in archive.infolist())
         if declared > MAX_NODES * (4 * COUNT + 2) + len(mesh.faces) + MAX_OTHER_BYTES:

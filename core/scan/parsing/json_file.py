@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
+from ...files import regular_size
 
 MAX_FILE_BYTES = 1 << 30  # Meshroom's .sfm with feature colours has some hundred MB
 
@@ -15,7 +16,7 @@ def read_json(path: Path, max_bytes: int = MAX_FILE_BYTES, what: str = "a file o
     """The parsed content of a file of at most ``max_bytes``. Raises InputError with file and
     line."""
     try:
-        if path.stat().st_size > max_bytes:
+        if regular_size(path) > max_bytes:
             raise InputError(f"is too large for {what}", file=path)
         with open(path, "rb") as opened:
             text = opened.read(max_bytes + 1).decode("utf-8-sig")

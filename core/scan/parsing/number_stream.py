@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...files import regular_size
 
 Array = NDArray[np.float64]
 
@@ -31,7 +32,7 @@ class NumberStream:
         self.line = 0  # number of the last line read
         self._rest = np.zeros(0)
         try:
-            self.size = path.stat().st_size
+            self.size = regular_size(path)
             self._file: BinaryIO = path.open("rb")
         except OSError as error:
             raise InputError(f"cannot be read ({error.strerror})", file=path) from error

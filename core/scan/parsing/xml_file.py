@@ -9,6 +9,7 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser
 
 from ...errors import InputError
+from ...files import read_regular
 
 MAX_XML_BYTES = 1 << 27  # bytes; 100,000 Metashape cameras take 50 MB
 MAX_ELEMENTS = 1_000_000  # 100,000 Metashape cameras take 600,000
@@ -101,8 +102,7 @@ def line_of(element: Element | None) -> int | None:
 
 def _bytes_of(path: Path) -> bytes:
     try:
-        with path.open("rb") as file:
-            return file.read(MAX_XML_BYTES + 1)  # bounded: the file may be a device, or grow
+        return read_regular(path, MAX_XML_BYTES + 1)  # bounded: the file may grow
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", file=path) from error
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...counted import counted
 from ...errors import InputError
+from ...files import regular_size
 from ..camera import Camera, Pose
 from ..lenses.brown import brown_lens
 from ..parsing.json_record import MAX_MAGNITUDE
@@ -134,7 +135,7 @@ def _names(path: Path, count: int) -> tuple[list[str], list[str]]:
 def _listed(path: Path) -> list[str]:
     """Names from a list with one photo per line: the name, then " 0 FOCAL" where the focal length
     was known."""
-    if path.stat().st_size > MAX_LIST_BYTES:
+    if regular_size(path) > MAX_LIST_BYTES:
         raise InputError("is too large for a list of photos", file=path)
     text = path.read_bytes().decode("utf-8-sig", "replace")
     lines = [line.strip() for line in text.splitlines()]

@@ -17,6 +17,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from xml.etree.ElementTree import Element
 
 from ...errors import InputError
+from ...files import open_regular
 from ..parsing.xml_file import MAX_XML_BYTES, XmlElement, line_of, read_xml
 from ..reconstruction import Reconstruction
 from .metashape import chunk_elements, select_chunk
@@ -117,7 +118,7 @@ def _folder(path: Path) -> tuple[Opener, str]:
 def _archive(path: Path, stack: ExitStack) -> Opener:
     """Function that opens the documents inside a .psz."""
     try:
-        file = stack.enter_context(path.open("rb"))
+        file = stack.enter_context(open_regular(path))
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", file=path) from error
     archive = stack.enter_context(open_zip(file, path))

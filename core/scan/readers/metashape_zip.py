@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from ...errors import UNREADABLE_NPZ, InputError
+from ...files import open_regular
 from ..parsing.xml_file import MAX_XML_BYTES
 from .metashape_values import Source
 
@@ -64,7 +65,7 @@ def member(archive: zipfile.ZipFile, entry: str, name: Source) -> bytes | None:
 def document_in(path: Path, name: Source) -> bytes:
     """The doc.xml of a zip on disk. Raises InputError."""
     try:
-        with path.open("rb") as file, open_zip(file, name) as archive:
+        with open_regular(path) as file, open_zip(file, name) as archive:
             return document(archive, name)
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", file=name) from error

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...files import regular_size
 from ..camera import Camera, Pose
 from ..parsing.json_record import as_number
 from ..parsing.photo_labels import labels_of
@@ -70,7 +71,7 @@ def read_realityscan(path: Path, images: Path | None, chunk: str | None) -> Reco
 def _rows(path: Path) -> list[tuple[str, dict[str, float], int]]:
     """(name of the photo, values by column, line) of each camera."""
     try:
-        if path.stat().st_size > MAX_FILE_BYTES:
+        if regular_size(path) > MAX_FILE_BYTES:
             raise InputError("is too large for a list of cameras", file=path)
         data = path.read_bytes()
     except OSError as error:

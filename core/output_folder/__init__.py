@@ -1,0 +1,6 @@
+"""Write results completely or not at all, and without losing work of the user."""
+
+from .folder import check_out, staged_folder
+from .publication import complete_publication
+
+__all__ = ["check_out", "complete_publication", "staged_folder"]
