@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import platform
+import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 """Root folder of the checkout, which is also the extension."""
+
+
+SIGNAL_AT_PARENT_DEATH = 1  # PR_SET_PDEATHSIG of prctl(2)
 
 
 class Failure(Exception):
@@ -58,12 +64,23 @@ def this_platform() -> str:
 def call(command: Sequence[str | Path], *, env: Mapping[str, str] | None = None) -> int:
     """Run a command in the user's terminal and return its exit code.
 
-    Ctrl-C reaches the command too; it has 5 seconds to clean up before it is killed.
+    Ctrl-C reaches the command too, and SIGTERM is passed on; it has 5 seconds to clean up before it
+    is killed. On Linux it also ends where this process is killed.
     """
-    process = subprocess.Popen([str(word) for word in command], env=env and dict(env))
+    words, end_too = [str(word) for word in command], None
+    if sys.platform == "linux":
+        libc = ctypes.CDLL(None)  # loaded before the fork
+
+        def end_too() -> None:
+            libc.prctl(SIGNAL_AT_PARENT_DEATH, signal.SIGTERM)
+
+    process = subprocess.Popen(words, env=env and dict(env), preexec_fn=end_too)
     try:
-        code = process.wait()
-    except KeyboardInterrupt:
+        with _terminated_as_exception():
+            code = process.wait()
+    except KeyboardInterrupt as interrupt:
+        if isinstance(interrupt, Terminated):
+            process.terminate()
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(timeout=5)
         raise
@@ -72,6 +89,27 @@ def call(command: Sequence[str | Path], *, env: Mapping[str, str] | None = None)
             process.kill()
             process.wait()
     return code if code >= 0 else 128 - code  # ended by a signal: the exit code of a shell
+
+
+class Terminated(KeyboardInterrupt):
+    """The process got SIGTERM."""
+
+
+@contextlib.contextmanager
+def _terminated_as_exception() -> Iterator[None]:
+    """Raise Terminated for SIGTERM within the block, in the main thread."""
+
+    def raise_it(*_: object) -> None:
+        raise Terminated
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, raise_it)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def quietly(
