@@ -8,6 +8,7 @@ import errno
 import os
 import secrets
 import stat
+import unicodedata
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
@@ -36,6 +37,12 @@ def write_text_atomic(path: Path, text: str) -> None:
     """Write a text as UTF-8, atomically. Raises OSError."""
     with atomic_path(path) as partial:
         partial.write_text(text, "utf-8")
+
+
+def as_file_name(name: str) -> str:
+    """A name so that two that are equal may be one file: some file systems ignore upper and lower
+    case, and the two ways to write an accented letter in Unicode."""
+    return unicodedata.normalize("NFC", name).casefold()
 
 
 def regular_size(path: Path) -> int:

@@ -15,6 +15,11 @@ from .section import Section, shown
 MAX_RADIUS_PIXELS = 131_072.0
 MAX_RADIUS = 1e9  # scan units
 
+IRRADIANCES, INTENSITIES = (1e-9, 1e9), (1e-15, 1e21)
+"""Limits in the photos' unit of radiance. Pixel values up to 1 and exposures from 1/8000 s to an
+hour stay within, and intensities at distances from a thousandth to a million scan units too.
+Beyond, all pixels of a photo would be black or white."""
+
 LOCATION_KEYS = ("direction", "sphere", "sun", "position", "mounted")
 
 
@@ -107,8 +112,11 @@ def _strength(section: Section, key: str, distant: bool) -> NDArray[np.float64] 
             "white",
         )
     strength = section.vector(key, "red, green, blue")
-    if strength is not None and not (strength > 0).all():
-        raise section.error(f"found {shown(strength.tolist())}; expected positive numbers", key)
+    low, high = IRRADIANCES if distant else INTENSITIES
+    if strength is not None and not ((strength >= low) & (strength <= high)).all():
+        raise section.error(
+            f"found {shown(strength.tolist())}; expected numbers from {low:g} to {high:g}", key
+        )
     return strength
 
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..errors import InputError
-from ..files import regular_size
+from ..files import as_file_name, regular_size
 from ..fit import PaperSettings
 from ..samples import Margins
-from .entries import FitOptions, LightEntry, MaterialEntry, ToneEntry
+from .entries import FitOptions, LightEntry, MaterialEntry, PhotoEntry, ToneEntry
 from .light_section import read_light
 from .lines import key_lines
 from .model import EXCLUDED_MASKS, Capture, ScanEntry
@@ -69,6 +69,7 @@ def read_capture(path: Path, margins: Margins | None = None) -> Capture:
         read_photo_entry(section, {light.name for light in lights}, {m.name for m in materials})
         for section in top.tables("photo")
     )
+    _check_distinct_files(top, photos)
     _check_located(top, materials, {name for photo in photos for name in photo.masks})
     fit = _fit(top.table("fit"), margins or Margins())
     top.table("diagnose").close()
@@ -175,11 +176,34 @@ def _text(path: Path) -> str:
 def _check_unique(top: Section, kind: str, names: list[str]) -> None:
     """Raise InputError where two tables have the same name."""
     for place, name in enumerate(names):
-        # names become file names, and some file systems ignore upper and lower case
-        if name.casefold() in [other.casefold() for other in names[:place]]:
+        if as_file_name(name) in [as_file_name(other) for other in names[:place]]:
             raise top.error(
                 f"the name {name!r} is used twice; expected unique names", kind, place, "name"
             )
+
+
+def _check_distinct_files(top: Section, photos: tuple[PhotoEntry, ...]) -> None:
+    """Raise InputError where a photo is listed twice, which would count its pixels twice, and where
+    two materials have one mask in a photo."""
+    seen: dict[Path, int] = {}
+    for place, photo in enumerate(photos):
+        for file in photo.files:
+            first = seen.setdefault(file.resolve(), place)
+            if first != place or photo.files.count(file) > 1:
+                raise top.error(
+                    f"{file.name!r} is listed more than once (photo {first + 1}); expected each "
+                    "file once: remove one of the entries",
+                    "photo", place, "file",
+                )  # fmt: skip
+        masks: dict[Path, str] = {}
+        for name, mask in photo.masks.items():
+            other = masks.setdefault(mask.resolve(), name)
+            if other != name and not {other, name} & set(EXCLUDED_MASKS):
+                raise top.error(
+                    f"{name!r} and {other!r} have the same mask {mask.name!r}; expected a mask for "
+                    "each material",
+                    "photo", place, "masks", name,
+                )  # fmt: skip
 
 
 def _material(section: Section) -> MaterialEntry:

@@ -115,6 +115,19 @@ def refined(
     )  # fmt: skip
 
 
+def _check_radius(capture: Capture, scan: Scan, place: int, entry: LightEntry) -> None:
+    """Raise InputError for a lamp that reaches into the object."""
+    if entry.position is None or entry.radius <= 0 or entry.guess:
+        return
+    away = float(np.linalg.norm(scan.mesh.vertices - entry.position, axis=1).min())
+    if entry.radius >= away:
+        raise capture.error(
+            f"found a radius of {entry.radius:g}; the object is at a distance of {away:.3g} scan "
+            "units from the lamp's centre: expected a smaller radius, in scan units",
+            "light", place, "radius",
+        )  # fmt: skip
+
+
 def _light(
     capture: Capture,
     scan: Scan,
@@ -124,6 +137,7 @@ def _light(
     notes: list[str],
 ) -> Light:
     if entry.position is not None:
+        _check_radius(capture, scan, place, entry)
         relative = entry.relative_strength or 1.0
         return NearLight(entry.name, entry.position, entry.strength, entry.radius, relative)
     if entry.mounted is not None:

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..files import write_text_atomic
+from ..files import as_file_name, write_text_atomic
 from ..photo import write_png
 from ..photo.image import write_exr
 from ..photo.transfer import srgb_encoded
@@ -104,12 +104,15 @@ def _maps(
 ) -> Iterator[tuple[MapFile, NDArray[np.float32], NDArray[np.floating] | float]]:
     """(file, values (n,) or (n, 3), fill value outside the faces) of each map."""
     several = len(result.materials) > 1
+    stems = _file_stems([material.name for material in result.materials])
     for index, material in enumerate(result.materials):
         name = material.name
 
-        def named(what: str, colour: bool, name: str = name, ending: str = "") -> MapFile:
+        def named(
+            what: str, colour: bool, ending: str = "", name: str = name, stem: str = stems[index]
+        ) -> MapFile:
             suffix = ending or (colours_as if colour else kind)
-            return MapFile(name, what, f"{name}_{what}.{suffix}", colour)
+            return MapFile(name, what, f"{stem}_{what}.{suffix}", colour)
 
         colours = base_color(result, index)
         yield named("base_color", True), colours, _typical(result, index, colours)
@@ -141,6 +144,16 @@ def _maps(
     yield MapFile("", "coverage", "coverage.png", False), photos, 0.0
     error = np.clip(result.maps.error / MAX_ERROR, 0, 1)
     yield MapFile("", "uncertainty", "uncertainty.png", False), error, 1.0
+
+
+def _file_stems(names: list[str]) -> list[str]:
+    """The start of the names of each material's files: its name; with numbers where one name is the
+    start of another, or BLEND, so that two files could have one name."""
+    folded = [as_file_name(name) for name in names]
+    clash = BLEND in folded or any(
+        other.startswith(f"{name}_") for name in folded for other in folded
+    )
+    return [f"{i + 1:02d}_{name}" for i, name in enumerate(names)] if clash else names
 
 
 def _typical(result: MapsResult, index: int, colours: NDArray[np.float32]) -> NDArray[np.floating]:

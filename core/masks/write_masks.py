@@ -15,6 +15,7 @@ from ..capture import Capture
 from ..capture.model import SHADOW_MASK
 from ..concurrency.job import Job, Step, finished
 from ..errors import InputError
+from ..files import as_file_name
 from ..geometry import RayScene, SurfaceView, edges, view_surface
 from ..inputs import capture_data
 from ..inputs.photos import LitPhotos
@@ -157,13 +158,12 @@ def material_names(count: int) -> list[str]:
 
 
 def _stems(capture: Capture) -> list[str]:
-    """File stem of the masks of each photo: that of the photo, with its number if not unique."""
+    """File stem of the masks of each photo: that of the photo; all with numbers if any two photos
+    have the same."""
     stems = [photo.file.stem for photo in capture.photos]
-    folded = [stem.casefold() for stem in stems]
-    return [
-        stem if folded.count(folded[i]) == 1 else f"{i + 1:03d}_{stem}"
-        for i, stem in enumerate(stems)
-    ]
+    if len({as_file_name(stem) for stem in stems}) == len(stems):
+        return stems
+    return [f"{i + 1:03d}_{stem}" for i, stem in enumerate(stems)]
 
 
 def _painted_shadow(capture: Capture, place: int, shape: tuple[int, ...]) -> NDArray[np.bool_]:

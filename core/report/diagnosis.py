@@ -147,7 +147,7 @@ def _materials(folder: Path, before: CaptureResult, after: CaptureResult) -> str
     for one, other in zip(before.materials, after.materials, strict=True):
         cells = ""
         for suffix, stage, material in (("before", "before", one), ("after", "after", other)):
-            name = f"sphere_{one.name}_{suffix}.png"
+            name = f"{suffix}_{one.name}.png"
             write_sphere(folder / name, material.fit.brdf.evaluate)
             held = material.held_out
             error = (

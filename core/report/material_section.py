@@ -67,17 +67,17 @@ def _spheres(folder: Path, material: MaterialResult) -> str:
     """HTML of lit spheres of the measured BRDF, its lobe stack and its Principled BSDF."""
     lobes, principled = material.lobes, material.principled
     shown: list[tuple[str, str, Reflector]] = [
-        ("", "Measured BRDF (Cycles with OSL)", material.fit.brdf.evaluate),
-        ("_lobes", f"Lobe stack (EEVEE), error {100 * lobes.error:.1f} %", lobes.stack),
+        ("sphere", "Measured BRDF (Cycles with OSL)", material.fit.brdf.evaluate),
+        ("lobes", f"Lobe stack (EEVEE), error {100 * lobes.error:.1f} %", lobes.stack),
         (
-            "_principled",
+            "principled",
             f"Principled BSDF (exports), error {100 * principled.error:.1f} %",
             principled.principled,
         ),
     ]
     cells = []
-    for suffix, label, reflector in shown:
-        name = f"sphere_{material.name}{suffix}.png"
+    for kind, label, reflector in shown:
+        name = f"{kind}_{material.name}.png"  # the kind first: material names may end in anything
         write_sphere(folder / name, reflector)
         cells.append(
             f"<figure><img src='{escape(quote(name))}' alt='lit sphere, {label}'>"

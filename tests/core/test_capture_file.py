@@ -12,6 +12,8 @@ import pytest
 from patina.core.capture import read_capture
 from patina.core.errors import InputError, PatinaError
 from patina.core.inputs import capture_data
+from patina.core.inputs.lights import find_lights
+from patina.core.inputs.photos import LitPhotos
 from patina.core.jobs import FitJob
 from patina.core.samples import Margins
 from tests import make_capture as made
@@ -54,6 +56,21 @@ TEXT_MISTAKES = {
     "missing mesh": (replaced("mesh.ply", "gone.ply"), r"scan\.mesh.*no such file"),
     "missing key": (replaced('camera = "view_02.jpg"\n', ""), r"photo 2\.camera.*missing"),
     "unknown light": (replaced('light = "lamp2"', 'light = "sun"'), r"no \[\[light\]\]"),
+    "photo listed twice": (
+        replaced('file = "lit_2.exr"', 'file = "lit_1.exr"'),
+        r"photo 2\.file.*'lit_1\.exr' is listed more than once \(photo 1\)",
+    ),
+    "light of no strength": (
+        replaced("irradiance = [3.0, 3.0, 3.0]", "irradiance = [1e-300, 3.0, 3.0]"),
+        r"irradiance.*expected numbers from 1e-09 to 1e\+09",
+    ),
+    "twin names in Unicode": (
+        appended(
+            '[[material]]\nname = "caf\u00e9"\nfaces = "part"\n[[material]]\n'
+            'name = "cafe\u0301"\nfaces = "part"'
+        ),
+        "is used twice",
+    ),
     "label": (replaced("view_02.jpg", "view_99.jpg"), r"photo 2\.camera.*view_99"),
     "two lights of a name": (replaced('name = "lamp2"', 'name = "lamp1"'), "used twice"),
     "short vector": (
@@ -229,3 +246,38 @@ def test_margins_of_the_caller_apply_where_the_file_sets_none(tmp_path: Path) ->
     margins = Margins(silhouette=7, shadow=8, mask=9, cosine=0.3)
     assert read_capture(path, margins).fit.margins == Margins(7, 8, 4, 0.3)
     assert read_capture(path).fit.margins == Margins(mask=4)
+
+
+def test_mask_of_two_materials_is_refused(ball: Path, tmp_path: Path) -> None:
+    text = """[[material]]
+name = "steel"
+[[material]]
+name = "paint"
+"""
+    path = edited(ball, tmp_path, appended(text))
+    made.write_png(path.parent / "all.png", np.full((made.HEIGHT, made.WIDTH), 255))
+    both = inserted_after_light_2('masks = {steel = "all.png", paint = "all.png"}')
+    path.write_text(both(path.read_text()))
+    with pytest.raises(InputError, match=r"'paint' and 'steel' have the same mask 'all.png'"):
+        read_capture(path)
+
+
+def test_lamp_that_reaches_into_the_object_is_refused(ball: Path, tmp_path: Path) -> None:
+    path = edited(ball, tmp_path, lambda text: _near_lights(text, "radius = 50.0"))
+    capture = read_capture(path)
+    scan = capture_data.open_scan(capture)
+    with pytest.raises(InputError, match=r"radius.*the object is at a distance of"):
+        find_lights(capture, scan, LitPhotos.open(capture))
+
+
+def _near_lights(text: str, more: str) -> str:
+    """The lights of a capture at a distance of 10 from its object."""
+    lines = []
+    for line in text.splitlines():
+        if line.startswith("direction = "):
+            x, y, z = (10 * float(n) + c for n, c in zip(
+                line.split("[")[1].strip("]").split(","), made.CENTRE, strict=True
+            ))  # fmt: skip
+            line = f"position = [{x}, {y}, {z}]\n{more}"
+        lines.append(line.replace("irradiance = [3.0", "intensity = [300.0"))
+    return "\n".join(lines)

@@ -129,6 +129,16 @@ def test_materials_keep_to_their_faces(brdf):
     assert second.scale[x < 0.3, 0] == pytest.approx(np.exp(0.3), rel=0.02)
 
 
+@pytest.mark.parametrize("names", [("m0", "blend"), ("m0", "M0_specular"), ("m0", "m1")])
+def test_every_map_has_a_file_of_its_own(brdf, tmp_path, names):
+    result = baked(square(), brdf, materials=2)
+    own = tuple(replace(m, name=n) for m, n in zip(result.materials, names, strict=True))
+    files = write_maps(tmp_path, replace(result, materials=own), "exr")
+    assert len({file.file.casefold() for file in files}) == len(files)
+    assert all((tmp_path / file.file).is_file() for file in files)
+    assert {file.material for file in files} >= set(names)
+
+
 def test_parameters_do_not_cross_the_border_of_materials():
     mesh = square()
     made = surface(mesh, materials=2)

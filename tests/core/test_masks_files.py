@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 import tomllib
+import unicodedata
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import OpenImageIO as oiio
@@ -21,7 +24,7 @@ from patina.core.inputs.material_pixels import material_pixels
 from patina.core.inputs.photos import LitPhotos
 from patina.core.masks.capture_text import capture_with_masks
 from patina.core.masks.shadow import from_grey, light_visibility
-from patina.core.masks.write_masks import MasksJob, MasksSettings, check_final
+from patina.core.masks.write_masks import MasksJob, MasksSettings, _stems, check_final
 from tests import make_capture as made
 
 
@@ -159,7 +162,8 @@ def test_all_capture_paths_are_rewritten_for_new_folder(tmp_path: Path) -> None:
         "irradiance = [3.0, 3.0, 3.0]",
         'white = {photo = "lit_1.exr", mask = "a.png", reflectance = 0.9}',
     )
-    text = text.replace('file = "lit_2.exr"', 'file = ["lit_2.exr", "lit_3.exr"]')
+    shutil.copy(path.parent / "lit_2.exr", path.parent / "longer.exr")
+    text = text.replace('file = "lit_2.exr"', 'file = ["lit_2.exr", "longer.exr"]')
     text = text.replace(
         'light = "lamp2"', 'light = "lamp2"\nmasks = {red = "b.png"}\nexposure = [1, 2]'
     )
@@ -195,3 +199,19 @@ def test_unusual_names_are_written_unchanged(commented: Path, masks, materials) 
     assert data["photo"][1]["masks"] == {"shadow": "b.png"}
     assert [entry["name"] for entry in data.get("material", [])] == materials
     assert "# of a Tuesday" in text and "# the end" in text
+
+
+@pytest.mark.parametrize("names", [
+    ("lit/x.exr", "b/x.exr", "lit/001_x.exr"),
+    ("a.exr", "A.exr"),
+    ("caf\u00e9.exr", "cafe\u0301.exr"),
+])  # fmt: skip
+def test_masks_of_each_photo_have_a_name_of_their_own(names):
+    photos = [SimpleNamespace(file=Path(name)) for name in names]
+    found = _stems(SimpleNamespace(photos=photos))
+    assert len({unicodedata.normalize("NFC", stem).casefold() for stem in found}) == len(names)
+
+
+def test_masks_of_distinct_photos_have_their_names():
+    photos = [SimpleNamespace(file=Path(name)) for name in ("a/one.exr", "b/two.exr")]
+    assert _stems(SimpleNamespace(photos=photos)) == ["one", "two"]
