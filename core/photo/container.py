@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -25,7 +26,11 @@ KIND_OF = {
 }
 RAW = frozenset((".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw"))
 READABLE_SUFFIXES = ", ".join((*KIND_OF, *sorted(RAW)))
-MAX_SIDE, MAX_PIXELS = 1 << 17, 300_000_000  # pixels
+MAX_SIDE = 1 << 17  # pixels
+MAX_MEGAPIXELS = 160.0
+"""Of one image: the largest cameras have 151. A file of 1 MB can declare far more, and would take
+gigabytes of memory to decode."""
+LIMIT_VARIABLE = "PATINA_MAX_MEGAPIXELS"
 HEADS = {
     "openexr": rb"\x76\x2f\x31\x01",
     "png": re.escape(SIGNATURE),
@@ -102,14 +107,28 @@ def _check(path: Path, whole: bool) -> Container:
         raise InputError(f"cannot be read ({error.strerror})", file=path) from error
 
 
+def _max_megapixels() -> float:
+    """The limit that the user has set, or MAX_MEGAPIXELS. Raises InputError."""
+    text = os.environ.get(LIMIT_VARIABLE, "")
+    try:
+        limit = float(text) if text else MAX_MEGAPIXELS
+    except ValueError:
+        limit = float("nan")
+    if not 0 < limit < 1e6:
+        raise InputError(f"found {text!r}; expected a number of million pixels", key=LIMIT_VARIABLE)
+    return limit
+
+
 def check_size(path: Path, width: int, height: int) -> None:
     """Raise InputError for an image that is empty or larger than any photo, before it is read.
 
     width, height: pixels, as the header states them.
     """
-    if not (0 < width <= MAX_SIDE and 0 < height <= MAX_SIDE) or (width * height > MAX_PIXELS):
+    most = _max_megapixels()
+    if not (0 < width <= MAX_SIDE and 0 < height <= MAX_SIDE) or width * height > most * 1e6:
         raise InputError(
             f"has {width} × {height} pixels according to its header; expected at most {MAX_SIDE} "
-            f"per side and {MAX_PIXELS // 10**6} million in total",
+            f"per side and {most:g} million in total; for larger images set the environment "
+            f"variable {LIMIT_VARIABLE} to a number of million pixels",
             file=path,
         )

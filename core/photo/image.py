@@ -151,13 +151,16 @@ def read_mask(path: Path) -> NDArray[np.bool_]:
                 f"has too many channels for a mask; expected at most {MAX_CHANNELS}", file=path
             )
         alpha = spec.alpha_channel
-        pixels = image.file.read_image(0, 0, 0, spec.nchannels, oiio.FLOAT)
-        if pixels is None:
-            raise InputError(f"is truncated or damaged ({_reason(image.file)})", file=path)
-        pixels = np.atleast_3d(np.asarray(pixels, np.float32))
-    colours = [c for c in range(pixels.shape[2]) if c != alpha][:3]
-    white = pixels[:, :, colours].max(axis=2) if colours else np.ones(pixels.shape[:2])
-    return (white > 0.5) & (alpha < 0 or pixels[:, :, alpha] > 0.5)
+        colours = [c for c in range(spec.nchannels) if c != alpha][:3]
+        white = np.ones((spec.height, spec.width), bool)
+        for top, block in image.blocks(0, list(range(spec.nchannels))):
+            rows = white[top : top + len(block)]
+            half = np.iinfo(block.dtype).max / 2 if block.dtype.kind == "u" else 0.5
+            if colours:
+                rows &= block[:, :, colours].max(axis=2) > half
+            if alpha >= 0:
+                rows &= block[:, :, alpha] > half
+        return white
 
 
 @once_per_file
