@@ -7,9 +7,11 @@ import importlib
 import signal
 import sys
 from collections.abc import Sequence
+from types import ModuleType
 from typing import NoReturn
 
 from ..core.errors import PatinaError
+from .plain_output import plain_output
 
 DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130  # exit codes; shells use 130 for SIGINT
 
@@ -50,13 +52,33 @@ def main(arguments: Sequence[str]) -> int:
     for command, module in modules.items():
         module.add_arguments(choices.add_parser(command, help=module.HELP))
     parsed = parser.parse_args(arguments)
+    with plain_output():
+        return _run(modules[parsed.command], parsed)
+
+
+def _run(command: ModuleType, parsed: argparse.Namespace) -> int:
+    """Run a command; returns the exit code."""
     try:
-        modules[parsed.command].run(parsed)
+        command.run(parsed)
     except PatinaError as error:
         print(f"patina: {error}", file=sys.stderr)
         return WRONG_INPUT
+    except OSError as error:  # such as a full disk, or a network folder that is gone
+        where = "" if error.filename is None else f"{error.filename}: "
+        print(f"patina: {where}{error.strerror or error}", file=sys.stderr)
+        return WRONG_INPUT
+    except MemoryError:
+        print(
+            "patina: the memory was not sufficient; close other programs, or use fewer threads, "
+            "smaller photos or a smaller mesh",
+            file=sys.stderr,
+        )
+        return WRONG_INPUT
     except KeyboardInterrupt:
-        print("patina: Interrupted. No files were written.", file=sys.stderr)
+        print(
+            "patina: Interrupted. The folder of results has the earlier files, or all new ones.",
+            file=sys.stderr,
+        )
         return INTERRUPTED
     return DONE
 

@@ -76,8 +76,12 @@ def publish(staging: Path, out: Path, owner: str | None) -> Plan:
         _check_places(staging, out)
         plan = Plan() if owner is None else _plan(staging, out, new, owner)
         (staging / PLAN).write_text(plan.as_json(), "utf-8")
-        os.rename(staging, out / READY)
-        _finish(out)
+        try:
+            os.rename(staging, out / READY)
+            _finish(out)
+        except KeyboardInterrupt:
+            _finish(out)  # what is published is completed first
+            raise
     return plan
 
 
