@@ -8,13 +8,13 @@ from pathlib import Path
 import bpy
 
 from ...core.appearance.principled_fit import PrincipledFit
-from ...core.errors import PatinaError
 from ...core.export.subject import Subject
 from ..material import material_nodes, osl_files
 from ..material.preview import show_sphere
 from ..paint.mesh_paint import COLOUR_ATTRIBUTE
 from ..property_keys import EVIDENCE_COLOURS, MEASURED_NAME, VARIATION_COLOURS
 from ..scan.vertex_colours import drop_vertex_colours
+from .open_blend import open_blend
 from .present_result import export_name
 
 RINGS, SEGMENTS = 48, 96  # of a preview sphere
@@ -27,11 +27,7 @@ def open_scan(file: Path, names: Sequence[str]) -> bpy.types.Object | None:
 
     Raises PatinaError if the file cannot be opened.
     """
-    try:
-        bpy.ops.wm.open_mainfile(filepath=str(file), load_ui=False, use_scripts=False)
-    except RuntimeError as error:
-        message = " ".join(str(error).split())
-        raise PatinaError(f"{file}: cannot be opened as a .blend ({message})") from error
+    open_blend(file)
     mesh = bpy.context.scene.patina.mesh
     if mesh is None or mesh.type != "MESH" or mesh.name not in bpy.context.scene.objects:
         return None

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import bpy
 
-from ...core.errors import PatinaError
 from ...core.jobs import Stage
 from ...core.maps.maps_result import MapsResult
 from ...core.maps.write import MapFile
@@ -16,6 +15,7 @@ from ..material.measured_materials import measured_materials
 from ..material.packed_exr import write_packed
 from ..scan.apply_maps import apply_maps
 from .blend_file import save, write_blend
+from .open_blend import open_blend
 
 
 def write_mapped_blend(
@@ -47,10 +47,7 @@ def write_mapped_blend(
 
 def _open(source: Path) -> None:
     """Open a .blend and make its image paths absolute, so that it can be saved elsewhere."""
-    try:
-        bpy.ops.wm.open_mainfile(filepath=str(source.resolve()), load_ui=False)
-    except RuntimeError as error:
-        raise PatinaError(f"{source}: cannot be opened ({error})") from error
+    open_blend(source.resolve())
     for image in bpy.data.images:
         own_file = image.source == "FILE" and image.packed_file is None
         if own_file and image.filepath.startswith("//"):
