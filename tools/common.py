@@ -34,7 +34,10 @@ def say(message: str) -> None:
 
 
 def cache_dir() -> Path:
-    """Return the folder for downloads and environments; it may be deleted at any time."""
+    """Return the folder for downloads and environments; it may be deleted at any time.
+
+    Raises Failure if it cannot be made.
+    """
     if own := os.environ.get("PATINA_CACHE"):
         folder = Path(own).expanduser().resolve()
     elif sys.platform == "win32":
@@ -43,7 +46,13 @@ def cache_dir() -> Path:
         folder = Path.home() / "Library/Caches/patina"
     else:
         folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "patina"
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Failure(
+            f"the cache {folder} cannot be made ({error.strerror}); set PATINA_CACHE to a folder "
+            "that can be written to"
+        ) from error
     return folder
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from .blender import find_blender, prepare, run_script
 from .common import ROOT, call, say
 from .environment import bpy_python
+from .repair import remove_if_damaged
 
 SCRIPT = ROOT / "headless.py"
 
@@ -17,7 +18,10 @@ def main(arguments: Sequence[str]) -> int:
         home = prepare(blender)
         say(f"using Blender {blender.label}")
         return run_script(blender, home, SCRIPT, arguments)
-    return call([bpy_python(), SCRIPT, *arguments])
+    python = bpy_python()
+    code = call([python, SCRIPT, *arguments])
+    remove_if_damaged(python, code)
+    return code
 
 
 def demo(arguments: Sequence[str]) -> int:
