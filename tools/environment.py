@@ -17,6 +17,9 @@ from .wheels import requirements
 BPY = {(3, 11): "5.0.1", (3, 13): "5.2.3"}
 """Python version → version of bpy (each wheel supports one Python version only)."""
 
+LOCKS = Path(__file__).with_name("locks")
+"""Lists of what is installed, with checksums; tools/lock.py writes them."""
+
 TEST_TOOLS = [
     "pytest==8.4.2",
     "hypothesis==6.140.3",
@@ -111,11 +114,11 @@ def bpy_python() -> Path:
     The name of the folder contains a hash of the requirements. It is created under another name and
     renamed when complete, so that an incomplete environment is never used.
     """
-    this_platform()
+    platform = this_platform()
     interpreter = find_interpreter()
     bpy = BPY[interpreter.version]
-    wanted = [f"bpy=={bpy}", *requirements()]
-    key = f"{interpreter.program}\n" + "\n".join(wanted)
+    wanted = lock_file(interpreter.version, platform, tests=False)
+    key = f"{interpreter.program}\n" + wanted.read_text(encoding="utf-8")
     tag = f"cp{interpreter.version[0]}{interpreter.version[1]}"
     folder = cache_dir() / f"venv-{tag}-{hashlib.sha256(key.encode()).hexdigest()[:10]}"
     if venv_python(folder).exists():
@@ -127,9 +130,8 @@ def bpy_python() -> Path:
             shutil.rmtree(folder, ignore_errors=True)
             say(f"setting up Python {tag} with bpy in {folder}")
             quietly([interpreter.program, "-m", "venv", making], "creating an environment")
-            say(f"installing bpy {bpy} (Blender as a module, about 400 MB, once) ...")
-            pip_install(making, wanted[:1])
-            say(f"installing {', '.join(requirements())} (about 100 MB, once) ...")
+            say(f"installing bpy {bpy} (Blender as a module, about 400 MB, once) and")
+            say(f"{', '.join(requirements())} (about 100 MB, once) ...")
             pip_install(making, wanted)
             making.rename(folder)
     return venv_python(folder)
@@ -140,21 +142,29 @@ def test_python() -> Path:
     python = bpy_python()
     folder = python.parent.parent
     stamp = folder / "test-tools.txt"
-    wanted = "\n".join(TEST_TOOLS)
+    lock = lock_file(find_interpreter().version, this_platform(), tests=True)
+    wanted = lock.read_text(encoding="utf-8")
     with one_at_a_time(folder.name):
         if not (stamp.exists() and stamp.read_text(encoding="utf-8") == wanted):
             say("installing pytest, ruff, mypy, matplotlib … (about 160 MB, once) ...")
-            pip_install(folder, TEST_TOOLS)
+            pip_install(folder, lock)
             stamp.write_text(wanted, encoding="utf-8")
     return python
 
 
-def pip_install(folder: Path, what: list[str]) -> None:
-    """Install packages into an environment, only from wheels, so that nothing is compiled."""
+def lock_file(version: tuple[int, int], platform: str, tests: bool) -> Path:
+    """The list of packages for a Python and a platform; tests: of those that only tests need."""
+    return LOCKS / f"cp{version[0]}{version[1]}-{platform}{'-tests' if tests else ''}.txt"
+
+
+def pip_install(folder: Path, lock: Path) -> None:
+    """Install the packages of a list into an environment: only wheels, so that nothing is compiled,
+    and only those with the checksums of the list."""
     quietly(
         [
             venv_python(folder), "-m", "pip", "install", "--quiet",
-            "--disable-pip-version-check", "--only-binary=:all:", *what,
+            "--disable-pip-version-check", "--only-binary=:all:", "--no-deps", "--require-hashes",
+            "-r", lock,
         ],
-        f"installing {', '.join(what)}",
+        f"installing the packages of {lock.name}",
     )  # fmt: skip
