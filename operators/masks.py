@@ -124,7 +124,7 @@ excluded from the fit"""
 
     replace: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Replace",
-        description="Recompute existing masks. Painted ones are kept in a folder of their own",
+        description="Recompute existing masks; what was painted on them is lost",
         options={"SKIP_SAVE"},
     )
 

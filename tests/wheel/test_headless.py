@@ -54,7 +54,9 @@ def test_fit_writes_exactly_the_documented_files(fitted: Path) -> None:
         if name.startswith(("patina_components_", "patina_brdf_", "patina_sampling_"))
     }
     assert len(exr) == 3
-    assert names - exr == {"result.json", "surface.binary", "scene.blend", "report", "mine.txt"}
+    assert names - exr == {
+        "result.json", "surface.binary", "scene.blend", "report", "mine.txt", ".patina-files.json",
+    }  # fmt: skip
     assert (fitted / "report" / "index.html").is_file()
     assert (fitted / "report" / "notes.txt").read_text() == "kept"
 
