@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..concurrency.steps import scaled
+from ..concurrency.steps import drained, scaled
 from ..counted import counted
 from ..errors import PatinaError
-from ..light import DistantLight
+from ..light import DistantLight, MountedLight
 from ..light_search import FoundLamp, LampPhoto, UnknownLamp, draw_lamp_pixels, find_lamps
+from ..light_search.search import AMBIGUOUS_RATIO
 from ..light_search.search import MIN_PIXELS as MIN_LIT_PIXELS
 from ..photo import Transfer, read_exif, read_photo
 from ..scan import Camera, Mesh
@@ -34,6 +35,8 @@ FLASH_COSINE = np.cos(np.radians(25.0))  # between light and view, of a flash on
 MIN_FLASH_SHARE = 0.8  # of the photos
 FIRED_COSINE, MIN_FIRED_SHARE = np.cos(np.radians(45.0)), 0.5  # where EXIF says that it fired
 MIN_FLASH_PHOTOS = 3
+HIDDEN_COSINE = np.cos(np.radians(5.0))  # between a lamp and a camera that would hide it
+BY_SHADING = "by shading"
 COMPARE_SHARE = 0.4  # of the time, before the lamps are searched together
 
 
@@ -70,11 +73,14 @@ def with_lamps(
     fired = all(_flash_fired(draft.photos[i].file) for i in used)
     if len(used) >= MIN_FLASH_PHOTOS and is_flash(cosines, len(used), fired):
         lamps, how = [0] * len(used), "the light comes from the camera"
-        made = [DraftLamp("flash", LampKind.FLASH, (0.0, 0.0, 0.0))]
+        made = [_flash()]
     else:
         if len(used) <= MAX_SEARCHED_PHOTOS:
             directions = yield from _searched(parts, opened)
         lamps, how = _groups(draft, used, directions)
+        if how == BY_SHADING and max(lamps) == 0 and _behind_camera(parts, directions, opened):
+            how = "a lamp there would stand behind the camera, so the light comes from the camera"
+            return _with_made(draft, used, lamps, [_flash()], how)
         made = [
             DraftLamp(
                 f"lamp {len(draft.lamps) + k + 1}",
@@ -86,6 +92,17 @@ def with_lamps(
             )
             for k in range(max(lamps) + 1)
         ]  # fmt: skip
+    return _with_made(draft, used, lamps, made, how)
+
+
+def _flash() -> DraftLamp:
+    return DraftLamp("flash", LampKind.FLASH, (0.0, 0.0, 0.0))
+
+
+def _with_made(
+    draft: Draft, used: list[int], lamps: list[int], made: list[DraftLamp], how: str
+) -> Draft:
+    """The draft with new lamps. lamps: that of each used photo; how: it was found."""
     photos = list(draft.photos)
     for i, lamp in zip(used, lamps, strict=True):
         photos[i] = replace(photos[i], lamp=len(draft.lamps) + lamp)
@@ -132,7 +149,27 @@ def _groups(draft: Draft, used: list[int], directions: list[Array | None]) -> tu
         if lamp is None:
             extra += 1
             lamps[place] = extra
-    return [k for k in lamps if k is not None], "by shading"
+    return [k for k in lamps if k is not None], BY_SHADING
+
+
+def _behind_camera(
+    parts: Sequence[LampPhoto | None], directions: Sequence[Array | None], opened: OpenedScan
+) -> bool:
+    """Whether one distant lamp for all photos would be hidden by a camera, and a flash explains the
+    photos about as well. Photos of a flat object, all from the front, do not tell the two apart."""
+    known = [one for one in directions if one is not None]
+    shown = [part for part in parts if part is not None]
+    if len(shown) < MIN_FLASH_PHOTOS or not known:
+        return False
+    shared = np.array(_mean(known))
+    if max(_cosine_to_camera(shared, part.camera, opened) for part in shown) < HIDDEN_COSINE:
+        return False
+    costs = []
+    for light in (DistantLight("lamp", shared), MountedLight("flash", np.zeros(3))):
+        lamp = UnknownLamp(light, tuple(shown))
+        found = drained(find_lamps([lamp], 1, opened.rays, opened.dictionary, with_errors=False))
+        costs.append(found.lamps[0].cost if found.lamps[0] is not None else np.inf)
+    return costs[1] <= AMBIGUOUS_RATIO * costs[0]
 
 
 def _mean(directions: list[Array]) -> tuple[float, float, float]:

@@ -202,3 +202,29 @@ def test_exif_flash_needs_less_agreement_of_the_shading() -> None:
     assert not propose_lamps.is_flash([wide] * 10, 10, fired=False)
     assert propose_lamps.is_flash([wide] * 6 + [elsewhere] * 4, 10, fired=True)
     assert not propose_lamps.is_flash([elsewhere] * 8 + [near] * 2, 10, fired=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["yellow_box", "card_blue"])
+def test_hand_held_flash_is_recognised(name: str, shared: Path) -> None:
+    """Telephone photos of a flat sample: the flash is next to the lens, and moves with it."""
+    folder = shared / "data" / "real" / "flash_plane" / name
+    photos = sorted(folder.glob("0?.png"))
+    draft = drafted(folder / "colmap", folder / "plane.obj", *photos)
+    assert [lamp.kind for lamp in draft.lamps] == [LampKind.FLASH]
+    assert {photo.lamp for photo in draft.photos} == {0}
+    assert "the light comes from the camera" in draft.found[-1]
+    assert not draft.lamps[0].stated  # so its place is found from the photos
+
+
+def test_lamp_near_one_camera_is_no_flash(tmp_path: Path) -> None:
+    """The cameras go around the object, and the lamp stays where it is."""
+    path = made.make_capture(tmp_path / "in")
+    rotation, translation = next(iter(made.poses(6)))
+    towards = -np.asarray(rotation).T @ np.asarray(translation) - made.CENTRE
+    light = towards / np.linalg.norm(towards)
+    for k, (turn, shift) in enumerate(made.poses(6), 1):
+        made.write_exr(path.parent / f"lit_{k}.exr", made.photo(turn, shift, light))
+    path.unlink()
+    draft = drafted(path.parent)
+    assert [lamp.kind for lamp in draft.lamps] != [LampKind.FLASH]
