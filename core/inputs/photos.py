@@ -21,6 +21,9 @@ from ..photo.noise_estimate import estimate_noise
 from ..photo.photo import read_photo
 from ..photo.transfer import Transfer
 
+LINEAR_SUFFIXES, ENCODED_SUFFIXES = (".exr", ".hdr"), (".jpg", ".jpeg")
+"""Of files whose values are nearly always linear, and nearly never."""
+
 
 @dataclass(frozen=True)
 class LitPhoto:
@@ -60,7 +63,7 @@ class LitPhotos:
         exposures, first, notes = _exposures(capture)
         if chart is not None:
             notes = (*notes, *chart.notes)
-        return cls(capture, chart, exposures, first, notes)
+        return cls(capture, chart, exposures, first, (*notes, *_unusual_curves(capture)))
 
     def read(self, place: int) -> LitPhoto:
         """One lit photo. Raises InputError naming the capture's key."""
@@ -136,6 +139,25 @@ class LitPhotos:
         if self.chart is not None:
             return self.chart.transfer
         return Transfer.named(self.capture.tone.transfer)
+
+
+def _unusual_curves(capture: Capture) -> list[str]:
+    """Sentences on stated transfer curves that files of their kind seldom have."""
+    odd: dict[str, list[str]] = {}
+    for photo in capture.photos:
+        name = photo.transfer or capture.tone.transfer
+        if name == "auto":
+            continue
+        linear, suffix = Transfer.named(name).is_linear, photo.file.suffix.lower()
+        if (suffix in LINEAR_SUFFIXES and not linear) or (suffix in ENCODED_SUFFIXES and linear):
+            odd.setdefault(f"{name!r} for {suffix[1:].upper()} files", []).append(photo.file.name)
+    return [
+        f"The capture states the transfer curve {what}, which is unusual ({names[0]}"
+        f"{'' if len(names) == 1 else f' and {len(names) - 1} more'}). If it is wrong, "
+        "reflectances are wrong by up to a factor of 12; remove transfer to use the curve of the "
+        "file."
+        for what, names in odd.items()
+    ]
 
 
 def _chart(capture: Capture) -> ChartTone | None:

@@ -281,3 +281,10 @@ def _near_lights(text: str, more: str) -> str:
             line = f"position = [{x}, {y}, {z}]\n{more}"
         lines.append(line.replace("irradiance = [3.0", "intensity = [300.0"))
     return "\n".join(lines)
+
+
+@pytest.mark.parametrize(("curve", "said"), [("srgb", True), ("linear", False), ("auto", False)])
+def test_unusual_curve_is_mentioned(ball: Path, tmp_path: Path, curve: str, said: bool) -> None:
+    path = edited(ball, tmp_path, appended(f'[tone]\ntransfer = "{curve}"'))
+    notes = LitPhotos.open(read_capture(path)).notes
+    assert any("'srgb' for EXR files, which is unusual" in note for note in notes) == said
