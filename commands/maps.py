@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> None:
     job.drain(progress)
     result = finished(job.result)
     progress.share = 1.0
-    with staged_folder(out, "maps", print_note) as folder:
+    with staged_folder(out, _owner, print_note) as folder:
         stages = [*job.stages]
         with timed(stages, "maps", progress, 0.92):
             files = write_maps(folder, result, arguments.format)
@@ -116,6 +116,11 @@ def run(arguments: argparse.Namespace) -> None:
     )
     for name in (name for name, is_written in also if is_written):
         print(f"      {out / name}")
+
+
+def _owner(name: str) -> str:
+    """What writes a file: that of a refit is not removed by maps without one."""
+    return "refit" if name == "result.json" or name.endswith(".binary") else "maps"
 
 
 def _print_summary(result: MapsResult) -> None:

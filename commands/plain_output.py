@@ -42,6 +42,9 @@ class PlainStream:
 @contextlib.contextmanager
 def plain_output() -> Iterator[None]:
     """Write what is printed within the block through PlainStream."""
-    out, err = PlainStream(sys.stdout), PlainStream(sys.stderr)
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):  # type: ignore[type-var]
+    with contextlib.ExitStack() as stack:
+        if sys.stdout is not None:  # pythonw has none
+            stack.enter_context(contextlib.redirect_stdout(PlainStream(sys.stdout)))  # type: ignore
+        if sys.stderr is not None:
+            stack.enter_context(contextlib.redirect_stderr(PlainStream(sys.stderr)))  # type: ignore
         yield

@@ -53,7 +53,14 @@ def remove_if_damaged(python: Path, code: int) -> None:
         wrong = damaged_files(environment)
         if not wrong:
             return
-        shutil.rmtree(environment, ignore_errors=True)
+        broken = environment.with_name(f"{environment.name}.broken")
+        shutil.rmtree(broken, ignore_errors=True)
+        try:
+            environment.rename(broken)  # at once: half an environment would be used
+        except OSError as error:
+            say(f"{environment} is damaged; remove it ({error.strerror})")
+            return
+        shutil.rmtree(broken, ignore_errors=True)
     say(
         f"{len(wrong)} files of the environment {environment} were damaged (first "
         f"{wrong[0].name}), so it was removed; run the command again to set it up anew"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -69,7 +70,7 @@ def read_capture(path: Path, margins: Margins | None = None) -> Capture:
         read_photo_entry(section, {light.name for light in lights}, {m.name for m in materials})
         for section in top.tables("photo")
     )
-    _check_distinct_files(top, photos)
+    _check_distinct_files(top, photos, {m.name for m in materials if m.by_mesh})
     _check_located(top, materials, {name for photo in photos for name in photo.masks})
     fit = _fit(top.table("fit"), margins or Margins())
     top.table("diagnose").close()
@@ -182,23 +183,25 @@ def _check_unique(top: Section, kind: str, names: list[str]) -> None:
             )
 
 
-def _check_distinct_files(top: Section, photos: tuple[PhotoEntry, ...]) -> None:
+def _check_distinct_files(top: Section, photos: tuple[PhotoEntry, ...], by_mesh: set[str]) -> None:
     """Raise InputError where a photo is listed twice, which would count its pixels twice, and where
-    two materials have one mask in a photo."""
-    seen: dict[Path, int] = {}
+    two materials that only masks locate have one mask in a photo. by_mesh: other materials."""
+    seen: dict[str, int] = {}
     for place, photo in enumerate(photos):
         for file in photo.files:
-            first = seen.setdefault(file.resolve(), place)
+            first = seen.setdefault(os.path.realpath(file), place)
             if first != place or photo.files.count(file) > 1:
                 raise top.error(
                     f"{file.name!r} is listed more than once (photo {first + 1}); expected each "
                     "file once: remove one of the entries",
                     "photo", place, "file",
                 )  # fmt: skip
-        masks: dict[Path, str] = {}
+        masks: dict[str, str] = {}
         for name, mask in photo.masks.items():
-            other = masks.setdefault(mask.resolve(), name)
-            if other != name and not {other, name} & set(EXCLUDED_MASKS):
+            if name in by_mesh or name in EXCLUDED_MASKS:
+                continue
+            other = masks.setdefault(os.path.realpath(mask), name)
+            if other != name:
                 raise top.error(
                     f"{name!r} and {other!r} have the same mask {mask.name!r}; expected a mask for "
                     "each material",

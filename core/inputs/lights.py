@@ -37,6 +37,7 @@ MIN_CHART_COSINE = 0.1  # between a chart's normal and its light
 MAX_SPHERE_ERROR = 3.0  # degrees, standard error of a direction
 MAX_SUN_TIME = 120.0  # seconds between photos with one sun entry: half a degree
 MAX_CLIPPED_SHARE = 0.02  # of a white target's pixels
+NEAR_SHARE = 0.05  # of the faces, that may be within the radius of a lamp
 REFINE_PIXELS = 1000  # per photo
 
 
@@ -116,10 +117,12 @@ def refined(
 
 
 def _check_radius(capture: Capture, scan: Scan, place: int, entry: LightEntry) -> None:
-    """Raise InputError for a lamp that reaches into the object."""
+    """Raise InputError for a lamp that reaches into the object: beyond NEAR_SHARE of it, as a scan
+    may show the lamp's stand."""
     if entry.position is None or entry.radius <= 0 or entry.guess:
         return
-    away = float(np.linalg.norm(scan.mesh.vertices - entry.position, axis=1).min())
+    used = scan.mesh.vertices[scan.mesh.faces[:, 0]]
+    away = float(np.quantile(np.linalg.norm(used - entry.position, axis=1), NEAR_SHARE))
     if entry.radius >= away:
         raise capture.error(
             f"found a radius of {entry.radius:g}; the object is at a distance of {away:.3g} scan "

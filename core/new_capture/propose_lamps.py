@@ -36,6 +36,9 @@ MIN_FLASH_SHARE = 0.8  # of the photos
 FIRED_COSINE, MIN_FIRED_SHARE = np.cos(np.radians(45.0)), 0.5  # where EXIF says that it fired
 MIN_FLASH_PHOTOS = 3
 HIDDEN_COSINE = np.cos(np.radians(5.0))  # between a lamp and a camera that would hide it
+MAX_FLASH_OFFSET = (
+    0.25  # from the lens, in distances of the object: else it is no flash on a camera
+)
 BY_SHADING = "by shading"
 COMPARE_SHARE = 0.4  # of the time, before the lamps are searched together
 
@@ -164,12 +167,19 @@ def _behind_camera(
     shared = np.array(_mean(known))
     if max(_cosine_to_camera(shared, part.camera, opened) for part in shown) < HIDDEN_COSINE:
         return False
-    costs = []
+    found: list[FoundLamp] = []
     for light in (DistantLight("lamp", shared), MountedLight("flash", np.zeros(3))):
-        lamp = UnknownLamp(light, tuple(shown))
-        found = drained(find_lamps([lamp], 1, opened.rays, opened.dictionary, with_errors=False))
-        costs.append(found.lamps[0].cost if found.lamps[0] is not None else np.inf)
-    return costs[1] <= AMBIGUOUS_RATIO * costs[0]
+        steps = find_lamps(
+            [UnknownLamp(light, tuple(shown))], 1, opened.rays, opened.dictionary, with_errors=False
+        )
+        found += [one for one in drained(steps).lamps if one is not None]
+    lamp, flash = found
+    assert isinstance(flash.light, MountedLight)
+    away = min(
+        float(np.linalg.norm(part.camera.pose.centre - _centre(opened.scan.mesh))) for part in shown
+    )
+    on_camera = np.linalg.norm(flash.light.offset) < MAX_FLASH_OFFSET * away
+    return bool(on_camera and flash.cost <= AMBIGUOUS_RATIO * lamp.cost)
 
 
 def _mean(directions: list[Array]) -> tuple[float, float, float]:

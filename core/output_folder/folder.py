@@ -6,15 +6,18 @@ import contextlib
 import os
 import secrets
 import shutil
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import InputError
 from .folder_lock import lock_folder
-from .publication import Plan, complete_publication, publish
+from .publication import Kept, Owner, complete_publication, publish
 
 STAGING = ".patina-part-"  # start of the names of staging folders
+UNPUBLISHED = "patina-unpublished-"  # the same, of results that could not move to their places
+MIN_AGE = 60.0  # seconds, of a staging folder that counts as abandoned: it is locked long before
 SHOWN_FILES = 3  # names in the sentence on files of the user
 
 
@@ -38,14 +41,15 @@ def check_out(out: Path) -> Path:
 
 @contextmanager
 def staged_folder(
-    out: Path, owner: str | None = None, say: Callable[[str], object] = lambda sentence: None
+    out: Path, owner: Owner | None = None, say: Callable[[str], object] = lambda sentence: None
 ) -> Iterator[Path]:
     """A temporary folder whose files move to ``out`` if the block succeeds, and are deleted if not.
 
     owner: what writes them, such as "fit". Files of an earlier result of this owner are replaced or
     deleted; files that the user changed, or wrote, are kept (publication.py), and ``say`` gets a
     sentence about them. None: files of the same name are replaced, whoever wrote them. Raises
-    InputError.
+    InputError; where the result is complete but cannot move to ``out``, it stays in a folder that
+    the error names.
     """
     out = check_out(out)
     try:
@@ -56,42 +60,61 @@ def staged_folder(
         _remove_abandoned(location)
         staging = location / f"{STAGING}{secrets.token_hex(4)}"
         staging.mkdir()
-        held = lock_folder(staging, wait=False)
+        held = lock_folder(staging)
     except OSError as error:
         raise InputError(f"cannot be written ({error.strerror})", file=out, key="--out") from error
+    done = Kept()
     try:
         yield staging
-        done = publish(staging, out, owner)
+        if held is not None:
+            held.close()  # Windows does not rename a folder with an open file
+        try:
+            done = publish(staging, out, owner)
+        except (InputError, OSError) as error:
+            raise _unpublished(staging, out, error) from error
     except OSError as error:
         raise InputError(f"cannot be written ({error})", file=out, key="--out") from error
     finally:
-        try:
-            shutil.rmtree(staging, ignore_errors=True)
-        finally:
-            if held is not None:
-                held.close()
-    if done.keep:
+        if held is not None:
+            held.close()
+        shutil.rmtree(staging, ignore_errors=True)
+    if done.names:
         say(_sentence(done, out))
 
 
+def _unpublished(staging: Path, out: Path, error: Exception) -> Exception:
+    """The error of a result that cannot move to its place, with where it is. It may have taken
+    hours."""
+    if not staging.is_dir():
+        return error  # it is published, and waits in ``out``
+    kept = staging.with_name(staging.name.replace(STAGING, UNPUBLISHED))
+    try:
+        os.rename(staging, kept)
+    except OSError:
+        return error
+    return InputError(f"{error}; the complete result is in {kept}", file=out, key="--out")
+
+
 def _remove_abandoned(location: Path) -> None:
-    """Remove the staging folders of processes that were killed."""
+    """Remove the staging folders of processes that were killed: no process has them locked."""
     for folder in location.glob(f"{STAGING}*"):
-        if folder.is_symlink() or not folder.is_dir():
-            continue
         with contextlib.suppress(OSError):
-            held = lock_folder(folder, wait=False)
-            if held is not None:
+            if folder.is_symlink() or time.time() - folder.stat().st_mtime < MIN_AGE:
+                continue
+            held = lock_folder(folder)
+            if held is None:
+                continue
+            held.close()
+            if held.certain:
                 shutil.rmtree(folder, ignore_errors=True)
-                held.close()
 
 
-def _sentence(done: Plan, out: Path) -> str:
+def _sentence(done: Kept, out: Path) -> str:
     """What happened to files of the user."""
-    shown = ", ".join(done.keep[:SHOWN_FILES])
-    more = len(done.keep) - SHOWN_FILES
+    shown = ", ".join(done.names[:SHOWN_FILES])
+    more = len(done.names) - SHOWN_FILES
     names = shown if more <= 0 else f"{shown} and {more} more"
     return (
         f"{names}: changed since Patina wrote it, or not written by Patina; kept in "
-        f"{out / done.earlier}"
+        f"{out / done.folder}"
     )

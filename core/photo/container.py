@@ -27,9 +27,9 @@ KIND_OF = {
 RAW = frozenset((".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw"))
 READABLE_SUFFIXES = ", ".join((*KIND_OF, *sorted(RAW)))
 MAX_SIDE = 1 << 17  # pixels
-MAX_MEGAPIXELS = 160.0
-"""Of one image: the largest cameras have 151. A file of 1 MB can declare far more, and would take
-gigabytes of memory to decode."""
+MAX_MEGAPIXELS = 270.0
+"""Of one image: a texture of 16384 × 16384 has 268, the largest photos (shifted sensors) 240. A file
+of 1 MB can declare far more, and would take many gigabytes of memory to decode."""
 LIMIT_VARIABLE = "PATINA_MAX_MEGAPIXELS"
 HEADS = {
     "openexr": rb"\x76\x2f\x31\x01",

@@ -31,6 +31,7 @@ TIED_EDGES = 4.0
 """Edges of the mesh in the length l. The tilt of cells four edges wide varies a quarter as much as
 that of one edge (MAX_TILT in hierarchy.py): there the mesh is better known than the slopes."""
 MIN_AREA = 1e-12  # of the median: smaller triangles have none
+WELD = 1e-4  # spacings, within which two nodes are at one place
 TOLERANCE = 1e-4  # of the residual of the linear equations, relative
 MAX_ITERATIONS = 2000
 
@@ -47,7 +48,7 @@ def heights(surface: VaryingSurface) -> Array:
         )
     grid = surface.grid
     points, tilt = grid.points(slice(None)), _tangential(surface)
-    first, welded = distinct_places(points)  # the mesh may be split at seams of its texture
+    first, welded = _welded(grid)
     faces = welded[grid.small_faces()]
     stiffness, mass, right = _equations(points[first], faces, tilt[first])
     matrix = stiffness + diags_array(mass / (TIED_EDGES * grid.mesh_edge) ** 2)
@@ -77,6 +78,13 @@ def displaced_mesh(surface: VaryingSurface) -> Mesh:
     return Mesh(vertices, grid.small_faces().astype(np.int32), uv=grid.small_uv())
 
 
+def _welded(grid: SurfaceGrid) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """(first node of each place, (n,) the place of each node): the mesh may be split at seams of
+    its texture, and has two nodes at one place there."""
+    cells = grid.points(slice(None)) / (WELD * grid.spacing)
+    return distinct_places(np.rint(cells))
+
+
 def _tangential(surface: VaryingSurface) -> Array:
     """(n, 3) tilts along the surface."""
     tilt = surface.parameters[:, TILT].astype(np.float64)
@@ -86,7 +94,7 @@ def _tangential(surface: VaryingSurface) -> Array:
 
 def integrable_tilts(grid: SurfaceGrid, height: Array) -> NDArray[np.float32]:
     """(n, 3) tilts −∇d of a height (n,) at the nodes, the mean over the triangles around each."""
-    first, welded = distinct_places(grid.points(slice(None)))
+    first, welded = _welded(grid)
     faces, height = welded[grid.small_faces()], height[first]
     slope, area = _slopes(grid.points(first), faces)
     weighted = -area[:, None] * np.einsum("fac,fa->fc", slope, height[faces])

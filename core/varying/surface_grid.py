@@ -176,7 +176,8 @@ class SurfaceGrid:
     def _blend(self, values: NDArray, rows: slice | NDArray) -> NDArray[np.float64]:
         face, x, y = self.places
         a, b, c = (values[self.mesh.faces[face[rows], side]] for side in range(3))
-        second, third = (w[rows, None].astype(np.float64) for w in (x, y))
+        # exact multiples of 1 / n, so that nodes on both sides of a seam have one place
+        second, third = (np.rint(w[rows, None] * np.float64(self.n)) / self.n for w in (x, y))
         return np.asarray(a * (1 - second - third) + b * second + c * third)
 
     @cached_property

@@ -16,7 +16,7 @@ from patina.core.varying.node_model import COUNT, TILT
 from patina.core.varying.surface_grid import SurfaceGrid
 from patina.core.varying.varying_surface import MaterialVariation, VaryingSurface
 
-CELLS, DIVISIONS = 16, 8
+CELLS, DIVISIONS = 16, 7
 DEPTH, WAVES = 0.004, 6.0  # of the relief, on a square of side 1; cells are 1/16 wide
 
 

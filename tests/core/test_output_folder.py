@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import json
 import multiprocessing
 import os
 import sys
@@ -14,10 +16,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patina.core.errors import InputError
-from patina.core.output_folder import complete_publication, staged_folder
+from patina.core.output_folder import (
+    complete_publication,
+    folder,
+    folder_lock,
+    staged_folder,
+)
 from patina.core.output_folder.publication import PLAN, READY, RECORD
 
 NAMES = ("result.json", "steel.binary", "scene.blend", "report/index.html", "report/a/b.png")
+
+
+@pytest.fixture(autouse=True)
+def short_wait(monkeypatch):
+    monkeypatch.setattr(folder_lock, "MAX_WAIT", 20.0)
 
 
 class Killed(BaseException):
@@ -25,10 +37,10 @@ class Killed(BaseException):
 
 
 def write(out: Path, content: str, names=NAMES, owner: str | None = "fit", say=lambda s: None):
-    with staged_folder(out, owner, say) as folder:
+    with staged_folder(out, owner, say) as staging:
         for name in names:
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            (folder / name).write_text(f"{content} {name}", "utf-8")
+            (staging / name).parent.mkdir(parents=True, exist_ok=True)
+            (staging / name).write_text(f"{content} {name}", "utf-8")
 
 
 def files(out: Path) -> dict[str, str]:
@@ -36,7 +48,7 @@ def files(out: Path) -> dict[str, str]:
     found = {}
     for path in sorted(out.rglob("*")):
         name = path.relative_to(out).as_posix()
-        if path.is_file() and name != RECORD:
+        if path.is_file() and name not in (RECORD, folder_lock.LOCK):
             found[name] = path.read_text("utf-8")
     return found
 
@@ -59,8 +71,8 @@ def test_new_folder_appears_by_one_rename(tmp_path, monkeypatch):
 def test_a_block_that_fails_changes_nothing(tmp_path):
     out = tmp_path / "out"
     write(out, "first")
-    with pytest.raises(RuntimeError), staged_folder(out, "fit") as folder:
-        (folder / "result.json").write_text("half")
+    with pytest.raises(RuntimeError), staged_folder(out, "fit") as staging:
+        (staging / "result.json").write_text("half")
         raise RuntimeError
     assert files(out) == expected("first")
     assert not list(out.glob(".patina-part-*"))
@@ -99,8 +111,10 @@ def test_process_killed_at_any_move_leaves_the_old_or_the_new_result(tmp_path_fa
     else:
         assert kept == "changed by the user"
         assert visible == expected("new")
-    write(out, "third")  # and nothing is left of the killed process
-    assert not [p.name for p in out.iterdir() if p.name.startswith((".patina-part", READY))]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(folder, "MIN_AGE", -1.0)
+        write(out, "third")  # and nothing is left of the killed process
+    assert {p.name for p in out.iterdir() if p.name.startswith(".patina")} == {RECORD}
     assert {k: v for k, v in files(out).items() if "earlier" not in k} == expected("third")
 
 
@@ -153,16 +167,14 @@ def test_results_are_not_written_through_links(tmp_path):
     with pytest.raises(InputError, match="results are not written through links"):
         write(out, "first")
     assert not list(other.iterdir())
-    assert files(out) == {}
+    assert not (out / "result.json").exists()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links need a permission on Windows")
 @pytest.mark.parametrize("plan", [
-    '{"keep": [], "earlier": "earlier-1", "remove": ["report/mine.txt"]}',
-    '{"keep": [], "earlier": "earlier-1", "remove": ["../mine.txt"]}',
-    '{"keep": ["a.txt"], "earlier": "..", "remove": []}',
-    '{"keep": ["a.txt"], "earlier": "/tmp", "remove": []}',
-    "[]", "{", '{"keep": 1}',
+    '{"known": {}, "remove": {"../mine.txt": "0"}}',
+    '{"known": {"/tmp/x": "0"}, "remove": {}}',
+    "[]", "{", '{"known": 1}', "[" * 100_000,
 ])  # fmt: skip
 def test_plan_of_a_stranger_reaches_no_other_folder(tmp_path, plan):
     """A result folder from elsewhere may hold a plan that Patina did not write."""
@@ -173,12 +185,108 @@ def test_plan_of_a_stranger_reaches_no_other_folder(tmp_path, plan):
         (place / "mine.txt").write_text("mine")
     (out / "a.txt").write_text("a")
     (out / READY / "a.txt").write_text("new")
-    (out / "report").symlink_to(other, target_is_directory=True)
     (out / READY / PLAN).write_text(plan)
     with pytest.raises(InputError, match="cannot be moved to its place"):
         complete_publication(out)
     assert (other / "mine.txt").is_file() and (tmp_path / "mine.txt").is_file()
     assert not (tmp_path / "a.txt").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links need a permission on Windows")
+def test_link_of_a_stranger_is_not_followed(tmp_path):
+    out, other = tmp_path / "out", tmp_path / "other"
+    out.mkdir()
+    write(other, "mine", ["a.txt"])
+    (other / PLAN).write_text('{"known": {}, "remove": {}}')
+    (out / READY).symlink_to(other, target_is_directory=True)
+    with pytest.raises(InputError, match="it is no folder"):
+        complete_publication(out)
+    assert (other / "a.txt").is_file() and (other / PLAN).is_file()
+    (out / READY).unlink()
+    os.mkfifo(out / RECORD)
+    (out / "report").mkdir()
+    content = hashlib.blake2b(b"mine").hexdigest()[:32]
+    (other / "old.txt").write_text("mine")
+    write(out, "first")  # the pipe is no record
+    record = json.loads((out / RECORD).read_text())
+    record["gone/old.txt"] = {"owner": "fit", "content": content}
+    (out / RECORD).write_text(json.dumps(record))
+    (out / "gone").symlink_to(other, target_is_directory=True)
+    write(out, "second")
+    assert (other / "old.txt").is_file()
+    assert files(out)["result.json"] == "second result.json"
+
+
+def test_file_changed_after_the_publication_is_kept(tmp_path, monkeypatch):
+    """The rest of a publication may be done days later."""
+    out = tmp_path / "out"
+    write(out, "first")
+    real = os.replace
+
+    def locked(source, target):
+        if Path(source).name == "scene.blend":
+            raise PermissionError(13, "is open in another program", str(source))
+        return real(source, target)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", locked)
+        with pytest.raises(InputError, match="holds a complete result"):
+            write(out, "second")
+    (out / "scene.blend").write_text("painted meanwhile")
+    complete_publication(out)
+    assert files(out) == {**expected("second"), "earlier-1/scene.blend": "painted meanwhile"}
+
+
+def test_result_that_cannot_be_moved_is_not_lost(tmp_path):
+    out = tmp_path / "out"
+    (out / "result.json").mkdir(parents=True)
+    with pytest.raises(
+        InputError, match=r"is a folder that blocks.*the complete result is in"
+    ) as e:
+        write(out, "first")
+    kept = Path(str(e.value).rpartition(" in ")[2])
+    assert files(kept) == expected("first")
+
+
+def test_change_of_case_removes_nothing(tmp_path):
+    out = tmp_path / "out"
+    write(out, "first", ["steel.binary"])
+    write(out, "second", ["Steel.binary"])
+    assert files(out)["Steel.binary"] == "second Steel.binary"
+
+
+def test_files_of_another_owner_stay(tmp_path):
+    out = tmp_path / "out"
+
+    def owner(name):
+        return "refit" if name == "result.json" else "maps"
+
+    write(out, "first", ["maps.json", "old.exr", "result.json"], owner)
+    write(out, "second", ["maps.json"], owner)
+    assert set(files(out)) == {"maps.json", "result.json"}
+
+
+def test_live_staging_folder_is_not_removed(tmp_path, monkeypatch):
+    monkeypatch.setattr(folder, "MIN_AGE", -1.0)
+    out = tmp_path / "out"
+    out.mkdir()
+    with staged_folder(out, "fit") as first:
+        (first / "a.txt").write_text("a")
+        write(out, "other")
+        assert (first / "a.txt").is_file()
+    assert files(out)["a.txt"] == "a"
+
+
+def test_folder_that_is_locked_for_ever_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(folder_lock, "MAX_WAIT", 0.2)
+    out = tmp_path / "out"
+    out.mkdir()
+    held = folder_lock.lock_folder(out)
+    with pytest.raises(InputError, match=r"another process has been writing"):
+        write(out, "first")
+    held.close()
+    write(out, "second")
+    assert not (out / folder_lock.LOCK).exists()
 
 
 def _publish_often(out: Path, word: str) -> None:
