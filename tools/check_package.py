@@ -162,7 +162,8 @@ def check_fit(installed: Installed, capture: Path) -> None:
     result = json.loads((out / "result.json").read_text("utf-8"))
     tables = {f"{material['name']}.binary" for material in result["materials"]}
     names = {path.name for path in out.iterdir()}
-    installed.check("the files of a fit", done, names == {"result.json", "report", *tables})
+    expected = {"result.json", "report", ".patina-files", *tables}
+    installed.check("the files of a fit", done, names == expected)
     installed.check("the report", done, (out / "report" / "index.html").is_file())
     blender_lines = [line for line in done.stdout.splitlines() if "Blender" in line]
     installed.check("one line about scene.blend", done, len(blender_lines) == 1)

@@ -36,9 +36,7 @@ MIN_FLASH_SHARE = 0.8  # of the photos
 FIRED_COSINE, MIN_FIRED_SHARE = np.cos(np.radians(45.0)), 0.5  # where EXIF says that it fired
 MIN_FLASH_PHOTOS = 3
 HIDDEN_COSINE = np.cos(np.radians(5.0))  # between a lamp and a camera that would hide it
-MAX_FLASH_OFFSET = (
-    0.25  # from the lens, in distances of the object: else it is no flash on a camera
-)
+MAX_FLASH_OFFSET = 0.25  # of a flash from its lens, in distances of the object
 BY_SHADING = "by shading"
 COMPARE_SHARE = 0.4  # of the time, before the lamps are searched together
 

@@ -29,7 +29,7 @@ from .folder_lock import LOCK, locked_folder
 
 READY = ".patina-ready"  # folder of a published result whose files are not in their places yet
 PLAN = ".patina-plan.json"  # in it
-RECORD = ".patina-files.json"  # of the files that Patina wrote to a folder
+RECORD = ".patina-files"  # of the files that Patina wrote to a folder
 MAX_RECORD_BYTES = 1 << 26
 EARLIER = "earlier-{}"  # folder for files of the user
 OWN_NAMES = frozenset((PLAN, RECORD, LOCK))

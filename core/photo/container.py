@@ -28,8 +28,8 @@ RAW = frozenset((".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2",
 READABLE_SUFFIXES = ", ".join((*KIND_OF, *sorted(RAW)))
 MAX_SIDE = 1 << 17  # pixels
 MAX_MEGAPIXELS = 270.0
-"""Of one image: a texture of 16384 × 16384 has 268, the largest photos (shifted sensors) 240. A file
-of 1 MB can declare far more, and would take many gigabytes of memory to decode."""
+"""Of one image: a texture of 16384 × 16384 has 268, the largest photos (shifted sensors) 240. A
+file of 1 MB can declare far more, and would take many gigabytes of memory to decode."""
 LIMIT_VARIABLE = "PATINA_MAX_MEGAPIXELS"
 HEADS = {
     "openexr": rb"\x76\x2f\x31\x01",

@@ -78,7 +78,8 @@ def test_slopes_of_the_height_are_the_tilts():
     inner = ((points[:, :2] > 0.1) & (points[:, :2] < 0.9)).all(axis=1)
     found = integrable_tilts(surface.grid, heights(surface))[inner]
     true = surface.parameters[inner, TILT]
-    assert np.sqrt(np.mean((found - true) ** 2)) < 0.07 * true.std()
+    # a node has the mean of the triangles around it: with 19 of them in a wave, 8 % too little
+    assert np.sqrt(np.mean((found - true) ** 2)) < 0.09 * true.std()
 
 
 def test_tilts_that_are_no_slopes_give_no_height():

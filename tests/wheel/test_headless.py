@@ -55,7 +55,7 @@ def test_fit_writes_exactly_the_documented_files(fitted: Path) -> None:
     }
     assert len(exr) == 3
     assert names - exr == {
-        "result.json", "surface.binary", "scene.blend", "report", "mine.txt", ".patina-files.json",
+        "result.json", "surface.binary", "scene.blend", "report", "mine.txt", ".patina-files",
     }  # fmt: skip
     assert (fitted / "report" / "index.html").is_file()
     assert (fitted / "report" / "notes.txt").read_text() == "kept"

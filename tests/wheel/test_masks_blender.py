@@ -151,7 +151,7 @@ def test_painted_shadow_masks_are_used_by_fit(scene) -> None:
     assert not read_mask(capture.photos[1].masks["shadow"]).all()
     file = Path(bpy.path.abspath(image.filepath))
     leftovers = {p.name for p in file.parents[1].iterdir() if p.name.startswith(".patina")}
-    assert leftovers == {".patina-files.json"}
+    assert leftovers == {".patina-files"}
     assert bpy.ops.patina.shadow_masks(replace=True) == {"FINISHED"}
     assert not read_mask(file).all()
     assert len(shadow_images(str(Path(path).resolve()))) == 5

@@ -52,7 +52,7 @@ def solved(root: Path, photos: Path) -> Path:
 
 def test_solve_writes_model_and_capture(solved: Path, photos: Path) -> None:
     assert {p.name for p in solved.iterdir()} == {
-        "sparse", "report.txt", "my photos.capture.toml", ".patina-files.json",
+        "sparse", "report.txt", "my photos.capture.toml", ".patina-files",
     }  # fmt: skip
     found = read_colmap(solved / "sparse")
     assert [c.label for c in found.cameras] == [f"photo {i}.jpg" for i in range(VIEWS)]
