@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from ..core.errors import PatinaError
+from ..core.output_folder import record_again
 from ..core.report.relit import add_to_report
 from .diagnose import MATERIALS, diagnose_to_folder
 from .render import render_to_folder
@@ -39,4 +40,6 @@ def _show_under_other_light(out: Path) -> None:
     except PatinaError as error:
         print(f"note: The materials were not rendered under other light ({error}).")
         return
-    add_to_report(report / "index.html", found, RELIT)
+    page = report / "index.html"
+    add_to_report(page, found, RELIT)
+    record_again(out, page)

@@ -126,7 +126,7 @@ def print_summary(out: Path, result: CaptureResult) -> None:
         if isinstance(material.fit, MeasuredResult):
             print(f"  90 % interval: {reach(material.spread)}")
         for warning in material.warnings:
-            print(f"  note: {warning}")
+            print_note(warning)
     for note in result.notes:
         print(f"note: {note}")
     for name, parameters in result.lights.moved.items():

@@ -17,6 +17,7 @@ from ..core.inputs.photos import LitPhotos
 from ..core.output_folder import staged_folder
 from ..core.scan.formats import read_reconstruction
 from .needs_blender import check_blender
+from .progress import print_note
 
 HELP = "import mesh, lights, and cameras with their photos into a .blend"
 
@@ -70,7 +71,7 @@ def run(arguments: argparse.Namespace) -> None:
         *lights.notes,
         *capture_data.size_notes(capture, scan),
     ):
-        print(f"  note: {note}")
+        print_note(note)
     print(f"wrote {out}: {len(scan.cameras)} cameras, {len(scan.mesh.faces):,} faces")
 
 
@@ -84,7 +85,7 @@ def _import_model(model: Path, out: Path, images: Path | None, chunk: str | None
         _building()
         write_reconstruction(folder / out.name, out, found, images)
     for note in found.notes:
-        print(f"  note: {note}")
+        print_note(note)
     print(f"wrote {out}: {len(found.cameras)} cameras, {len(found.points):,} points")
 
 

@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> None:
         job.cancel()
     result = job.result
     for note in (*notes, *result.notes):
-        print(f"  note: {note}")
+        print_note(note)
     if result.placed:
         with staged_folder(out, "localise", print_note) as folder:
             name = result.write(folder).name

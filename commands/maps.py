@@ -107,7 +107,7 @@ def run(arguments: argparse.Namespace) -> None:
             result_json.write(folder / "result.json", result.refit, stages, result.notes)
     _print_summary(result)
     for note in (*result.notes, *notes):
-        print(f"  note: {note}")
+        print_note(note)
     print(f"wrote {len(files)} maps and {out / 'maps.json'}")
     also = (
         (DISPLACED, arguments.displaced),

@@ -57,7 +57,7 @@ def run(arguments: argparse.Namespace) -> None:
         errors_json.write(folder / "errors.json", content)
     _print_summary(content)
     for note in notes:
-        print(f"  note: {note}")
+        print_note(note)
     print(f"wrote {3 * len(photos)} pictures and {out / 'errors.json'}")
 
 

@@ -109,13 +109,17 @@ def venv_python(folder: Path) -> Path:
 
 
 def bpy_python() -> Path:
-    """Return the Python of the environment with bpy, which the first call creates.
+    """Return the Python of the environment with bpy, which the first call creates."""
+    return _environment(find_interpreter())
+
+
+def _environment(interpreter: Interpreter) -> Path:
+    """Return the Python of the environment of an interpreter, which the first call creates.
 
     The name of the folder contains a hash of the requirements. It is created under another name and
     renamed when complete, so that an incomplete environment is never used.
     """
     platform = this_platform()
-    interpreter = find_interpreter()
     bpy = BPY[interpreter.version]
     wanted = lock_file(interpreter.version, platform, tests=False)
     key = f"{interpreter.program}\n" + wanted.read_text(encoding="utf-8")
@@ -139,10 +143,11 @@ def bpy_python() -> Path:
 
 def test_python() -> Path:
     """Return the Python of the same environment, after installing the test tools in it."""
-    python = bpy_python()
+    interpreter = find_interpreter()
+    python = _environment(interpreter)
     folder = python.parent.parent
     stamp = folder / "test-tools.txt"
-    lock = lock_file(find_interpreter().version, this_platform(), tests=True)
+    lock = lock_file(interpreter.version, this_platform(), tests=True)
     wanted = lock.read_text(encoding="utf-8")
     with one_at_a_time(folder.name):
         if not (stamp.exists() and stamp.read_text(encoding="utf-8") == wanted):

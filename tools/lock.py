@@ -19,14 +19,14 @@ from .environment import BPY, LOCKS, TEST_TOOLS, lock_file
 from .wheels import PINS, PLATFORMS, checksums, requirements, wheel_name
 
 TAGS = {
-    "linux-x64": [["manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux_2_17_x86_64",
-                   "manylinux2014_x86_64", "manylinux_2_12_x86_64", "manylinux2010_x86_64",
-                   "manylinux_2_5_x86_64", "manylinux1_x86_64", "linux_x86_64"]],
-    "windows-x64": [["win_amd64"]],
-    "macos-arm64": [["macosx_14_0_arm64", "macosx_13_0_arm64", "macosx_12_0_arm64",
-                     "macosx_11_0_arm64", "macosx_10_13_universal2", "macosx_10_9_universal2"]],
+    "linux-x64": ["manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux_2_17_x86_64",
+                  "manylinux2014_x86_64", "manylinux_2_12_x86_64", "manylinux2010_x86_64",
+                  "manylinux_2_5_x86_64", "manylinux1_x86_64", "linux_x86_64"],
+    "windows-x64": ["win_amd64"],
+    "macos-arm64": ["macosx_14_0_arm64", "macosx_13_0_arm64", "macosx_12_0_arm64",
+                    "macosx_11_0_arm64", "macosx_10_13_universal2", "macosx_10_9_universal2"],
 }  # fmt: skip
-"""Platform → platform tags of each variant that is resolved: those that pip accepts there."""
+"""Platform → platform tags that pip accepts there."""
 
 ALSO = {"windows-x64": ["colorama==0.4.6"]}
 """Platform → packages that others need there: pip evaluates conditions on the platform for the one
@@ -58,14 +58,6 @@ def main() -> int:
 
 def _resolved(wanted: list[str], version: tuple[int, int], platform: str) -> Packages:
     """What pip would install."""
-    found: Packages = {}
-    for tags in TAGS[platform]:
-        for name, digest in _report(wanted, version, tags):
-            found.setdefault(name, set()).add(digest)
-    return found
-
-
-def _report(wanted: list[str], version: tuple[int, int], tags: list[str]) -> list[tuple[str, str]]:
     number, abi = f"{version[0]}.{version[1]}", f"cp{version[0]}{version[1]}"
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.json"
@@ -74,17 +66,17 @@ def _report(wanted: list[str], version: tuple[int, int], tags: list[str]) -> lis
             "--only-binary=:all:", "--ignore-requires-python", "--target", folder,
             "--python-version", number, "--implementation", "cp",
             "--abi", abi, "--abi", "abi3", "--abi", "none",
-            *(word for tag in tags for word in ("--platform", tag)), "--report", str(report),
-            *wanted,
+            *(word for tag in TAGS[platform] for word in ("--platform", tag)),
+            "--report", str(report), *wanted,
         ]  # fmt: skip
         done = subprocess.run(command, capture_output=True, text=True)
         if done.returncode:
-            raise Failure(f"pip cannot resolve {', '.join(wanted)} for {tags[0]}: {done.stderr}")
+            raise Failure(f"pip cannot resolve {', '.join(wanted)} for {platform}: {done.stderr}")
         content = json.loads(report.read_text(encoding="utf-8"))
-    found = []
+    found: Packages = {}
     for entry in content["install"]:
         name = f"{entry['metadata']['name'].lower()}=={entry['metadata']['version']}"
-        found.append((name, entry["download_info"]["archive_info"]["hashes"]["sha256"]))
+        found[name] = {entry["download_info"]["archive_info"]["hashes"]["sha256"]}
     return found
 
 

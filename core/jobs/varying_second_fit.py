@@ -12,7 +12,7 @@ from .diagnose_job import DiagnoseJob
 from .fit_job import CaptureResult
 from .refit_job import RefitJob
 from .varying.node_steps import CHOICE_NODES
-from .varying.separate_materials import observe_whole
+from .varying.surface_observations import observe_surface
 from .varying.variation_estimator import MAX_NODES, VariationEstimator
 
 SECOND_FIT, OBSERVED, VARIED = 0.6, 0.63, 0.97
@@ -52,9 +52,14 @@ class VaryingSecondFit(Job):
         fit, parts = self.checked.fit, self.checked.parts
         coarse = self.checked.surface
         if coarse is None or correction is not None:
-            share = OBSERVED - SECOND_FIT
-            coarse = yield from observe_whole(
-                before, parts, CHOICE_NODES, SECOND_FIT, share, correction, fit.threads
+            coarse = yield from observe_surface(
+                before,
+                CHOICE_NODES,
+                SECOND_FIT,
+                OBSERVED - SECOND_FIT,
+                correction,
+                fit.threads,
+                whole=None if parts is None else parts.whole,
             )
         own = VariationEstimator(
             fit, before, self.mode, self.nodes, correction, parts, self.portable

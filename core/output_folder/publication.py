@@ -111,6 +111,17 @@ def complete_publication(out: Path) -> None:
         raise InputError(f"cannot be read ({error.strerror or error})", file=out) from error
 
 
+def record_again(out: Path, path: Path) -> None:
+    """Record the content of a file of the result in ``out`` that Patina has changed since. Raises
+    InputError, OSError."""
+    name = path.relative_to(out).as_posix()
+    with locked_folder(out):
+        record = _read_record(out)
+        if name in record:
+            record[name]["content"] = _content(path)
+            _write_record(out, record)
+
+
 def files_in(folder: Path) -> list[str]:
     """All files of a folder, as paths with slashes, sorted."""
     return sorted(

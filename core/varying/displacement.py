@@ -49,7 +49,7 @@ def heights(surface: VaryingSurface) -> Array:
     grid = surface.grid
     points, tilt = grid.points(slice(None)), _tangential(surface)
     first, welded = _welded(grid)
-    faces = welded[grid.small_faces()]
+    faces = welded[grid.small_faces]
     stiffness, mass, right = _equations(points[first], faces, tilt[first])
     matrix = stiffness + diags_array(mass / (TIED_EDGES * grid.mesh_edge) ** 2)
     diagonal = np.maximum(matrix.diagonal(), 1e-300)
@@ -73,9 +73,8 @@ def displaced_mesh(surface: VaryingSurface) -> Mesh:
     Raises what ``heights`` raises."""
     grid = surface.grid
     rows = slice(None)
-    height = heights(surface)
-    vertices = grid.points(rows) + height[:, None] * grid.normals(rows)
-    return Mesh(vertices, grid.small_faces().astype(np.int32), uv=grid.small_uv())
+    vertices = grid.points(rows) + heights(surface)[:, None] * grid.normals(rows)
+    return Mesh(vertices, grid.small_faces.astype(np.int32), uv=grid.small_uv())
 
 
 def _welded(grid: SurfaceGrid) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -95,7 +94,7 @@ def _tangential(surface: VaryingSurface) -> Array:
 def integrable_tilts(grid: SurfaceGrid, height: Array) -> NDArray[np.float32]:
     """(n, 3) tilts −∇d of a height (n,) at the nodes, the mean over the triangles around each."""
     first, welded = _welded(grid)
-    faces, height = welded[grid.small_faces()], height[first]
+    faces, height = welded[grid.small_faces], height[first]
     slope, area = _slopes(grid.points(first), faces)
     weighted = -area[:, None] * np.einsum("fac,fa->fc", slope, height[faces])
     total = np.maximum(np.bincount(faces.ravel(), np.repeat(area, 3), len(first)), 1e-300)

@@ -109,6 +109,7 @@ class SurfaceGrid:
         )
         return node, weight.astype(np.float32)
 
+    @cached_property
     def small_faces(self) -> NDArray[np.int64]:
         """(f·n², 3) nodes of the small triangles of all faces, face after face, counter-clockwise
         from outside."""

@@ -20,6 +20,7 @@ from patina.core.output_folder import (
     complete_publication,
     folder,
     folder_lock,
+    record_again,
     staged_folder,
 )
 from patina.core.output_folder.publication import PLAN, READY, RECORD
@@ -253,6 +254,16 @@ def test_change_of_case_removes_nothing(tmp_path):
     write(out, "first", ["steel.binary"])
     write(out, "second", ["Steel.binary"])
     assert files(out)["Steel.binary"] == "second Steel.binary"
+
+
+def test_file_that_patina_changed_itself_is_not_the_users(tmp_path):
+    out, said = tmp_path / "out", []
+    write(out, "first")
+    page = out / "report" / "index.html"
+    page.write_text("with pictures")
+    record_again(out, page)
+    write(out, "second", say=said.append)
+    assert not said and files(out) == expected("second")
 
 
 def test_files_of_another_owner_stay(tmp_path):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,17 +18,14 @@ from ...inputs.separated_materials import (
     separated_names,
     separated_scan,
     with_separated,
-    without_separated,
 )
 from ...scan import Scan
 from ...varying.choice import MIN_PHOTOS
-from ...varying.corrected_observations import ObservationCorrection
-from ...varying.labels import PackedLabels
 from ...varying.separation import divide, division_improves, features, second_at
 from ...varying.varying_surface import ALL_VARIATIONS
 from ..fit_job import CaptureResult, FitJob, MaterialResult
 from .node_steps import model_of
-from .surface_observations import SurfaceObservations, observe_surface
+from .surface_observations import SurfaceObservations
 
 MAX_KINDS = 4  # of material on one object: more are seldom, and each takes as long as a fit
 SOLVED, FITTED = 0.2, 0.7  # fractions of a trial after which kinds are found, and are fitted
@@ -53,26 +50,6 @@ class SeparatedFit:
     def separated_from(self) -> str:
         """The name of the material that they are parts of."""
         return self.whole.materials[0].name
-
-
-def observe_whole(
-    fitted: CaptureResult,
-    parts: SeparatedFit | None,
-    nodes: int,
-    start: float,
-    share: float,
-    correction: ObservationCorrection | None = None,
-    threads: int | None = None,
-    labels: Sequence[PackedLabels] = (),
-) -> Generator[Step, None, SurfaceObservations]:
-    """``observe_surface`` of a fit whose materials are ``parts`` of one, unless None. The pixels at
-    the borders of parts are used too: what the photos show there is known, only not of which."""
-    one = fitted
-    if parts is not None:
-        capture = without_separated(fitted.capture, parts.whole)
-        one = replace(fitted, capture=capture, face_material=np.zeros_like(fitted.face_material))
-    seen = yield from observe_surface(one, nodes, start, share, correction, threads, labels)
-    return seen if parts is None else seen.with_materials(fitted.face_material)
 
 
 @dataclass(frozen=True)

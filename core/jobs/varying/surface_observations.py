@@ -9,12 +9,14 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from ...capture import Capture
 from ...concurrency.background import in_background
 from ...concurrency.job import Step
 from ...concurrency.ordered_map import ordered_map
 from ...concurrency.thread_pool import thread_count, thread_pool
 from ...fit.measured_result import MeasuredResult
 from ...inputs import capture_data
+from ...inputs.separated_materials import without_separated
 from ...varying.choice import MIN_NORMAL_ERROR, Nodes
 from ...varying.corrected_observations import ObservationCorrection
 from ...varying.hierarchy import MAX_TILT
@@ -82,16 +84,21 @@ def observe_surface(
     correction: ObservationCorrection | None = None,
     threads: int | None = None,
     labels: Sequence[PackedLabels] = (),
+    whole: Capture | None = None,
 ) -> Generator[Step, None, SurfaceObservations]:
     """Read every photo at the nodes of a grid of about ``nodes`` nodes. start, share: the part of
     the job that this takes. correction: for the causes that a diagnosis named. threads: None for
     one a core. labels: of the pixels of each photo, if they are known: they take most of the
-    time."""
+    time. whole: the capture before its only material was separated into those of ``fitted``: pixels
+    at their borders are used too, as what the photos show there is known, only not of which."""
     mesh, count = fitted.scan.mesh, len(fitted.capture.photos)
     grid = yield from in_background(
         lambda: SurfaceGrid.with_nodes(mesh, nodes), Step("dividing the mesh", start)
     )
-    parts, read = [], partial(_one, fitted, grid, correction, labels)
+    shown = fitted
+    if whole is not None:
+        shown = replace(fitted, capture=without_separated(fitted.capture, whole))
+    parts, read = [], partial(_one, shown, grid, correction, labels)
     with thread_pool(min(thread_count(threads), PHOTOS_AT_ONCE)) as pool:
         found = ordered_map(pool, read, range(count), ahead=PHOTOS_AT_ONCE - 1)
         for place in range(count):
@@ -99,7 +106,8 @@ def observe_surface(
             parts.append((yield from in_background(partial(next, found), step)))
     material = _of_nodes(grid, fitted.face_material)
     seen = Observations.joined([own for own, _ in parts])
-    return SurfaceObservations(grid, material, seen, threads, tuple(own for _, own in parts))
+    surface = SurfaceObservations(grid, material, seen, threads, tuple(own for _, own in parts))
+    return surface if whole is None else surface.with_materials(fitted.face_material)
 
 
 def pixel_size(fitted: CaptureResult) -> float:

@@ -25,8 +25,8 @@ from ...varying.varying_surface import (
 )
 from ..fit_job import CaptureResult, FitJob, MaterialResult, with_portable
 from .node_steps import CHOICE_NODES, chosen_kind, final_fields, model_of
-from .separate_materials import SeparatedFit, observe_whole
-from .surface_observations import SurfaceObservations, pixel_size
+from .separate_materials import SeparatedFit
+from .surface_observations import SurfaceObservations, observe_surface, pixel_size
 
 MODES = ("auto", "never", "always")
 _, DIFFUSE, *FURTHER = VARIATIONS
@@ -149,8 +149,9 @@ class VariationEstimator:
         pixels = NODES_PER_PIXEL * before.scan.mesh.area / pixel_size(before) ** 2
         count = int(min(self.nodes, MAX_OBSERVATIONS / len(before.capture.photos), pixels))
         reading = READING * share
-        fine = yield from observe_whole(
-            before, self.parts, count, start, reading, self.correction, self.fit.threads, labels
+        whole = None if self.parts is None else self.parts.whole
+        fine = yield from observe_surface(
+            before, count, start, reading, self.correction, self.fit.threads, labels, whole
         )
         n = len(fine.grid)
         parameters, variance = (np.zeros((n, COUNT), np.float32) for _ in range(2))
