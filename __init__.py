@@ -62,6 +62,7 @@ MODULES: tuple[str, ...] = (
     "panels.preferences",
     "scene.session.scene_properties",
     "scene.session.session_state",
+    "scene.session.child_processes",
     "scene.photos.photo_list",
     "scene.scan.capture_draft",
     "scene.scan.orientation",

@@ -1,38 +1,49 @@
 """Run Patina without a graphical interface.
 
 blender -b --python-exit-code 1 -P headless.py -- COMMAND …
-python headless.py COMMAND …                            (with the bpy wheel)
+python headless.py COMMAND …                            (in a checkout, with the bpy wheel)
 
-In a Blender in which the extension is enabled, the installed extension is used. Otherwise the files
-in the folder of this script are imported as package "patina".
+In Blender the installed extension is used; it is enabled for this run if it is not. In a checkout
+the files of the checkout are used.
 """
 
 from __future__ import annotations
 
 import importlib
-import importlib.util
+import runpy
 import sys
 from pathlib import Path
 
+ROOT = Path(__file__).resolve().parent
+CHECKOUT = ROOT / "tools" / "package.py"  # is not shipped
+
 
 def package() -> str:
-    """Return the importable name of the extension; import and register it if necessary."""
-    installed = next(
+    """The importable name of Patina, which is registered in Blender."""
+    enabled = next(
         (n for n in sys.modules if n.startswith("bl_ext.") and n.endswith(".patina")), None
     )
+    if enabled:
+        return enabled
+    installed = extension_name()
     if installed:
-        return installed
-    root = Path(__file__).resolve().parent
-    spec = importlib.util.spec_from_file_location(
-        "patina", root / "__init__.py", submodule_search_locations=[str(root)]
-    )
-    if spec is None or spec.loader is None:
-        raise ImportError(f"no package in {root}")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["patina"] = module
-    spec.loader.exec_module(module)
-    module.register()
-    return "patina"
+        addon_utils = importlib.import_module("addon_utils")
+        if addon_utils.enable(installed) is not None:
+            return installed
+    elif CHECKOUT.is_file():
+        module = runpy.run_path(str(CHECKOUT))["load_patina"]()
+        module.register()
+        return str(module.__name__)
+    sys.exit("patina: not installed in this Blender; install the extension from its zip file")
+
+
+def extension_name() -> str | None:
+    """The name of this folder as an extension; None if it is in none of Blender's repositories."""
+    repositories = importlib.import_module("bpy").context.preferences.extensions.repos
+    for one in repositories:
+        if Path(one.directory).resolve() == ROOT.parent:
+            return f"bl_ext.{one.module}.{ROOT.name}"
+    return None
 
 
 def main(arguments: list[str]) -> int:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import os
 import signal
 import sys
 from collections.abc import Sequence
 from types import ModuleType
 from typing import NoReturn
 
+from ..core.child_process.parent_watch import END_WITH_PARENT, end_with_parent
 from ..core.errors import PatinaError
 from .plain_output import plain_output
 
@@ -46,6 +48,8 @@ def main(arguments: Sequence[str]) -> int:
         command: importlib.import_module(f".{file}", __package__)
         for command, file in COMMANDS.items()
     }
+    if END_WITH_PARENT in os.environ:
+        end_with_parent()
     signal.signal(signal.SIGTERM, _interrupt)  # after the imports: some libraries install a handler
     parser = _Parser(prog="patina", description="Measured materials from photo scans")
     choices = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")

@@ -6,8 +6,7 @@ import argparse
 from pathlib import Path
 
 from ..core.errors import InputError
-from ..core.output_folder import check_out, staged_folder
-from ..core.solve import SolveJob
+from ..core.solve import SolveToFolderJob
 from ..core.solve.solve import LENSES
 from .progress import Progress, print_note
 
@@ -30,16 +29,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     check_threads(arguments.threads)
-    out = check_out(arguments.out)
-    job = SolveJob(arguments.photos, arguments.lens, arguments.threads)
+    job = SolveToFolderJob(arguments.photos, arguments.out, arguments.lens, arguments.threads)
     try:
         job.drain(Progress())
     finally:
-        job.cancel()
-    with staged_folder(out, "solve", print_note) as folder:
-        capture = job.solution.write(folder, out, arguments.photos)
-    print(job.solution.report(), end="")
-    print(f"wrote {out}: sparse, report.txt, {capture.name}")
+        job.close()
+    for note in job.notes:
+        print_note(note)
+    print(job.report, end="")
+    print(f"wrote {job.out}: sparse, report.txt, {job.capture.name}")
 
 
 def check_threads(threads: int | None) -> None:

@@ -15,7 +15,6 @@ from ..core.jobs.check_job import CheckJob
 from ..core.jobs.refit_job import RefitJob
 from ..core.jobs.varying_second_fit import VaryingSecondFit
 from ..core.report.diagnosis_json import describe
-from ..scene.material.prepared_materials import PreparedJob
 from ..scene.session.last_diagnosis import keep_check, kept_check
 from ..scene.session.running_job import set_running
 from ..scene.session.scene_properties import (
@@ -27,7 +26,7 @@ from ..scene.session.scene_properties import (
 from ..scene.views.evidence import paint_evidence
 from ..scene.views.evidence_overlay import toggle_evidence
 from ..scene.views.outdated import inputs_now, record_inputs
-from .fit import can_fit, fit_job, show_result
+from .fit import can_fit, fit_job, prepared, show_result
 from .stepped import Stepped
 
 
@@ -46,7 +45,7 @@ the causes, and fit again with these causes included in the model"""
 
     def _start(self, context: bpy.types.Context) -> None:
         keep_check(None)  # the samples of two checks would need too much memory
-        self._job = PreparedJob(_varying(CheckJob(fit_job(self, context.scene)), context.scene))
+        self._job = prepared(_varying(CheckJob(fit_job(self, context.scene)), context.scene))
         self._inputs = inputs_now(context.scene)
         self._scene = context.scene.name
 
@@ -110,7 +109,8 @@ class PATINA_OT_refit(Stepped, bpy.types.Operator):
     def _start(self, context: bpy.types.Context) -> None:
         off = [cause.name for cause in context.scene.patina.causes if not cause.use]
         refit = RefitJob(kept_check(capture_path(context.scene)), without=off, exactly=True)
-        self._job = PreparedJob(_varying(refit, context.scene))
+        self._job = prepared(_varying(refit, context.scene))
+        self._basis_source = None  # that of the check
         self._inputs = inputs_now(context.scene)
         self._scene = context.scene.name
 

@@ -25,7 +25,7 @@ The materials are those of the last fit; glTF and USD include the scanned mesh a
     PANEL = "material"
     bl_options = {"REGISTER", "UNDO"}
 
-    IN_BACKGROUND = False
+    IN_CHILD = False
     TICK = 0.1
     CANCELLED = "Export cancelled."
 

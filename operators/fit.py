@@ -12,8 +12,9 @@ from ..core.counted import counted
 from ..core.jobs import CaptureResult, FitJob
 from ..core.jobs.varying.varying_job import VaryingJob
 from ..core.samples import Margins
-from ..scene.material.file_cache import own_basis, trim_cache
-from ..scene.material.prepared_materials import PreparedJob
+from ..core.views.prepared_materials import Fitting, PreparedJob
+from ..scene.material.file_cache import basis_source, keep_basis, own_basis, trim_cache
+from ..scene.material.material_nodes import osl_missing
 from ..scene.paint.apply_paint import apply_strokes
 from ..scene.paint.mask_images import with_mask_images
 from ..scene.photos.dragged_lamps import lamp_of
@@ -59,17 +60,25 @@ def fit_job(operator: bpy.types.Operator, scene: bpy.types.Scene) -> FitJob:
         )
     apply_strokes(scene)
     capture, prepare = with_painted_slots(with_mask_images(capture), scene)
+    operator._basis_source = basis_source()
     return FitJob(capture, own_basis(), prepare)
+
+
+def prepared(job: Fitting) -> PreparedJob:
+    """The job, followed by the preparation of its materials for this Blender."""
+    return PreparedJob(job, with_osl=osl_missing() is None)
 
 
 def show_result(operator: Stepped, scene: bpy.types.Scene, result: CaptureResult) -> Iterator[None]:
     """Assign the materials to the mesh, one piece per yield, and report their warnings."""
     job = operator._job
     leave_overlay()
-    notes = yield from apply_result_steps(scene, result, job.stages, job.prepared)
+    notes = yield from apply_result_steps(scene, result, job.stages, job.prepared, job.colours)
     yield
     scene.patina_photos.mesh_over = 1.0  # the fitted material is shown, not the photo over it
     keep_fit(result)
+    if operator._basis_source is not None:
+        keep_basis(operator._basis_source, result.basis)
     trim_cache()
     for material in result.materials:
         for warning in material.warnings:
@@ -92,7 +101,7 @@ class PATINA_OT_fit(Stepped, bpy.types.Operator):
 
     def _start(self, context: bpy.types.Context) -> None:
         fit, varying = fit_job(self, context.scene), context.scene.patina.varying
-        self._job = PreparedJob(fit if varying == "never" else VaryingJob(fit, varying))
+        self._job = prepared(fit if varying == "never" else VaryingJob(fit, varying))
         self._inputs = inputs_now(context.scene)
         self._scene = context.scene.name  # by name: a reference does not survive undo
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import bpy
 
 from ..core.capture import Capture, read_capture
-from ..core.concurrency.job import Job, Step
+from ..core.concurrency.job import Job
 from ..core.counted import counted
 from ..core.errors import PatinaError
 from ..core.masks.proposal import MOST_MATERIALS
 from ..core.masks.proposal_job import ProposalJob
-from ..core.masks.write_masks import MasksJob, MasksSettings, WrittenMasks, material_names
-from ..core.output_folder import check_out, staged_folder
+from ..core.masks.staged_masks import StagedMasksJob
+from ..core.masks.write_masks import material_names
+from ..core.output_folder import check_out
 from ..scene.paint.apply_paint import apply_strokes
 from ..scene.paint.mask_images import (
     masks_folder,
@@ -97,23 +95,6 @@ class PATINA_OT_propose_materials(_CaptureJob, bpy.types.Operator):
             )
 
 
-class _StagedMasks(Job):
-    """Write the shadow masks to the folder ``out``, all of them or none."""
-
-    def __init__(self, capture: Capture, out: Path) -> None:
-        super().__init__()
-        self.capture, self.out = capture, out
-        self.notes: list[str] = []
-        self.result: WrittenMasks | None = None
-
-    def run(self) -> Iterator[Step]:
-        """Run a MasksJob in a temporary folder, then move the files into place."""
-        with staged_folder(self.out, "masks", self.notes.append) as folder:
-            job = MasksJob(self.capture, MasksSettings(), folder, self.out)
-            yield from job.run()
-        self.result = job.result
-
-
 class PATINA_OT_shadow_masks(_CaptureJob, bpy.types.Operator):
     """Compute where the light of each photo is blocked, as images to paint on. White areas are \
 excluded from the fit"""
@@ -132,7 +113,7 @@ excluded from the fit"""
         if shadow_images(self._capture) and not self.replace:
             raise PatinaError("There are shadow masks already; enable Replace to overwrite them")
         self._photos = capture.photos
-        return _StagedMasks(capture, check_out(masks_folder(capture.file)))
+        return StagedMasksJob(capture, check_out(masks_folder(capture.file)))
 
     def _take(self, scene: bpy.types.Scene) -> None:
         out = self._job.out

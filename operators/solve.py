@@ -7,9 +7,8 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import InputError
-from ..core.output_folder import check_out, staged_folder
 from ..core.scan.readers.colmap import read_colmap
-from ..core.solve import SolveJob
+from ..core.solve import SolveToFolderJob
 from ..core.solve.solution import MODEL
 from ..core.solve.solve import LENSES
 from ..scene.scan.orientation import set_upright
@@ -36,8 +35,6 @@ class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
     PANEL = "scan"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
-    TICK = 0.1
-    IN_BACKGROUND = False
     CANCELLED = "Solving cancelled; nothing was written."
 
     directory: bpy.props.StringProperty(  # type: ignore[valid-type]
@@ -85,27 +82,19 @@ class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
             raise InputError("no folder given; choose the folder of the photos", key="directory")
         self._photos = Path(bpy.path.abspath(self.directory)).resolve()
         default_out = self._photos.with_name(f"{self._photos.name} solved")
-        self._out = check_out(Path(bpy.path.abspath(self.out)) if self.out else default_out)
-        self._job = SolveJob(self._photos, self.lens, self.threads or None)
+        out = Path(bpy.path.abspath(self.out)) if self.out else default_out
+        self._job = SolveToFolderJob(self._photos, out, self.lens, self.threads or None)
         self._scene = context.scene.name  # by name: a reference does not survive undo
 
-    def _stop(self, context: bpy.types.Context) -> None:
-        if self._job is not None:
-            self._job.cancel()
-        super()._stop(context)
-
-    def _note(self, sentence: str) -> None:
-        self.report({"INFO"}, sentence)
-
     def _finish(self, context: bpy.types.Context) -> None:
-        solution = self._job.solution
-        with staged_folder(self._out, "solve", self._note) as folder:
-            capture = solution.write(folder, self._out, self._photos)
-        self.report({"INFO"}, f"{solution.summary()}. Written: {self._out / capture.name}")
-        missing = solution.photos - solution.placed
-        if missing:
+        job = self._job
+        for note in job.notes:
+            self.report({"INFO"}, note)
+        self.report({"INFO"}, f"{job.summary}. Written: {job.capture}")
+        if job.missing:
             self.report(
-                {"WARNING"}, f"Photos without a pose: {missing}. See report.txt for the reasons."
+                {"WARNING"},
+                f"Photos without a pose: {job.missing}. See report.txt for the reasons.",
             )
         scene = bpy.data.scenes.get(self._scene)
         if scene is None:
@@ -115,8 +104,8 @@ class PATINA_OT_solve_photos(Stepped, bpy.types.Operator):
             )
             return
         # without photos behind the cameras: undistorting each would block Blender for seconds
-        found = read_colmap(self._out / MODEL)
-        create_reconstruction(scene, self._photos.name, found, None, rectified_folder(capture))
+        found = read_colmap(job.out / MODEL)
+        create_reconstruction(scene, self._photos.name, found, None, rectified_folder(job.capture))
         set_upright(scene)
 
 

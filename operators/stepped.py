@@ -1,8 +1,9 @@
 """Base class of operators with a long job. Scripts run the job to its end; in a window a timer
 follows its progress, and ESC cancels it.
 
-A job that does not use Blender runs in its own thread, so that a timer tick never waits for it.
-Blender's data is changed on the timer only, one piece per tick.
+A job that does not use Blender runs in a child process: a timer tick never waits for it, and
+Blender and the open file outlive its end, whatever ends it. Blender's data is changed on the timer
+only, one piece per tick.
 """
 
 from __future__ import annotations
@@ -13,31 +14,33 @@ from typing import Any
 
 import bpy
 
-from ..core.concurrency.background import BackgroundJob
+from ..core.child_process import ChildJob
 from ..core.concurrency.remaining_time import RemainingTime
 from ..core.errors import PatinaError
 from ..core.jobs import Job
+from ..scene.session.child_processes import end_child, start_child
 from ..scene.session.running_job import Running, running, set_running
 from .report_errors import report_and_cancel
 
 APPLYING = "Applying the result"  # progress text
+WAIT = 0.02  # seconds that a script waits between two looks at a child process
 REDRAW_INTERVAL = 0.25  # seconds between two updates of the progress bar
 
 
 class Stepped:
     """Mixin for operators. Subclasses set self._job and self._scene in _start, and apply the result
-    in _finish. A _finish that yields continues at the next tick; until it ends, no event is passed
-    on."""
+    in _finish, where self._job is the job as it has run. A _finish that yields continues at the
+    next tick; until it ends, no event is passed on."""
 
     TICK = 0.05
-    IN_BACKGROUND = True  # run the job in a background thread; False: the job uses Blender
+    IN_CHILD = True  # run the job in a child process; False: the job uses Blender
     PANEL = ""  # the stage that shows the progress
     CANCELLED = "Cancelled; nothing was changed."
 
     _timer: Any = None
     _started_at = _drawn_at = 0.0
     _job: Job | None = None
-    _background: BackgroundJob | None = None
+    _child: ChildJob | None = None
     _applying: Iterator[None] | None = None
     _time_left = RemainingTime()
     _scene: str = ""  # by name: a reference does not survive undo
@@ -54,7 +57,9 @@ class Stepped:
         """Run the job and apply its result in one call."""
         try:
             self._start(context)
-            self._job.drain()
+            self._begin()
+            while self._step():
+                time.sleep(WAIT if self._child is not None else 0.0)
             for _ in self._finish(context) or ():
                 pass
         except PatinaError as error:
@@ -67,6 +72,7 @@ class Stepped:
         """Start the job; modal() continues it."""
         try:
             self._start(context)
+            self._begin()
         except PatinaError as error:
             self._stop(context)
             return report_and_cancel(self, error)
@@ -108,7 +114,7 @@ class Stepped:
                 if (
                     time.perf_counter() - self._drawn_at > REDRAW_INTERVAL
                 ):  # redrawing slows the job down
-                    now = self._job.now
+                    now = (self._child or self._job).now
                     state = Running(
                         self._scene, self.PANEL, now.stage, now.fraction, self._remaining()
                     )
@@ -123,12 +129,23 @@ class Stepped:
             return True
         return next(self._applying, self) is not self
 
+    def _begin(self) -> None:
+        """Start the child process."""
+        if self.IN_CHILD:
+            try:
+                self._child = start_child(self._job)
+            except OSError as error:
+                raise PatinaError(f"No process can be started for this job ({error})") from error
+
     def _step(self) -> bool:
         """False when the job is done."""
-        if not self.IN_BACKGROUND:
+        child = self._child
+        if child is None:
             return self._job.step()
-        self._background = self._background or BackgroundJob(self._job)
-        return self._background.step()
+        if child.step():
+            return True
+        self._child, self._job = None, child.result
+        return False
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Called by Blender when it ends the operator (the window closes)."""
@@ -143,11 +160,12 @@ class Stepped:
     def _remaining(self) -> float | None:
         """Remaining seconds; None if it is too early."""
         elapsed = time.perf_counter() - self._started_at
-        return self._time_left.update(elapsed, self._job.now.fraction)
+        return self._time_left.update(elapsed, (self._child or self._job).now.fraction)
 
     def _stop(self, context: bpy.types.Context) -> None:
-        if self._background is not None:
-            self._background.close()
+        child, self._child = self._child, None
+        if child is not None:
+            end_child(child)
         elif self._job is not None:
             self._job.close()
         if self._timer is not None:

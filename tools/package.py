@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from pathlib import Path
 from types import ModuleType
 
-from .common import ROOT
+ROOT = Path(__file__).resolve().parents[1]
 
 
 def load_patina() -> ModuleType:

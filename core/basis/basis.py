@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,8 @@ class Basis:
     turn; None where unknown.
     """
 
+    STORED_APART: ClassVar[bool] = True
+
     grid: AngleGrid
     mean: NDArray[np.float32]
     log_reference: NDArray[np.float32]
@@ -44,6 +47,10 @@ class Basis:
     columns: int
     provenance: str
     training: NDArray[np.float64] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields, without what is computed from them."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def count(self) -> int:

@@ -8,8 +8,6 @@ from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import TypeVar
 
-from .job import Job
-
 Value = TypeVar("Value")
 Result = TypeVar("Result")
 
@@ -47,35 +45,3 @@ def steps_in_background(
             return result  # type: ignore[return-value]
         done = fraction
         yield done
-
-
-class BackgroundJob:
-    """A job in its own thread: a caller that steps it never waits. Not for a job that uses objects
-    of another thread, such as Blender's data."""
-
-    def __init__(self, job: Job) -> None:
-        self.job = job
-        self._pool = ThreadPoolExecutor(1, "patina")
-        self._cancelled = False
-        self._future = self._pool.submit(self._drive)
-
-    def step(self) -> bool:
-        """False when the job is done. Errors of the work are raised."""
-        if not self._future.done():
-            return True
-        self._future.result()
-        return False
-
-    def close(self) -> None:
-        """Cancel the job: the current piece runs to its end, its result is discarded, and then the
-        job releases its resources."""
-        self._cancelled = True
-        self._pool.shutdown(wait=False)
-
-    def _drive(self) -> None:
-        """Step the job in the thread until it ends or is cancelled."""
-        try:
-            while not self._cancelled and self.job.step():
-                pass
-        finally:
-            self.job.close()

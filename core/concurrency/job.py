@@ -8,7 +8,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from .thread_pool import single_threaded_blas
 
@@ -66,6 +66,10 @@ class Job(ABC):
         steps, self._steps = self._steps, iter(())
         if isinstance(steps, Generator):
             steps.close()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State for another process, where the job starts from its beginning or has ended."""
+        return {**vars(self), "_steps": None}
 
     def _run(self) -> Iterator[Step]:
         """run() with single-threaded BLAS."""

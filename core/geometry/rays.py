@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from ..angles.vectors import length
 from ..scan import Mesh
 from .cover import Cover
+from .embree_tree import EmbreeTree
 from .lift import SHADOW_LIFT, facet_lift
 
 CHUNK_RAYS = 1 << 20  # bounds memory: 24 M rays with their results would take over 2 GB
@@ -40,21 +40,28 @@ class RayScene:
     mesh's centre, which keeps the precision of georeferenced coordinates. lift: distance of shadow
     rays' starts from the surface, scan units."""
 
+    STORED_APART: ClassVar[bool] = True
+
     mesh: Mesh
     origin: NDArray[np.float64]
-    scene: EmbreeScene
+    tree: EmbreeTree
     lift: float
 
     @classmethod
     def build(cls, mesh: Mesh) -> RayScene:
         origin = mesh.vertices[mesh.faces[:, 0]].mean(axis=0)
-        scene = EmbreeScene()
-        triangles = (mesh.vertices - origin).astype(np.float32)[mesh.faces]
-        TriangleMesh(scene, np.ascontiguousarray(triangles))
-        del triangles
-        one = np.zeros((1, 3), np.float32)
-        scene.run(one, one + 1)  # builds the tree here, before threads use it
-        return cls(mesh, origin, scene, SHADOW_LIFT * mesh.size)._ready()
+        tree = EmbreeTree(mesh, origin)
+        _ = tree.scene  # builds it here, before threads use it
+        return cls(mesh, origin, tree, SHADOW_LIFT * mesh.size)._ready()
+
+    @property
+    def scene(self) -> EmbreeScene:
+        """Embree's scene."""
+        return self.tree.scene
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields, without what is computed from them."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def close(self) -> RayScene:
         """The same scene with shadow rays that start as close to the surface as its facets

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +46,18 @@ def without_separated(capture: Capture, whole: Capture) -> Capture:
         for photo, before in zip(capture.photos, whole.photos, strict=True)
     )
     return replace(capture, materials=whole.materials, photos=photos)
+
+
+@dataclass(frozen=True)
+class SeparatedFaces:
+    """Gives a scan that is read the material of each face. labels: (f,) index, −1 for none;
+    earlier: is applied first."""
+
+    labels: NDArray[np.integer]
+    earlier: Callable[[Scan], Scan] | None = None
+
+    def __call__(self, scan: Scan) -> Scan:
+        return separated_scan(scan if self.earlier is None else self.earlier(scan), self.labels)
 
 
 def _masks(masks: dict[str, Path], only: str, names: Sequence[str]) -> dict[str, Path]:

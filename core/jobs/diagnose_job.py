@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
@@ -50,6 +50,8 @@ class DiagnoseJob(Job):
     several first (VaryingJob); ``parts`` is then the separation, and ``fit`` the fit of its
     materials. ``surface``: observations of a grid of CHOICE_NODES; None where there are more than
     MAX_MATERIALS."""
+
+    STORED_APART: ClassVar[bool] = True
 
     def __init__(self, fit: FitJob, separate: bool = False) -> None:
         super().__init__()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,10 +46,13 @@ class FindLightsJob(Job):
     ``result``. The other lights keep their values; their photos help to know the materials."""
 
     def __init__(
-        self, capture: Capture, names: Collection[str] = (), basis: Basis | None = None
+        self,
+        capture: Capture,
+        names: Collection[str] = (),
+        basis: Basis | Callable[[], Basis] | None = None,
     ) -> None:
-        """Raises PatinaError for a name that the capture does not have, and where there is nothing
-        to find."""
+        """basis: as of FitJob. Raises PatinaError for a name that the capture does not have, and
+        where there is nothing to find."""
         super().__init__()
         have = [entry.name for entry in capture.lights]
         unknown = [name for name in names if name not in have]
@@ -88,7 +91,7 @@ class FindLightsJob(Job):
             for name in names
         ]
         yield Step(SEARCHING, READ_SHARE)
-        dictionary = BrdfDictionary.of(self.basis or default_basis())
+        dictionary = BrdfDictionary.of(self._basis())
         steps = find_lamps(lamps, len(capture.materials), rays, dictionary)
         found = yield from relayed(
             scaled(steps, READ_SHARE, 1.0), lambda done: Step(SEARCHING, done)
@@ -97,6 +100,11 @@ class FindLightsJob(Job):
         gains = dict(zip(names, found.gains, strict=True))
         strengths = _relative_strengths(capture, lights, gains)
         self.result = _result(capture, lights, by_name, parts, strengths)
+
+    def _basis(self) -> Basis:
+        if self.basis is None or isinstance(self.basis, Basis):
+            return self.basis or default_basis()
+        return self.basis()
 
 
 def _without_locations(capture: Capture, names: Collection[str]) -> Capture:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,6 +92,8 @@ class CaptureResult:
     into account. varying: how the materials vary over the surface, None where they are even or
     where this was not estimated.
     """
+
+    STORED_APART: ClassVar[bool] = True
 
     capture: Capture
     scan: Scan

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,8 @@ class Mesh:
     one for the whole mesh (not opened; they need not exist); notes: sentences about the file for
     the user.
     """
+
+    STORED_APART: ClassVar[bool] = True
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int32]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,8 @@ class Scan:
     """A scanned object: mesh and cameras in one frame. images: folder of the scan's own photos (if
     known). georeference: location on Earth (if known). notes: what the readers left out or assumed.
     """
+
+    STORED_APART: ClassVar[bool] = True
 
     mesh: Mesh
     cameras: tuple[Camera, ...]

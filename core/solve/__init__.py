@@ -3,6 +3,6 @@
 from .localise import Localised
 from .localise_job import LocaliseJob
 from .photo_set import find_photos
-from .solve_job import Solution, SolveJob
+from .solve_job import Solution, SolveJob, SolveToFolderJob
 
-__all__ = ["LocaliseJob", "Localised", "Solution", "SolveJob", "find_photos"]
+__all__ = ["LocaliseJob", "Localised", "Solution", "SolveJob", "SolveToFolderJob", "find_photos"]

@@ -18,15 +18,16 @@ import bpy
 from ...core.concurrency.job import Job, Step
 from ...core.errors import InputError, PatinaError
 from ...core.export import Loss
-from ...core.export.material_formats import BLENDER, export_materials
+from ...core.export.export_job import ExportMaterialsJob
+from ...core.export.material_formats import BLENDER
 from ...core.jobs import CaptureResult
 from ...core.output_folder import check_out, staged_folder
-from ...core.report import write_report
+from ...core.report.report_job import ReportJob
 from ...core.report.result_json import write_json
-from ...core.result import read_result
 from ...core.varying import storage
 from ..material.trait_update import finish_updates
 from ..session.background_blender import in_background
+from ..session.child_processes import in_child
 from ..session.last_fit import kept_fit
 from ..session.scene_properties import DIAGNOSIS, capture_path, stored_result
 from .export_choice import FORMATS, RECORD, REPORT, missing
@@ -82,8 +83,8 @@ class ExportJob(Job):
                 _save_copy(result / "scene.blend")
                 yield from self._by_another_blender(result, exported)
             else:
-                fitted = read_result(result, self.cache)
-                self.losses, _ = yield from export_materials(self.out, fitted, exported)
+                job = ExportMaterialsJob(result, self.cache, self.out, exported)
+                self.losses = (yield from in_child(job)).losses
         self.files += ["losses.txt", "losses.json"]
         self.files += sorted({file for loss in self.losses for file in loss.files})
 
@@ -120,8 +121,7 @@ class ExportJob(Job):
                     write_json(folder / name, self._with_variation(content, folder))
                     self.files.append(name)
             if report and self.fit is not None:
-                for fraction in write_report(folder / "report", self.fit):
-                    yield Step("writing the report", fraction)
+                yield from in_child(ReportJob(self.fit, folder / "report"))
                 self.files.append("report/index.html")
 
 

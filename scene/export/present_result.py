@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Generator
-from functools import partial
 from typing import Any
 
 import bpy
 import numpy as np
 
-from ...core.appearance.principled_fit import fit_principled
-from ...core.concurrency.background import in_background
 from ...core.concurrency.job import Step
 from ...core.errors import PatinaError
 from ...core.result.reader import FORBIDDEN
+from ...core.views.prepared_materials import PRINCIPLED, EditedMaterialJob
 from ..material.measured_materials import measured_of
 from ..material.trait_offsets import edited_brdf, movable, state
 from ..property_keys import MEASURED_DATE, MEASURED_NAME
+from ..session.child_processes import in_child
 
 NUMBERED = re.compile(r"\.\d{3,}")  # suffix by which Blender keeps names apart
 
@@ -65,8 +64,13 @@ def _changed(material: bpy.types.Material, name: str) -> Generator[Step, None, d
             f"The basis of {name} is not on this computer, so its changed traits cannot be "
             "exported; fit the material again, or reset its traits"
         )
-    step = Step(f"fitting {name} for other renderers", 0.0)
-    fit = yield from in_background(partial(fit_principled, brdf.evaluate), step)
+    job = yield from in_child(EditedMaterialJob(brdf, [PRINCIPLED]))
+    fit = job.found[PRINCIPLED]
+    if fit is None:
+        raise PatinaError(
+            f"The changed traits of {name} have no Principled BSDF; reset its traits, or change "
+            "them less"
+        )
     return {
         "coefficients": np.asarray(brdf.coefficients, float).tolist(),
         "principled": {

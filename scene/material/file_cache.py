@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable
-from functools import lru_cache
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -25,6 +25,8 @@ from . import osl_files
 log = logging.getLogger(__name__)
 
 MB = 1_000_000  # bytes
+_own: tuple[tuple[Path, Path], Basis] | None = None
+"""The source of the basis that was computed last, and the basis."""
 
 
 def cached_files() -> dict[Path, int]:
@@ -48,22 +50,32 @@ def trim_cache() -> tuple[int, int]:
     return _drop(preferences().cache_size * MB)
 
 
-def own_basis() -> Callable[[], Basis] | None:
-    """A function that computes the basis of the user's own MERL files; None without such files.
+def own_basis() -> Basis | Callable[[], Basis] | None:
+    """The basis of the user's own MERL files, or a function that computes it; None without such
+    files.
 
     The function is slow and does not use Blender. It raises InputError if the files are not the
     MERL database.
     """
-    folder = preferences().merl_folder
-    if not folder:
+    source = basis_source()
+    if source is None:
         return None
-    source, cache = Path(bpy.path.abspath(folder)), cache_folder()
-    return lambda: _basis(source, cache)
+    if _own is not None and _own[0] == source:
+        return _own[1]
+    return partial(cached_basis, source[0], cache=source[1])
 
 
-@lru_cache(maxsize=1)  # computing the checksums of the files takes seconds
-def _basis(folder: Path, cache: Path) -> Basis:
-    return cached_basis(folder, cache=cache)
+def keep_basis(source: tuple[Path, Path] | None, basis: Basis) -> None:
+    """Keep the basis that was computed from a source, because the checksums of the files take
+    seconds."""
+    global _own
+    _own = None if source is None else (source, basis)
+
+
+def basis_source() -> tuple[Path, Path] | None:
+    """(folder of the user's own MERL files, folder of computed bases); None without such files."""
+    folder = preferences().merl_folder
+    return (Path(bpy.path.abspath(folder)), cache_folder()) if folder else None
 
 
 def _drop(limit: int) -> tuple[int, int]:
@@ -107,6 +119,11 @@ def _after_load(*_: object) -> None:
     trim_cache()
 
 
+def _forget() -> None:
+    global _own
+    _own = None
+
+
 HANDLERS = (("load_post", _after_load),)
 
 
@@ -118,4 +135,4 @@ def register() -> None:
 def unregister() -> None:
     """Remove the handler and forget the basis."""
     detach(HANDLERS)
-    _basis.cache_clear()
+    _forget()

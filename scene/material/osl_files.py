@@ -17,13 +17,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
-import numpy as np
 from bpy.app.handlers import persistent
-from numpy.typing import NDArray
 
-from ...core.appearance import osl_atlas, sampling_table
-from ...core.appearance.closure_split import ClosureSplit, split
+from ...core.appearance import osl_atlas
 from ...core.appearance.osl_source import COMPONENTS, REMAINDER, SAMPLING
+from ...core.appearance.shader_tables import ShaderTables
 from ...core.basis import PrincipalBRDF
 from ...core.concurrency.steps import drained
 from ..property_keys import COMPONENTS_FILE, MEASURED_SAMPLING_FILE, REMAINDER_FILE, SAMPLING_FILE
@@ -52,23 +50,6 @@ class ShaderFiles:
     alphas: tuple[float, float, float]
 
 
-@dataclass(frozen=True)
-class ShaderTables:
-    """Tables of one shader. parts: the split into closures; texels: the sampling table as the
-    pixels of its EXR."""
-
-    parts: ClosureSplit
-    texels: NDArray[np.float32]
-
-
-def shader_tables(brdf: PrincipalBRDF) -> ShaderTables:
-    """Compute the tables of a BRDF, in about a second. Does not use Blender, so it may run in any
-    thread."""
-    parts = split(brdf.evaluate)
-    table = sampling_table.sampling_table(brdf.evaluate, parts)
-    return ShaderTables(parts, sampling_table.texels(parts, table))
-
-
 def ensure_files(brdf: PrincipalBRDF, tables: ShaderTables | None = None) -> ShaderFiles:
     """Write a BRDF's EXRs where this .blend expects them, and pack them into it.
 
@@ -81,7 +62,7 @@ def ensure_files_steps(
     brdf: PrincipalBRDF, tables: ShaderTables | None = None
 ) -> Generator[None, None, ShaderFiles]:
     """``ensure_files`` as a generator, one file per step."""
-    made = tables or shader_tables(brdf)
+    made = tables or ShaderTables.of(brdf)
     basis = brdf.basis
     wanted = (
         (COMPONENTS, osl_atlas.components_name(basis),

@@ -6,21 +6,10 @@ from collections.abc import Sequence
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.basis import PrincipalBRDF
 from ...core.views import display
-from ...core.views.sphere import lit_sphere
-
-SIZE, SMALL = 256, 32  # width of a preview and of an icon, pixels
-
-Picture = tuple[NDArray[np.floating], NDArray[np.floating]]
-"""Radiance (size, size, 3) and coverage (size, size) of a sphere."""
-
-
-def spheres(brdf: PrincipalBRDF) -> list[Picture]:
-    """Draw the spheres of preview and icon. Does not use Blender, so it may run in any thread."""
-    return [lit_sphere(brdf.evaluate, size) for size in (SIZE, SMALL)]
+from ...core.views.prepared_materials import Picture, spheres
 
 
 def show_sphere(material: bpy.types.Material, brdf: PrincipalBRDF) -> None:

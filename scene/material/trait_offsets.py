@@ -29,9 +29,9 @@ from ...core.appearance.traits import (
 from ...core.basis import Basis, PrincipalBRDF
 from ...core.errors import PatinaError
 from ...core.result.bases import basis_of_version
+from ...core.views.prepared_materials import ICON_SIZE, Picture
 from ...core.views.sphere import LitSphere
 from ..property_keys import BASIS_VERSION, COEFFICIENTS, MEASURED_NAME
-from .preview import SMALL, Picture
 
 QUICK_SIZE = 128  # width of the preview that is drawn while a slider moves, pixels
 CHANNELS = ("red", "green", "blue")
@@ -159,7 +159,7 @@ class _Quick:
 @lru_cache(maxsize=2)
 def _looked(version: str) -> tuple[tuple[LitSphere, tuple[ComponentLookup, ...]], ...]:
     basis = _basis(version)
-    both = (LitSphere.of(QUICK_SIZE), LitSphere.of(SMALL))
+    both = (LitSphere.of(QUICK_SIZE), LitSphere.of(ICON_SIZE))
     return tuple(
         (s, tuple(ComponentLookup.of(basis, part.angles) for part in s.parts)) for s in both
     )

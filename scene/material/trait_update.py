@@ -1,8 +1,8 @@
 """Update a material after its trait sliders change.
 
 The coefficients of the OSL shader and a small preview are updated at once. Shortly after the last
-change, a thread that does not use Blender computes the remaining pieces, and a timer applies them
-one by one: the full preview, the table that Cycles samples directions from (it also limits the
+change, a child process computes the remaining pieces, and a timer applies them one by one: the full
+preview, the table that Cycles samples directions from (it also limits the
 albedo to 1), the lobe stack for EEVEE, and the Principled for exporters. A custom property of the
 material states which traits each piece shows, so that other changes of the sliders (undo, a file
 from another version) are detected too.
@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,11 +20,19 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...core.appearance import osl_atlas
-from ...core.appearance.lobe_fit import fit_lobe_stack
-from ...core.appearance.principled_fit import fit_principled
 from ...core.basis import PrincipalBRDF
-from ...core.varying.split import split_body
+from ...core.child_process import ChildJob
+from ...core.errors import PatinaError
+from ...core.views.prepared_materials import (
+    LOBES,
+    PRINCIPLED,
+    SAMPLING,
+    SPHERE,
+    EditedMaterialJob,
+    material_piece,
+)
 from ..property_keys import SHOWN_TRAITS
+from ..session.child_processes import end_child, start_child
 from ..session.handlers import attach, detach
 from ..session.running_job import redraw
 from . import material_nodes, osl_files
@@ -38,26 +44,24 @@ from .measured_nodes import (
     set_sampling,
     store_inputs,
 )
-from .preview import set_preview, show_sphere, spheres
+from .preview import set_preview, show_sphere
 from .trait_offsets import clear_caches, edited_brdf, movable, quick_spheres, state
 
 log = logging.getLogger(__name__)
 
-START_DELAY, POLL_INTERVAL = 0.4, 0.1  # seconds after the last change; between checks of the thread
+START_DELAY, POLL_INTERVAL = 0.4, 0.1  # seconds after the last change; between checks of a child
 QUICKLY = "quickly"  # stored instead of a state: the preview is a small sphere
-SPHERE, SAMPLING, LOBES, PRINCIPLED = "sphere", "sampling", "lobes", "principled"
 
 
 @dataclass(frozen=True)
 class _Work:
-    """A piece of a state that is being computed."""
+    """A state whose pieces a child process computes, and those that are not applied yet."""
 
-    piece: str
     state: str
-    future: Future[Any]
+    child: ChildJob[EditedMaterialJob]
+    computed: dict[str, Any]
 
 
-_pool: ThreadPoolExecutor | None = None
 _work: _Work | None = None
 _changed_at = 0.0
 _failed: set[tuple[str, str]] = set()  # (piece, state)
@@ -101,8 +105,17 @@ def outdated_pieces(material: bpy.types.Material) -> list[str]:
 def finish_updates() -> None:
     """Update all pieces of all materials and wait for them. For scripts, where no timer runs."""
     while (todo := _next()) is not None:
-        piece, now, work = todo
-        _apply(piece, now, work)
+        now, brdf, pieces = todo
+        _apply(pieces[0], now, _computed(brdf, pieces[0]))
+
+
+def _computed(brdf: PrincipalBRDF, piece: str) -> Any:
+    """A piece, None where it cannot be computed: extreme sliders may fail."""
+    try:
+        return material_piece(brdf, piece)
+    except Exception:
+        log.exception("The %s of an edited material could not be computed.", piece)
+        return None
 
 
 def _pieces(material: bpy.types.Material) -> list[str]:
@@ -116,39 +129,24 @@ def _pieces(material: bpy.types.Material) -> list[str]:
     return pieces
 
 
-def _next() -> tuple[str, str, Callable[[], Any]] | None:
-    """(piece, state, function that computes it) of the first outdated piece; None if there is
-    none."""
+def _next() -> tuple[str, PrincipalBRDF, list[str]] | None:
+    """(state, its BRDF, its outdated pieces) of the first material that has some; None if none
+    has."""
     for material in bpy.data.materials:
         if not movable(material):
             continue
         late = outdated_pieces(material)
         brdf = edited_brdf(material) if late else None
         if brdf is not None:
-            return late[0], state(material), _WORK[late[0]](brdf)
+            return state(material), brdf, late
     return None
 
 
-def _sampling(brdf: PrincipalBRDF) -> Any:
-    made = osl_files.shader_tables(brdf)
-    alphas = tuple(float(a) for a in made.parts.alpha)
-    return osl_atlas.sampling_name(brdf), made.texels, alphas, split_body(brdf.evaluate)
-
-
-_WORK: dict[str, Callable[[PrincipalBRDF], Callable[[], Any]]] = {
-    SPHERE: lambda brdf: lambda: spheres(brdf),
-    SAMPLING: lambda brdf: lambda: _sampling(brdf),
-    LOBES: lambda brdf: lambda: fit_lobe_stack(brdf.evaluate),
-    PRINCIPLED: lambda brdf: lambda: fit_principled(brdf.evaluate),
-}
-
-
-def _apply(piece: str, now: str, result: Callable[[], Any]) -> None:
-    """Apply a piece to every material that still has the state it was computed for."""
-    try:
-        found = result()
-    except Exception:  # extreme sliders may fail; the other pieces must still be updated
-        log.exception("The %s of an edited material could not be computed.", piece)
+def _apply(piece: str, now: str, found: Any) -> None:
+    """Apply a piece to every material that still has the state it was computed for. found: None
+    where it could not be computed."""
+    if found is None:
+        log.warning("The %s of an edited material could not be computed.", piece)
         _failed.add((piece, now))
         return
     for material in bpy.data.materials:
@@ -162,11 +160,13 @@ def _write(material: bpy.types.Material, piece: str, found: Any) -> None:
     if piece == SPHERE:
         set_preview(material, found)
     elif piece == SAMPLING:
-        name, texels, alphas, split = found
+        tables, split = found
+        alphas = tuple(float(a) for a in tables.parts.alpha)
+        name = osl_atlas.sampling_name(edited_brdf(material))
         # not next to the .blend: the file is written there on save, and most states are never saved
         path = Path(bpy.app.tempdir) / name
         if not path.is_file():
-            osl_atlas.write_picture(path, texels)
+            osl_atlas.write_picture(path, tables.texels)
         osl_files.pack(path)
         set_sampling(material, path, alphas, split)
         osl_files.drop_unused()
@@ -192,9 +192,9 @@ def _start() -> None:
 
 
 def _tick() -> float | None:
-    """Timer callback: start a piece, check whether it is done, apply it. Returns the seconds until
-    the next call, None to stop."""
-    global _pool, _work
+    """Timer callback: start a child process, check whether it is done, apply one of its pieces.
+    Returns the seconds until the next call, None to stop."""
+    global _work
     if _work is None:
         wait = START_DELAY - (time.monotonic() - _changed_at)
         if wait > 0:
@@ -202,21 +202,50 @@ def _tick() -> float | None:
         todo = _next()
         if todo is None:
             return None
-        _pool = _pool or ThreadPoolExecutor(1, "patina")
-        _work = _Work(todo[0], todo[1], _pool.submit(todo[2]))
-    if not _work.future.done():
+        now, brdf, pieces = todo
+        try:
+            _work = _Work(now, start_child(EditedMaterialJob(brdf, pieces)), {})
+        except (PatinaError, OSError) as error:
+            return _give_up(now, pieces, error)
         return POLL_INTERVAL
-    work, _work = _work, None
-    _apply(work.piece, work.state, work.future.result)
+    if _work.computed:
+        piece = next(iter(_work.computed))
+        _apply(piece, _work.state, _work.computed.pop(piece))
+    elif not any(state(m) == _work.state for m in bpy.data.materials if movable(m)):
+        _drop()  # the sliders have moved on
+        return 0.0
+    elif not _finished(_work):
+        return POLL_INTERVAL
+    if _work is not None and not _work.computed:
+        _work = None
+    return 0.0
+
+
+def _finished(work: _Work) -> bool:
+    """Whether the child is done; its pieces are then in ``work``."""
+    try:
+        if work.child.step():
+            return False
+        work.computed.update(work.child.result.found)
+    except PatinaError as error:
+        pieces = [p for m in bpy.data.materials if movable(m) for p in outdated_pieces(m)]
+        _give_up(work.state, pieces, error)
+    return True
+
+
+def _give_up(now: str, pieces: list[str], error: Exception) -> float:
+    """Leave the pieces of a state as they are."""
+    log.warning("Previews of an edited material were not updated: %s", error)
+    _failed.update((piece, now) for piece in pieces)
     return 0.0
 
 
 def _drop() -> None:
-    """Stop the thread and discard the piece in progress."""
-    global _pool, _work
-    if _pool is not None:
-        _pool.shutdown(wait=False, cancel_futures=True)
-    _pool = _work = None
+    """End the child and discard its pieces."""
+    global _work
+    work, _work = _work, None
+    if work is not None:
+        end_child(work.child)
 
 
 @persistent
@@ -271,7 +300,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove handlers, timer and thread, and clear the caches."""
+    """Remove handlers, timer and child process, and clear the caches."""
     detach(HANDLERS)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)

@@ -4,19 +4,21 @@ description."""
 from __future__ import annotations
 
 import re
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from datetime import date
 
 import bpy
+import numpy as np
+from numpy.typing import NDArray
 
 from ...core.concurrency.steps import drained
 from ...core.jobs import CaptureResult, Stage
 from ...core.report.result_json import describe
+from ...core.views.prepared_materials import Prepared, prepare
 from ..material import material_nodes, osl_files
 from ..material.lobe_group import stack_group
 from ..material.material_evidence import keep_earlier, keep_evidence
 from ..material.measured_materials import measured_materials
-from ..material.prepared_materials import Prepared, prepare
 from ..material.preview import set_preview
 from ..property_keys import CAPTURE, MEASURED_DATE, MEASURED_NAME, NO_OSL_REASON
 from ..session.scene_properties import store_result
@@ -48,8 +50,10 @@ def apply_result_steps(
     result: CaptureResult,
     stages: Sequence[Stage],
     prepared: Sequence[Prepared] = (),
+    colours: Mapping[str, NDArray[np.float32]] | None = None,
 ) -> Generator[None, None, list[str]]:
-    """``apply_result`` as a generator, one piece per step."""
+    """``apply_result`` as a generator, one piece per step. colours: at_vertices(result.varying), if
+    it is computed already."""
     with_osl = material_nodes.osl_missing() is None
     capture = str(result.capture.file)
     notes: list[str] = []
@@ -98,7 +102,7 @@ def apply_result_steps(
     yield
     remove_unused_maps()
     notes += yield from apply_variation_steps(scene, result)
-    yield from paint_variation_steps(mesh, result.varying)
+    yield from paint_variation_steps(mesh, result.varying, colours)
     remove_placeholders(capture)
     for material in made:  # the name is free now; other names were set by the user
         name = material[MEASURED_NAME]

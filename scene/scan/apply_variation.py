@@ -10,16 +10,15 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.concurrency.background import in_background
+from ...core.concurrency.job import finished
+from ...core.concurrency.steps import relayed
 from ...core.errors import PatinaError
 from ...core.jobs import CaptureResult
-from ...core.maps.maps_result import MapsResult, baked_maps
-from ...core.maps.material import from_fit
-from ...core.maps.texels import rasterise
-from ...core.maps.write import write_maps
+from ...core.maps.bake_job import BakeJob
 from ...core.scan import Mesh
 from ...core.varying.surface_grid import SurfaceGrid
 from ..property_keys import MAP_KIND
+from ..session.child_processes import in_child_of_window
 from .apply_maps import apply_maps
 from .unwrap import unwrapped
 
@@ -40,26 +39,24 @@ def apply_variation_steps(
             scan = replace(scan, mesh=replace(scan.mesh, uv=unwrapped(scan.mesh)))
             yield
         size = map_size(scan.mesh, surface.grid)
-
-        def bake() -> MapsResult:
-            texels = rasterise(scan.mesh, size)
-            own = from_fit(result)
-            return baked_maps(result.capture, scan, texels, surface, own, made_uv)
-
-        maps = yield from in_background(bake, None)
+        with tempfile.TemporaryDirectory(prefix="patina_maps_", dir=bpy.app.tempdir) as folder:
+            baking = BakeJob(result, scan, made_uv, size, Path(folder))
+            baked = yield from relayed(in_child_of_window(baking), lambda step: None)
+            return (yield from _applied(scene, baked))
     except PatinaError as error:
         return [f"The materials vary over the surface, but are shown as even, because {error}"]
-    with tempfile.TemporaryDirectory(prefix="patina_maps_") as name:
-        folder = Path(name)
-        # colours in sRGB: Blender's glTF exporter writes linear ones as if they were in sRGB
-        files = yield from in_background(lambda: write_maps(folder, maps, "exr", "png"), None)
-        before = set(bpy.data.images)
-        notes = apply_maps(scene, maps, folder, files)
-        for image in set(bpy.data.images) - before:
-            image.pack()
-            image[MAP_KIND] = True
-            image.filepath = f"//{image.name}"  # where Blender would unpack it
-            yield
+
+
+def _applied(scene: bpy.types.Scene, baked: BakeJob) -> Generator[None, None, list[str]]:
+    """Put the maps on the materials, and pack them; one piece per step. Returns notes."""
+    maps = finished(baked.maps)
+    before = set(bpy.data.images)
+    notes = apply_maps(scene, maps, baked.folder, baked.files)
+    for image in set(bpy.data.images) - before:
+        image.pack()
+        image[MAP_KIND] = True
+        image.filepath = f"//{image.name}"  # where Blender would unpack it
+        yield
     return [*maps.notes, *notes]
 
 

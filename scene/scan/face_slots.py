@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import bpy
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ...core.capture import Capture, MaterialEntry
 from ...core.capture.model import EXCLUDED_MASKS
-from ...core.errors import InputError, PatinaError
-from ...core.scan import Scan
+from ...core.errors import PatinaError
+from ...core.inputs.face_slots import FaceSlots
 from ..property_keys import (
     CAPTURE,
     FIT_SLOTS,
@@ -29,8 +29,6 @@ COLOURS = (
 )  # fmt: skip
 FIRST_MATERIAL = "surface"  # name of the only material before any is painted
 FORBIDDEN = set('/\\:*?"<>|')  # characters that file names cannot have on all systems
-
-Prepare = Callable[[Scan], Scan]
 
 
 def show_proposal(
@@ -107,7 +105,9 @@ def reassign_slots(mesh: bpy.types.Object, capture: str) -> None:
     data[CAPTURE] = capture
 
 
-def with_painted_slots(capture: Capture, scene: bpy.types.Scene) -> tuple[Capture, Prepare | None]:
+def with_painted_slots(
+    capture: Capture, scene: bpy.types.Scene
+) -> tuple[Capture, FaceSlots | None]:
     """(the capture with a material for every used slot, function that adds the slots to its scan).
 
     If the user has not enabled the slots (Scene.patina.use_slots), the result is (capture, None).
@@ -142,7 +142,9 @@ def with_painted_slots(capture: Capture, scene: bpy.types.Scene) -> tuple[Captur
     )
     materials = tuple(MaterialEntry(name, faces=FIT_SLOTS) for name in names)
     faces = place.ravel().astype(np.int32)
-    return replace(capture, materials=materials, photos=photos), _add_slots(faces, target.name)
+    return replace(capture, materials=materials, photos=photos), FaceSlots(
+        FIT_SLOTS, faces, target.name
+    )
 
 
 def shown_name(material: bpy.types.Material) -> str:
@@ -156,19 +158,6 @@ def leave_edit_mode(target: bpy.types.Object) -> None:
     if target.data.is_editmode:
         with bpy.context.temp_override(active_object=target, object=target):
             bpy.ops.object.mode_set(mode="OBJECT")
-
-
-def _add_slots(faces: NDArray[np.int32], name: str) -> Prepare:
-    def prepare(scan: Scan) -> Scan:
-        if len(scan.mesh.faces) != len(faces):
-            raise InputError(
-                f"{name} has {len(faces):,} faces, the scan has {len(scan.mesh.faces):,}; import "
-                "the capture again, or disable Fit These Materials"
-            )
-        attributes = {**scan.mesh.face_attributes, FIT_SLOTS: faces}
-        return replace(scan, mesh=replace(scan.mesh, face_attributes=attributes))
-
-    return prepare
 
 
 def _capture_name(material: bpy.types.Material | None, slot: int) -> str:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 
 import bpy
+import numpy as np
+from numpy.typing import NDArray
 
-from ...core.concurrency.background import in_background
 from ...core.varying.varying_surface import VaryingSurface
 from ...core.views.surface_view import QUANTITIES, at_vertices
 from ..property_keys import VARIATION_COLOURS
@@ -16,19 +17,20 @@ MIN_VERTICES = 500  # of the mesh, below which its vertices are too far apart to
 
 
 def paint_variation_steps(
-    thing: bpy.types.Object | None, surface: VaryingSurface | None
+    thing: bpy.types.Object | None,
+    surface: VaryingSurface | None,
+    colours: Mapping[str, NDArray[np.float32]] | None = None,
 ) -> Generator[None, None, None]:
     """Write the attributes of a fit, in place of those of an earlier one. None are written where
     the mesh no longer has the vertices of the scan, or too few. surface: None where all materials
-    are even. One piece per step."""
+    are even. colours: at_vertices(surface), if it is computed already. One piece per step."""
     if thing is None or thing.type != "MESH":
         return
     drop_vertex_colours(thing.data, VARIATION_COLOURS)
     count = len(thing.data.vertices)
     if surface is None or count < MIN_VERTICES or count != len(surface.grid.mesh.vertices):
         return
-    found = yield from in_background(lambda: at_vertices(surface), None)
-    for kind, values in found.items():
+    for kind, values in (colours or at_vertices(surface)).items():
         paint_vertices(thing.data, VARIATION_COLOURS + kind, values)
         yield
 

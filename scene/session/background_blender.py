@@ -6,20 +6,21 @@ from __future__ import annotations
 import os
 import re
 import subprocess
-import sys
 import tempfile
 from collections.abc import Generator, Mapping, Sequence
 from pathlib import Path
 
 import bpy
 
+from ...core.child_process.parent_watch import END_WITH_PARENT
+from ...core.child_process.python_command import python_command, python_environment
 from ...core.concurrency.job import Step
 from ...core.errors import PatinaError
 
 HEADLESS = Path(__file__).parents[2] / "headless.py"
 PACKAGE = __package__.rsplit(".", 2)[0]
 POLL_INTERVAL = 0.05  # seconds between checks of the process
-TERMINATION_TIMEOUT = 10.0  # seconds between asking the process to end and killing it
+TERMINATION_TIMEOUT = 1.0  # seconds between asking the process to end and killing it
 PROGRESS = re.compile(r"^\[\s*(\d+) %\] (.*)$")
 ERROR_PREFIX = "patina: "  # of a one-line error message of the command
 NO_WINDOW = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # otherwise Windows opens a console
@@ -30,7 +31,7 @@ def command(words: Sequence[str]) -> list[str]:
     module."""
     binary = bpy.app.binary_path
     if not binary:
-        return [sys.executable, str(HEADLESS), *words]
+        return python_command("commands.registered", *words)
     factory = ["--factory-startup"] if bpy.app.factory_startup else []
     enabled = ["--addons", PACKAGE] if PACKAGE in bpy.context.preferences.addons else []
     return [
@@ -49,14 +50,15 @@ def in_background(
     Raises PatinaError with the message of the command if it fails.
     """
     with tempfile.TemporaryDirectory(prefix="patina-", ignore_cleanup_errors=True) as folder:
+        own = python_environment() if not bpy.app.binary_path else os.environ
         messages = Path(folder) / "said.txt"
         with messages.open("wb") as out:
             process = subprocess.Popen(
                 command(words),
-                stdin=subprocess.DEVNULL,
+                stdin=subprocess.PIPE,  # is closed when this Blender ends
                 stdout=subprocess.DEVNULL,
                 stderr=out,
-                env={**os.environ, **(environment or {})},
+                env={**own, **(environment or {}), END_WITH_PARENT: "1"},
                 creationflags=NO_WINDOW,
             )
         try:
@@ -79,6 +81,8 @@ def _runs(process: subprocess.Popen[bytes], seconds: float) -> bool:
 
 def _end(process: subprocess.Popen[bytes]) -> None:
     if process.poll() is None:
+        if process.stdin is not None:
+            process.stdin.close()
         process.terminate()  # the command removes its incomplete files
         if _runs(process, TERMINATION_TIMEOUT):
             process.kill()

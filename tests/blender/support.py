@@ -55,4 +55,6 @@ def without_window(operator: type, **properties: object):
     }
     made = type("Ticked", plain, own)()
     made._start(bpy.context)
+    if hasattr(made, "_begin"):  # a Stepped operator
+        made._begin()
     return made

@@ -35,12 +35,12 @@ class QuickFits:
     """Immediate fits of portable models: the order of updates is tested, not their quality."""
 
     def __enter__(self):
-        self.module = extension("scene.material.trait_update")
+        self.module = extension("core.views.prepared_materials")
         self.fits = self.module.fit_principled, self.module.fit_lobe_stack
         principled, lobes = self.fits
         self.module.fit_principled = lambda evaluate: principled(evaluate, False, (10, 4, 3))
         self.module.fit_lobe_stack = lambda evaluate: lobes(evaluate, 1, False)
-        return self.module
+        return extension("scene.material.trait_update")
 
     def __exit__(self, *_):
         self.module.fit_principled, self.module.fit_lobe_stack = self.fits

@@ -188,12 +188,15 @@ def test_no_file_is_longer_than_500_lines() -> None:
 
 def test_shipped_code_neither_changes_search_path_nor_evaluates_strings() -> None:
     pattern = re.compile(
-        r"sys\.path\s*(\.|\+=|=|\[)|(?<![.\w])(eval|exec)\(|\bpickle\b|\bpip install"
+        r"sys\.path\s*(\.|\+=|=|\[)|sys\.modules\s*(\.(?!items)|\[)|(?<![.\w])(eval|exec)\("
+        r"|\bpickle\b|\bpip install"
     )
     found = [
-        f"{path.relative_to(ROOT)}:{number} {line.strip()}"
+        (path.relative_to(ROOT).as_posix(), line.strip())
         for path in sources(".", *ROOMS)
-        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        for line in path.read_text(encoding="utf-8").splitlines()
         if pattern.search(line)
     ]
-    assert not found
+    # the objects that a child process gets from its parent and returns to it, and no other file
+    assert {file for file, _ in found} <= {"core/child_process/object_files.py"}, found
+    assert all("pickle" in line for _, line in found), found

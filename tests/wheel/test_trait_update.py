@@ -16,6 +16,7 @@ from patina.core.angles import half_difference  # noqa: E402
 from patina.core.appearance.principled_fit import fit_principled  # noqa: E402
 from patina.core.appearance.traits import ShiftableAlbedo, excess  # noqa: E402
 from patina.core.basis import PrincipalBRDF, default_basis  # noqa: E402
+from patina.core.views import prepared_materials  # noqa: E402
 from patina.scene.material import (  # noqa: E402
     material_nodes,
     osl_files,
@@ -40,7 +41,7 @@ def sliders(monkeypatch) -> Iterator[None]:
     def quick(evaluate):
         return fit_principled(evaluate, coat=False, nodes=(10, 4, 3))
 
-    monkeypatch.setattr(trait_update, "fit_principled", quick)
+    monkeypatch.setattr(prepared_materials, "fit_principled", quick)
     trait_properties.register()
     trait_update.register()
     yield

@@ -14,12 +14,11 @@ from ...concurrency.job import Step, finished
 from ...concurrency.steps import relayed
 from ...errors import PatinaError
 from ...inputs.separated_materials import (
+    SeparatedFaces,
     can_separate,
     separated_names,
-    separated_scan,
     with_separated,
 )
-from ...scan import Scan
 from ...varying.choice import MIN_PHOTOS
 from ...varying.separation import divide, division_improves, features, second_at
 from ...varying.varying_surface import ALL_VARIATIONS
@@ -157,10 +156,5 @@ def _fit_of(
     fit: FitJob, before: CaptureResult, names: Sequence[str], labels: NDArray[np.intp]
 ) -> FitJob:
     """The fit of separated materials. labels: (f,) material of each face, −1 for none."""
-    earlier = fit.prepare
-
-    def prepare(scan: Scan) -> Scan:
-        return separated_scan(scan if earlier is None else earlier(scan), labels)
-
-    capture = with_separated(fit.capture, names)
+    capture, prepare = with_separated(fit.capture, names), SeparatedFaces(labels, fit.prepare)
     return FitJob(capture, before.basis, prepare, fit.threads, fit.keep, portable=False)
