@@ -8,6 +8,7 @@
 #                                       that `run.py headless` installed)
 #   real_blender.sh own DIR NAME OUT    tools/window/own_shoots.py: an own object by mouse, from the
 #                                       folder NAME in the home folder's Scans, or "demo"
+#   real_blender.sh ended DIR OUT       tools/window/ended_process.py: the process of a fit is ended
 # Debian's build has no OSL and no USD; these are tested with the bpy wheel.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -68,10 +69,11 @@ blender)
   bind "$dir" "${PATINA_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/patina}"
   bind "$dir" "$PWD"
   exec chroot "$dir" /bin/bash -c 'cd "$0" && exec blender "$@"' "$PWD" "$@" ;;
-session | own)
+session | own | ended)
   dir=$1; shift
   script=(tools/window/session.py --)
   if [ "$what" = own ]; then script=(tools/window/own_shoots.py -- "$1"); shift; fi
+  if [ "$what" = ended ]; then script=(tools/window/ended_process.py --); fi
   mkdir -p "$1"; out=$(realpath "$1")
   cache=${PATINA_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/patina}
   system "$dir"
@@ -84,6 +86,11 @@ session | own)
     cd "$0"; export LIBGL_ALWAYS_SOFTWARE=1
     exec xvfb-run --auto-servernum -s "-screen 0 1600x1000x24 +extension GLX" timeout 1800 \
       blender --factory-startup --addons bl_ext.user_default.patina --window-geometry 0 0 1600 1000 \
-      -P "$@"' "$here" "${script[@]}" "$out" ;;
-*) sed -n '2,11p' "$0"; exit 2 ;;
+      -P "$@"' "$here" "${script[@]}" "$out"
+  if [ "$what" = ended ]; then # the process of the last fit ends with Blender
+    left=$(grep -A1 '"left"' "$out/ended.json" | grep -oE '[0-9]+')
+    sleep 1.5
+    if [ -d "/proc/$left" ]; then echo "process $left has outlived its Blender"; exit 1; fi
+  fi ;;
+*) sed -n '2,12p' "$0"; exit 2 ;;
 esac

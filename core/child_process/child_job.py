@@ -133,7 +133,7 @@ class ChildJob(Generic[AnyJob]):
             )
         if code == -getattr(signal, "SIGKILL", 9) and sys.platform != "win32":
             return (
-                "The system ended the process of this job (SIGKILL), mostly because memory ran "
+                "The system ended the process of this job (SIGKILL), most often because memory ran "
                 f"out; nothing was changed. {MEMORY_ADVICE}"
             )
         return (

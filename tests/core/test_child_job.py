@@ -32,7 +32,7 @@ linux = pytest.mark.skipif(sys.platform != "linux", reason="signals and /proc of
 
 def small_fit(**options) -> FitJob:
     capture = patina.select_photos(patina.load_capture(patina.DEMO_CAPTURE), range(4))
-    return FitJob(capture, **options)
+    return FitJob(capture, **{"portable": False, **options})
 
 
 def run(child: ChildJob) -> float:
@@ -60,7 +60,7 @@ def fitted(tmp_path_factory) -> tuple[FitJob, Path, float]:
     """(the job that ran in a child, folder of its files, longest step)"""
     folder = tmp_path_factory.mktemp("children")
     default_basis()
-    child = ChildJob(small_fit(), folder)
+    child = ChildJob(small_fit(portable=True), folder)
     longest = run(child)
     return child.result, folder, longest
 
@@ -73,7 +73,7 @@ def test_a_child_finds_the_result_of_this_process_and_never_blocks_it(fitted):
     for one, other in zip(found.materials, expected.materials, strict=True):
         np.testing.assert_array_equal(one.fit.brdf.coefficients, other.fit.brdf.coefficients)
     np.testing.assert_array_equal(found.face_material, expected.face_material)
-    assert [stage.name for stage in job.stages] == [stage.name for stage in own.stages]
+    assert {stage.name for stage in own.stages} < {stage.name for stage in job.stages}
     assert longest < 0.1, "seconds"
     assert found.basis is default_basis(), "the embedded basis is not copied"
     # the ray tracer is built again where it is used
@@ -149,7 +149,7 @@ def test_arrays_of_a_file_can_be_changed_without_changing_the_file(tmp_path):
             partial(os.kill, 0, 0) if sys.platform == "win32" else partial(
                 signal.raise_signal, getattr(signal, "SIGKILL", 9)
             ),
-            "The system ended the process of this job .SIGKILL., mostly because memory ran out",
+            "The system ended the process of this job .SIGKILL., most often because memory ran out",
             marks=linux,
         ),
     ],
