@@ -20,6 +20,7 @@ COMMANDS = {
     "pictures": ("tools.make_pictures", "render the pictures of docs/images again"),
     "experiments": ("tools.experiments", "run the experiments of docs/method/experiments.md"),
     "hunt": ("tools.hunt.table", "diagnose simulated captures with a hidden effect"),
+    "torture": ("tools.torture", "kill commands at random, and check that no result is lost"),
     "bench": ("tools.bench_main", "run the benchmarks behind the figures in docs/"),
 }
 """Command → (entry point, help text). A MODULE:FUNCTION is called in this process with the

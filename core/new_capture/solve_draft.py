@@ -9,8 +9,7 @@ from pathlib import Path
 
 from ..concurrency.job import Job, Step
 from ..counted import counted
-from ..output_folder import check_out, staged_folder
-from ..solve import SolveJob
+from ..solve import SolveToFolderJob
 from ..solve.solution import MODEL
 from .draft import Draft
 from .draft_job import DraftJob
@@ -32,8 +31,8 @@ class SolveDraftJob(Job):
         followed by "solved". Raises InputError."""
         super().__init__()
         self.before, self.folder = draft, folder
-        self.out = check_out(out or folder.with_name(f"{folder.name} solved"))
-        self._solve = SolveJob(folder)
+        self._solve = SolveToFolderJob(folder, out or folder.with_name(f"{folder.name} solved"))
+        self.out = self._solve.out
         self.draft: Draft | None = None
         self.summary = ""
 
@@ -41,10 +40,7 @@ class SolveDraftJob(Job):
         """The steps."""
         for step in self._solve.run():
             yield Step(step.stage, SOLVE_SHARE * step.fraction)
-        solution = self._solve.solution
-        self.summary = solution.summary()
-        with staged_folder(self.out, "solve") as staging:
-            solution.write(staging, self.out, self.folder)
+        self.summary, missing = self._solve.summary, self._solve.missing
         files = [photo.file for photo in self.before.photos]
         others = [file for file in files if file.parent != self.folder]
         draft = replace(self.before, photos=tuple(
@@ -55,7 +51,6 @@ class SolveDraftJob(Job):
         for step in match.run():
             yield Step(step.stage, SOLVE_SHARE + (1 - SOLVE_SHARE) * step.fraction)
         assert match.draft is not None  # the job ran to its end
-        missing = solution.photos - solution.placed
         problem = f"{counted(missing, 'photo')} of the scan without a pose: see report.txt"
         problems = (*match.draft.problems, problem) if missing else match.draft.problems
         self.draft = replace(match.draft, problems=problems)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from html import escape
 from pathlib import Path
 
+from ..concurrency.ordered_map import ordered_map
 from ..concurrency.steps import drained
+from ..concurrency.thread_pool import thread_count, thread_pool
 from ..counted import counted
 from ..fit import PaperFit
 from ..jobs import CaptureResult
@@ -18,20 +21,38 @@ from .material_section import material_section
 
 STYLE = Path(__file__).parents[2] / "assets" / "report" / "style.css"
 MAX_SIDE = 640  # pixels of a picture in a row of photos
+LOOK_SIDE = 960  # pixels along the object that are predicted: more than a picture shows
+PHOTOS_AT_ONCE = 2  # limits memory: each has a photo in its full size for a moment
 
 
-def write_report(folder: Path, result: CaptureResult) -> Iterator[float]:
-    """Write index.html and its pictures into ``folder``; yields the fraction done."""
+def write_report(
+    folder: Path, result: CaptureResult, threads: int | None = None
+) -> Iterator[float]:
+    """Write index.html and its pictures into ``folder``; yields the fraction done. threads: None
+    for one per core."""
     folder.mkdir(parents=True, exist_ok=True)
-    body = [f"<p>Included in the fit: {escape(e.sentence)}</p>" for e in result.effects]
     photos = [result.capture.photo_name(place) for place in range(len(result.capture.photos))]
-    count = len(result.materials) + len(result.capture.photos)
-    for done, material in enumerate(result.materials):
-        yield done / count
-        body.append(material_section(folder, material, photos))
+    sections: list[Callable[[], str | photo_view.PhotoView]] = [
+        partial(material_section, folder, material, photos) for material in result.materials
+    ]
     # the predictions use the light and camera of the capture, without the causes of a diagnosis
     if not result.effects:
-        yield from _photo_rows(folder, result, body)
+        sections += [partial(_looked_at, result, place) for place in range(len(photos))]
+    body = [f"<p>Included in the fit: {escape(e.sentence)}</p>" for e in result.effects]
+    rows, found_criteria, factors = [], set[Criterion](), set[int]()
+    with thread_pool(min(thread_count(threads), PHOTOS_AT_ONCE)) as pool:
+        made = ordered_map(pool, lambda section: section(), sections, PHOTOS_AT_ONCE - 1)
+        for done, section in enumerate(made):
+            yield done / len(sections)
+            if isinstance(section, str):
+                body.append(section)
+                continue
+            found_criteria.update(section.shares)
+            factors.add(section.factor)
+            rows.append(_photo_row(folder, section))
+    if rows:
+        paper = any(isinstance(m.fit, PaperFit) for m in result.materials)
+        body += [_head_of_photos(found_criteria, paper, max(factors)), *rows]
     head = (
         f"{counted(len(result.capture.photos), 'lit photo')} · "
         f"{counted(len(result.scan.mesh.faces), 'face')} · basis {result.basis.version}"
@@ -51,34 +72,33 @@ def page(name: str, body: str, head: str = "") -> str:
     )
 
 
-def _photo_rows(folder: Path, result: CaptureResult, body: list[str]) -> Iterator[float]:
-    """Add a row for each photo to ``body``; yields the fraction done of the whole report."""
-    count = len(result.materials) + len(result.capture.photos)
-    body.append("")  # placeholder: the legend lists only the criteria that the photos show
-    place_of_head, found_criteria = len(body) - 1, set[Criterion]()
-    for place in range(len(result.capture.photos)):
-        yield (len(result.materials) + place) / count
-        view = drained(
-            photo_view.look_at_photo(
-                result.capture,
-                result.scan,
-                result.rays,
-                result.photos,
-                result.lights,
-                [(m.name, m.fit.brdf, m.scale) for m in result.materials],
-                place,
-                photo_view.chosen_pixels([m.fit for m in result.materials], place),
-                result.varying,
-            )
+def _looked_at(result: CaptureResult, place: int) -> photo_view.PhotoView:
+    """A photo and its prediction, at about the size of its pictures."""
+    return drained(
+        photo_view.look_at_photo(
+            result.capture,
+            result.scan,
+            result.rays,
+            result.photos,
+            result.lights,
+            [(m.name, m.fit.brdf, m.scale) for m in result.materials],
+            place,
+            photo_view.chosen_pixels([m.fit for m in result.materials], place),
+            result.varying,
+            LOOK_SIDE,
         )
-        found_criteria.update(view.shares)
-        body.append(_photo_row(folder, view))
-    paper = any(isinstance(m.fit, PaperFit) for m in result.materials)
-    body[place_of_head] = _head_of_photos(found_criteria, paper)
+    )
 
 
-def _head_of_photos(found_criteria: set[Criterion], ringed: bool) -> str:
-    """HTML heading and legend of the rows of photos; found_criteria: those in any photo."""
+def _head_of_photos(found_criteria: set[Criterion], ringed: bool, factor: int) -> str:
+    """HTML heading and legend of the rows of photos; found_criteria: those in any photo; factor: by
+    which the photos are reduced at most."""
+    reduced = (
+        ""
+        if factor == 1
+        else f" Large photos are reduced first, up to {factor} × {factor} pixels to one: errors "
+        "and shares are those of the reduced photos."
+    )
     rings = " Rings: the pixels that the fit uses." if ringed else ""
     looks = [LOOKS[criterion] for criterion in sorted(found_criteria)]
     rows = "".join(
@@ -91,8 +111,8 @@ def _head_of_photos(found_criteria: set[Criterion], ringed: bool) -> str:
         "light and cast shadows. Difference: <span class='key'></span> prediction too dark … too "
         "bright, full colour at ± 30 % of the photo's white. Dark grey: no surface or no material. "
         "The last picture shows the criterion that decided about each pixel; the list below it "
-        f"gives the share of the surface for each criterion.{rings}</p><details><summary>The "
-        f"criteria, and what to do</summary><table>{rows}</table></details>"
+        f"gives the share of the surface for each criterion.{rings}{reduced}</p><details><summary>"
+        f"The criteria, and what to do</summary><table>{rows}</table></details>"
     )
 
 

@@ -46,11 +46,18 @@ class PhotoFeatures:
     colours: NDArray[np.uint8]
 
 
-def solve(photos: Sequence[PhotoFile], lens: str, threads: int | None, work: Work) -> Solution:
-    """Cameras of all photos that can be placed. Raises PatinaError where there are too few."""
+def solve(
+    photos: Sequence[PhotoFile],
+    lens: str,
+    threads: int | None,
+    work: Work,
+    scratch: Path | None = None,
+) -> Solution:
+    """Cameras of all photos that can be placed. scratch: folder for temporary files; None: that of
+    the system. Raises PatinaError where there are too few."""
     _check_count(len(photos), "")
     cores = threads or os.cpu_count() or 1
-    with tempfile.TemporaryDirectory(prefix="patina-solve-") as folder:
+    with tempfile.TemporaryDirectory(prefix="patina-solve-", dir=scratch) as folder:
         store = FeatureStore(Path(folder) / "features.db", lens)
         try:
             colours, first, unreadable = _extract(photos, store, cores, work)

@@ -27,6 +27,13 @@ from ..scan import Camera, Scan
 from ..varying.node_model import NodeModel
 from ..varying.varying_surface import VaryingSurface, predict_varying
 from . import display
+from .reduced_photo import (
+    reduced_camera,
+    reduced_margins,
+    reduced_masks,
+    reduced_photo,
+    reduction,
+)
 
 MARGIN = 12  # pixels around the object
 BAND_PIXELS = 1 << 15  # pixels of a band: a tenth of a second with its prediction
@@ -51,7 +58,7 @@ class PhotoView:
     (k, 2) int, row and column in the box of the pixels that a fit uses, where they are known;
     white: the radiance shown as white; error: ‖predicted − measured‖ / ‖measured‖ where there is a
     prediction, including edges and shadows; counts: (criteria,) number of pixels of the surface
-    for each criterion.
+    for each criterion; factor: a pixel here is the mean of factor × factor pixels of the photo.
     """
 
     place: int
@@ -65,6 +72,7 @@ class PhotoView:
     white: float
     error: float
     counts: NDArray[np.int64]
+    factor: int = 1
 
     @property
     def surface(self) -> int:
@@ -136,21 +144,25 @@ def look_at_photo(
     place: int,
     used: NDArray[np.integer] | None = None,
     varying: VaryingSurface | None = None,
+    side: int | None = None,
 ) -> Generator[float, None, PhotoView]:
     """Predict one photo and classify its pixels, band by band; yields the fraction done. Raises
     InputError for masks or photos that cannot be read.
 
     brdfs: of some or all materials of the capture, of any fit. used: (k,) flat indices in the
     photo of the pixels that a fit uses (see chosen_pixels). varying: how these materials vary over
-    the surface, None if they are even.
+    the surface, None if they are even. side: the photo is reduced so far that the object is still
+    so many pixels long; None: it is not reduced.
     """
-    camera = capture_data.camera_of(capture, scan, place)
-    masks = capture_data.photo_masks(capture, place)
+    full = capture_data.camera_of(capture, scan, place)
+    factor = 1 if side is None else reduction(full, rays, side)
+    camera = reduced_camera(full, factor)
+    masks = reduced_masks(capture_data.photo_masks(capture, place), factor)
     light = lights.of(capture, place)
     yield 0.0
-    photo = photos.read(place)
+    photo = reduced_photo(photos.read(place), factor)
     lines = PixelRays.of(camera)
-    margins, limit = capture.fit.margins, _curvature_limit(capture)
+    margins, limit = reduced_margins(capture.fit.margins, factor), _curvature_limit(capture)
     index_of = {material.name: index for index, material in enumerate(capture.materials)}
     windows = list(bands(camera, halo(margins), rays.cover.columns(camera), BAND_PIXELS))
     canvas = _Canvas.around(windows, camera)
@@ -187,7 +199,10 @@ def look_at_photo(
         canvas.material.reshape(-1)[target] = material[view.wanted]
         canvas.predicted.reshape(-1, 3)[target] = predicted[view.wanted]
     yield (1 + len(windows)) / (2 + len(windows))
-    return _cropped(capture, camera, photo, canvas, place, used)
+    if used is not None:
+        row, column = np.divmod(np.asarray(used, np.intp), full.width)
+        used = row // factor * camera.width + column // factor
+    return _cropped(capture, camera, photo, canvas, place, used, factor)
 
 
 def chosen_pixels(
@@ -224,6 +239,7 @@ def _cropped(
     canvas: _Canvas,
     place: int,
     used: NDArray[np.integer] | None,
+    factor: int,
 ) -> PhotoView:
     """The PhotoView, cropped to the surface and a margin."""
     surface = canvas.criteria != Criterion.NO_SURFACE
@@ -252,6 +268,7 @@ def _cropped(
         white=display.white_level(measured[surface[inner]]),
         error=relative_error(predicted, measured),
         counts=np.bincount(canvas.criteria[surface], minlength=len(Criterion)),
+        factor=factor,
     )
 
 
