@@ -20,6 +20,7 @@ DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130  # exit codes; shells use 130 for SIG
 COMMANDS = {
     "fit": "fit",
     "diagnose": "diagnose",
+    "batch": "batch",
     "import": "import_",
     "masks": "masks",
     "maps": "maps",

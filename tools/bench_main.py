@@ -29,8 +29,9 @@ BENCHES = (
     "speed",
     "traits",
     "steps",
+    "batch",
 )
-WITHOUT_DATA = ("renders", "large", "speed", "traits", "steps")  # need no reference data
+WITHOUT_DATA = ("renders", "large", "speed", "traits", "steps", "batch")  # need no reference data
 
 
 def main() -> int:

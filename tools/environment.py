@@ -29,6 +29,8 @@ TEST_TOOLS = [
     "usd-core==26.11",  # these three validate exported files
     "MaterialX==1.39.5",
     "mitsuba==3.9.1",
+    "distributed==2026.8.0",  # likewise: batches
+    "openjd-cli==0.8.0",  # checks the job templates of batches
     "matplotlib==3.10.7",  # draws the charts of the experiments
     "ruff==0.13.3",
     "mypy==1.18.2",

@@ -1,5 +1,5 @@
 """Jobs in a process of their own: Blender stays responsive, and outlives a crash of the job."""
 
-from .child_job import ChildJob, run_in_child
+from .child_job import ChildJob
 
-__all__ = ["ChildJob", "run_in_child"]
+__all__ = ["ChildJob"]

@@ -8,7 +8,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Generator
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -140,18 +139,6 @@ class ChildJob(Generic[AnyJob]):
             f"The process of this job ended unexpectedly ({_exit_name(code)}); nothing was "
             f"changed. If memory ran out: {MEMORY_ADVICE[0].lower()}{MEMORY_ADVICE[1:]}"
         )
-
-
-def run_in_child(job: AnyJob, parent: Path) -> Generator[Step, None, AnyJob]:
-    """Run a job in a child process; yields its steps and returns it. Closing the generator ends the
-    child. parent: as of ChildJob. Raises what ChildJob.step raises."""
-    child = ChildJob(job, parent)
-    try:
-        while child.step():
-            yield child.now
-        return child.result
-    finally:
-        child.end()
 
 
 def _exit_name(code: int) -> str:

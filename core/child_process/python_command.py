@@ -21,8 +21,14 @@ def python_command(module: str, *words: str) -> list[str]:
 
 def python_environment() -> dict[str, str]:
     """The environment in which that Python imports what this process imports."""
-    folders = [str(ROOT.parent), *(folder for folder in sys.path if folder)]
+    own = [folder for folder in sys.path if folder and not _is_blenders(Path(folder))]
+    folders = [str(ROOT.parent), *own]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(folders), "PYTHONSAFEPATH": "1"}
+
+
+def _is_blenders(folder: Path) -> bool:
+    """Whether a folder holds Blender's scripts, whose module bpy only works within Blender."""
+    return (folder / "addon_utils.py").is_file()
 
 
 def _python() -> Path:

@@ -10,7 +10,7 @@ from typing import TypeVar
 import bpy
 
 from ...core.basis import default_basis
-from ...core.child_process import ChildJob, run_in_child
+from ...core.child_process import ChildJob
 from ...core.concurrency.job import Job, Step
 
 AnyJob = TypeVar("AnyJob", bound=Job)
@@ -21,6 +21,7 @@ _ending: list[ChildJob] = []
 def start_child(job: AnyJob) -> ChildJob[AnyJob]:
     """Start a job in a child process. Its files are in Blender's temporary folder. Raises
     PatinaError and OSError."""
+    _look()  # without a window no timer does it
     default_basis()  # loaded here: results refer to it, and reading them must not take long
     return ChildJob(job, _folder())
 
@@ -28,7 +29,13 @@ def start_child(job: AnyJob) -> ChildJob[AnyJob]:
 def in_child(job: AnyJob) -> Generator[Step, None, AnyJob]:
     """Run a job in a child process; yields its steps and returns it. Raises the errors of the
     job."""
-    return (yield from run_in_child(job, _folder()))
+    child = start_child(job)
+    try:
+        while child.step():
+            yield child.now
+        return child.result
+    finally:
+        end_child(child)
 
 
 def in_child_of_window(job: AnyJob) -> Generator[Step, None, AnyJob]:
@@ -41,13 +48,10 @@ def in_child_of_window(job: AnyJob) -> Generator[Step, None, AnyJob]:
 
 
 def end_child(child: ChildJob) -> None:
-    """End a child. In a window Blender does not wait for it."""
-    if bpy.app.background:
-        child.end()
-        return
+    """End a child. Blender does not wait for it."""
     child.request_end()
     _ending.append(child)
-    if not bpy.app.timers.is_registered(_look):
+    if not bpy.app.background and not bpy.app.timers.is_registered(_look):
         bpy.app.timers.register(_look, first_interval=POLL_INTERVAL, persistent=True)
 
 

@@ -26,6 +26,9 @@ LIBRARIES = {"numpy", "scipy", "pycolmap", "OpenImageIO", "embreex"} | {
     "tomlkit",
     "rawpy",  # where it exists
     "flip_evaluator",  # likewise
+    "distributed",  # likewise, with the next two
+    "cloudpickle",
+    "psutil",
 }
 BLENDER = {
     "bpy",

@@ -1,0 +1,184 @@
+"""``batch COLLECTION --out DIR``: a command over many captures, on all cores or on a cluster."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..core.batch.cluster import Limits, Work, run_on_cluster
+from ..core.batch.collection import read_collection
+from ..core.batch.farm_files import write_flamenco, write_openjd
+from ..core.batch.page import PAGE, write_page
+from ..core.batch.record import Finished, finished, input_hash
+from ..core.batch.rig_errors import rig_errors
+from ..core.batch.summary import FAILED, Summary, summary_of
+from ..core.child_process.parent_watch import END_WITH_PARENT
+from ..core.child_process.python_command import ROOT, python_command, python_environment
+from ..core.counted import counted
+from ..core.errors import InputError, PatinaError
+from ..core.jobs.varying.variation_estimator import MODES
+from ..core.output_folder import check_out
+from ..core.report.result_json import program_version
+from .needs_blender import has_blender
+from .progress import print_note
+
+HELP = "fit or diagnose all captures of a collection, on all cores or on a cluster"
+PAGE_INTERVAL = 5.0  # seconds between two versions of the page
+FORMATS = ("openjd", "flamenco")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "collection", type=Path,
+        help="folder of captures, list of capture files, or table (CSV) with a column 'capture'",
+    )  # fmt: skip
+    parser.add_argument("--out", type=Path, required=True, help="folder for the results")
+    parser.add_argument(
+        "--run", dest="task", choices=("fit", "diagnose"), default="fit",
+        help="what to run for each object (default %(default)s)",
+    )  # fmt: skip
+    parser.add_argument("--varying", choices=MODES, default="never", help="as of fit")
+    parser.add_argument(
+        "--workers", type=int, default=1,
+        help="processes at a time on this computer (default %(default)s)",
+    )  # fmt: skip
+    parser.add_argument("--threads", type=int, help="threads of each process")
+    parser.add_argument("--scheduler", help="address of a Dask scheduler, in place of --workers")
+    parser.add_argument("--memory", type=float, default=0.0, help="limit of a process, GB")
+    parser.add_argument("--time", type=float, default=0.0, help="limit of a process, seconds")
+    parser.add_argument(
+        "--attempts", type=int, default=2,
+        help="runs before an object counts as failed (default %(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--program", help="command that runs Patina on the workers, such as 'blender -b -P "
+        "headless.py --' (default: this Python, which writes no scene.blend without bpy)",
+    )  # fmt: skip
+    parser.add_argument("--to", choices=FORMATS, help="only write a job for this engine")
+
+
+def run(arguments: argparse.Namespace) -> None:
+    limits = Limits(arguments.memory, arguments.time, arguments.attempts)
+    for value, key in (
+        (arguments.workers, "--workers"),
+        (arguments.attempts, "--attempts"),
+        (arguments.memory + 1, "--memory"),
+        (arguments.time + 1, "--time"),
+    ):
+        if value < 1:
+            raise InputError("found a number that is too small", key=key)
+    out = check_out(arguments.out)
+    work = _work(arguments, out)
+    out.mkdir(parents=True, exist_ok=True)
+    if arguments.to:
+        path = (
+            write_openjd(out, work, limits)
+            if arguments.to == "openjd"
+            else write_flamenco(out, work)
+        )
+        print(f"wrote {path}")
+        return
+    summaries, left = _known(out, work)
+    if len(left) < len(work):
+        print_note(f"{counted(len(work) - len(left), 'object')} finished before.")
+    _run_all(arguments, out, left, limits, summaries)
+    done = list(summaries.values())
+    write_page(out, done, running=False)
+    for error in rig_errors(done):
+        print(error.sentence)
+    failed = [one for one in done if one.state == FAILED]
+    print(f"{len(done) - len(failed)} of {counted(len(done), 'object')} finished")
+    print(f"wrote {out / PAGE}")
+    if failed:
+        names = ", ".join(one.item.name for one in failed[:5])
+        raise PatinaError(
+            f"{counted(len(failed), 'object')} failed ({names}{' …' if failed[5:] else ''}); "
+            f"{out / PAGE} has the reasons. Run the command again to try only these"
+        )
+
+
+def _work(arguments: argparse.Namespace, out: Path) -> list[Work]:
+    """What to run for each object."""
+    found = []
+    for item in read_collection(arguments.collection):
+        words = [arguments.task, str(item.capture), "--out", str(out / item.name)]
+        if arguments.varying != "never":
+            words += ["--varying", arguments.varying]
+        inputs = input_hash(item.capture, words, program_version())  # threads change no result
+        if arguments.threads is not None:
+            words += ["--threads", str(arguments.threads)]
+        found.append(Work(item, tuple(_process(arguments, words)), inputs))
+    return found
+
+
+def _process(arguments: argparse.Namespace, words: Sequence[str]) -> list[str]:
+    """The process that runs a command."""
+    if arguments.program:
+        return [*shlex.split(arguments.program), *words]
+    if has_blender():
+        from ..scene.session.background_blender import command  # needs bpy
+
+        own = command(words)
+    else:
+        own = python_command("commands.command_line", *words)
+    if arguments.to and sys.platform != "win32":  # engines start it without this environment
+        return ["env", f"PYTHONPATH={ROOT.parent}", *own]
+    return own
+
+
+def _known(out: Path, work: Sequence[Work]) -> tuple[dict[str, Summary], list[Work]]:
+    """(what is known of each object, those that are not finished)."""
+    summaries: dict[str, Summary] = {}
+    left = []
+    for one in work:
+        known: Finished | None = finished(out, one.item.name, one.inputs)
+        if known is None:
+            left.append(one)
+            summaries[one.item.name] = Summary(one.item)
+        else:
+            summaries[one.item.name] = summary_of(out, one.item, **vars(known), error="")
+    return summaries, left
+
+
+def _run_all(
+    arguments: argparse.Namespace,
+    out: Path,
+    left: Sequence[Work],
+    limits: Limits,
+    summaries: dict[str, Summary],
+) -> None:
+    """Run what is left; ``summaries`` is kept up to date, and so is the page."""
+    written = 0.0
+
+    def write(now: bool = False) -> None:
+        nonlocal written
+        if now or time.monotonic() - written > PAGE_INTERVAL:
+            write_page(out, list(summaries.values()), running=True)
+            written = time.monotonic()
+
+    if not left:
+        return
+    write(now=True)
+    environment = {**_own_environment(), END_WITH_PARENT: "1"}
+    ended = run_on_cluster(
+        left, out, environment, limits, arguments.scheduler, arguments.workers, write
+    )
+    for count, one in enumerate(ended, 1):
+        summaries[one.item.name] = summary_of(
+            out, one.item, one.seconds, one.peak_mb, one.attempts, one.error
+        )
+        print(
+            f"[{100 * count // len(left):3d} %] {one.item.name}: {one.error or 'finished'}",
+            file=sys.stderr,
+            flush=True,
+        )
+
+
+def _own_environment() -> dict[str, str]:
+    """What a process needs to find this Patina."""
+    names = ("PYTHONPATH", "PYTHONSAFEPATH")
+    return {key: value for key, value in python_environment().items() if key in names}

@@ -1,0 +1,81 @@
+"""The record of a finished object: what it was computed from, and what its result is. Whether an
+object is finished is read from its folder, not from the memory of a scheduler."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..capture import Capture, read_capture
+from ..errors import PatinaError
+from ..files import read_regular
+from ..output_folder.publication import RECORD as WRITTEN_FILES
+
+ENDING = ".batch.json"  # of a record, beside the folder of the result
+MAX_RECORD_BYTES = 1 << 20
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A finished object. seconds, peak_mb: of the process; attempts: how many it took."""
+
+    seconds: float
+    peak_mb: float
+    attempts: int
+
+
+def record_file(out: Path, name: str) -> Path:
+    """The record of an object in the folder of a batch."""
+    return out / f"{name}{ENDING}"
+
+
+def finished(out: Path, name: str, inputs: str) -> Finished | None:
+    """What is recorded of an object, if its result is there, and was computed from the same inputs;
+    else None. out: folder of the batch; inputs: of ``input_hash``."""
+    try:
+        found: Any = json.loads(read_regular(record_file(out, name), MAX_RECORD_BYTES))
+        if found["inputs"] != inputs or found["result"] != result_hash(out / name):
+            return None
+        return Finished(float(found["seconds"]), float(found["peak_mb"]), int(found["attempts"]))
+    except (OSError, PatinaError, ValueError, KeyError, TypeError):
+        return None
+
+
+def result_hash(folder: Path) -> str:
+    """A hash of a result: of the record of its files, with a hash of each. Raises OSError where
+    one of the files is missing."""
+    content = (folder / WRITTEN_FILES).read_bytes()
+    for name in json.loads(content):
+        os.stat(folder / name)
+    return hashlib.blake2b(content).hexdigest()[:32]
+
+
+def input_hash(capture: Path, words: Sequence[str], version: str) -> str:
+    """A hash of what the result of an object depends on: the command, the version of Patina, the
+    capture file, and size and time of change of the files that it names."""
+    digest = hashlib.blake2b(json.dumps([version, *words]).encode())
+    try:
+        digest.update(read_regular(capture, MAX_RECORD_BYTES * 64))
+        files = sorted(_files(read_capture(capture)))
+    except (OSError, PatinaError):  # the run will say what is wrong with it
+        files = []
+    for file in files:
+        try:
+            state = os.stat(file)
+        except OSError:
+            continue
+        digest.update(json.dumps([str(file), state.st_size, state.st_mtime_ns]).encode())
+    return digest.hexdigest()[:32]
+
+
+def _files(capture: Capture) -> set[Path]:
+    """The files that a capture names."""
+    named = {capture.scan.cameras, capture.scan.mesh, capture.scan.extra}
+    for photo in capture.photos:
+        named |= {*photo.files, *photo.masks.values()}
+    return {file for file in named if file is not None}
