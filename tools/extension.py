@@ -11,6 +11,8 @@ from .common import Failure, quietly
 from .staging import manifest, staged
 from .wheels import download, wheel_names
 
+MAX_BYTES = 195_000_000  # of a zip: Blender's extension site accepts 200 MB
+
 
 @dataclass(frozen=True)
 class ExtensionTool:
@@ -53,6 +55,9 @@ def pack(
             raise Failure(f"Blender did not write {name}", 1)
         tool.run("validate", archive)
         check_wheels(archive, wheel_names([platform], pythons, raw))
+        if archive.stat().st_size > MAX_BYTES and not raw:
+            size = archive.stat().st_size / 1e6
+            raise Failure(f"{name} has {size:.0f} MB; expected at most {MAX_BYTES / 1e6:.0f} MB", 1)
         archives.append(archive)
     return archives
 

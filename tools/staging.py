@@ -12,7 +12,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from .common import ROOT, cache_dir
-from .wheels import FOLDER, manifest_list, wheel_names
+from .smaller_wheels import shipped_wheel
+from .wheels import FOLDER, checksums, manifest_list, wheel_names
 
 MANIFEST = "blender_manifest.toml"
 IGNORED = shutil.ignore_patterns("__pycache__", "*.py[co]", ".*", "*~", "*.blend1")
@@ -71,11 +72,13 @@ def staged(platforms: Sequence[str], pythons: Sequence[str], raw: bool = False) 
                 shutil.copytree(path, folder / path.name, ignore=IGNORED)
             else:
                 shutil.copy2(path, folder)
+        sums = checksums()
         for name in wheel_names(platforms, pythons, raw):
+            wheel = shipped_wheel(FOLDER / name, sums[name])
             try:
-                os.link(FOLDER / name, folder / "wheels" / name)
+                os.link(wheel, folder / "wheels" / name)
             except OSError:  # another disk, or a file system without links
-                shutil.copy2(FOLDER / name, folder / "wheels")
+                shutil.copy2(wheel, folder / "wheels")
         text = filtered_manifest(platforms, pythons, raw)
         (folder / MANIFEST).write_text(text, encoding="utf-8")
         yield folder

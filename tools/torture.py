@@ -98,10 +98,14 @@ def _cases(folder: Path, chosen: Sequence[str]) -> list[Case]:
         Case(
             "material",
             folder / "material",
-            lambda which: [str(results[which]), "--to", "materialx", "tensor"],
+            lambda which: [str(results[which]), "--to", "mtlx", "binary"],
         ),
         Case("diagnose", folder / "diagnose", lambda which: [str(captures[which])]),
-        Case("maps", folder / "maps", lambda which: [str(results[which]), "--size", "64"]),
+        Case(
+            "maps",
+            folder / "maps",
+            lambda which: [str(captures[which]), str(results[which]), "--size", "64"],
+        ),
         Case("solve", folder / "solve", lambda which: [str(shoots[which]), "--threads", "2"]),
     ]
     cases = [case for case in cases if not chosen or case.name in chosen]
