@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import shlex
 import sys
 import time
@@ -13,7 +14,8 @@ from ..core.batch.cluster import Limits, Work, run_on_cluster
 from ..core.batch.collection import read_collection
 from ..core.batch.farm_files import write_flamenco, write_openjd
 from ..core.batch.page import PAGE, write_page
-from ..core.batch.record import Finished, finished, input_hash
+from ..core.batch.record import Finished, finished, input_hash, record_file
+from ..core.batch.remote import run_process
 from ..core.batch.rig_errors import rig_errors
 from ..core.batch.summary import FAILED, Summary, summary_of
 from ..core.child_process.parent_watch import END_WITH_PARENT
@@ -58,6 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--program", help="command that runs Patina on the workers, such as 'blender -b -P "
         "headless.py --' (default: this Python, which writes no scene.blend without bpy)",
     )  # fmt: skip
+    parser.add_argument("--only", metavar="NAME", help="run one object here, without a cluster")
     parser.add_argument("--to", choices=FORMATS, help="only write a job for this engine")
 
 
@@ -74,12 +77,15 @@ def run(arguments: argparse.Namespace) -> None:
     out = check_out(arguments.out)
     work = _work(arguments, out)
     out.mkdir(parents=True, exist_ok=True)
+    if arguments.only is not None:
+        _run_only(arguments.only, work, out, limits)
+        return
     if arguments.to:
-        path = (
-            write_openjd(out, work, limits)
-            if arguments.to == "openjd"
-            else write_flamenco(out, work)
-        )
+        names, words = [one.item.name for one in work], _farm_words(arguments, out)
+        if arguments.to == "openjd":
+            path = write_openjd(out, names, words, limits)
+        else:
+            path = write_flamenco(out, names, words)
         print(f"wrote {path}")
         return
     summaries, left = _known(out, work)
@@ -118,16 +124,45 @@ def _work(arguments: argparse.Namespace, out: Path) -> list[Work]:
 def _process(arguments: argparse.Namespace, words: Sequence[str]) -> list[str]:
     """The process that runs a command."""
     if arguments.program:
-        return [*shlex.split(arguments.program), *words]
+        windows = sys.platform == "win32"  # where "\\" separates folders
+        split = shlex.split(arguments.program, posix=not windows)
+        return [*(word.strip('"') if windows else word for word in split), *words]
     if has_blender():
         from ..scene.session.background_blender import command  # needs bpy
 
-        own = command(words)
-    else:
-        own = python_command("commands.command_line", *words)
-    if arguments.to and sys.platform != "win32":  # engines start it without this environment
-        return ["env", f"PYTHONPATH={ROOT.parent}", *own]
-    return own
+        return command(words)
+    return python_command("commands.command_line", *words)
+
+
+def _farm_words(arguments: argparse.Namespace, out: Path) -> list[str]:
+    """The command that an engine runs for an object, without its name."""
+    words = ["batch", str(arguments.collection.resolve()), "--out", str(out)]
+    words += ["--run", arguments.task, "--varying", arguments.varying]
+    for option in ("threads", "memory", "time", "program"):
+        value = getattr(arguments, option)
+        if value:
+            words += [f"--{option}", str(value)]
+    own = python_command("commands.command_line", *words, "--only")
+    if sys.platform == "win32":  # needs an installed Python package
+        return own
+    return ["env", f"PYTHONPATH={ROOT.parent}", *own]
+
+
+def _run_only(name: str, work: Sequence[Work], out: Path, limits: Limits) -> None:
+    """Run one object here, without a cluster and without a page."""
+    found = next((one for one in work if one.item.name == name), None)
+    if found is None:
+        raise InputError(f"found no object {name!r} in the collection", key="--only")
+    if finished(out, name, found.inputs) is not None:
+        print(f"{name}: finished before")
+        return
+    ended = run_process(
+        list(found.words), _environment(), str(out / name), str(record_file(out, name)),
+        found.inputs, 1, limits.gigabytes, limits.seconds,
+    )  # fmt: skip
+    if ended["message"]:
+        raise PatinaError(f"{name}: {ended['message']}")
+    print(f"{name}: finished")
 
 
 def _known(out: Path, work: Sequence[Work]) -> tuple[dict[str, Summary], list[Work]]:
@@ -157,15 +192,15 @@ def _run_all(
     def write(now: bool = False) -> None:
         nonlocal written
         if now or time.monotonic() - written > PAGE_INTERVAL:
-            write_page(out, list(summaries.values()), running=True)
             written = time.monotonic()
+            with contextlib.suppress(OSError):  # such as a table that is open in a spreadsheet
+                write_page(out, list(summaries.values()), running=True)
 
     if not left:
         return
     write(now=True)
-    environment = {**_own_environment(), END_WITH_PARENT: "1"}
     ended = run_on_cluster(
-        left, out, environment, limits, arguments.scheduler, arguments.workers, write
+        left, out, _environment(), limits, arguments.scheduler, arguments.workers, write
     )
     for count, one in enumerate(ended, 1):
         summaries[one.item.name] = summary_of(
@@ -178,7 +213,8 @@ def _run_all(
         )
 
 
-def _own_environment() -> dict[str, str]:
-    """What a process needs to find this Patina."""
+def _environment() -> dict[str, str]:
+    """What a process needs to find this Patina, and to end with its worker."""
     names = ("PYTHONPATH", "PYTHONSAFEPATH")
-    return {key: value for key, value in python_environment().items() if key in names}
+    own = {key: value for key, value in python_environment().items() if key in names}
+    return {**own, END_WITH_PARENT: "1"}

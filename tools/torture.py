@@ -75,7 +75,7 @@ def main() -> int:
     print("| command | seconds | killed | old result | new result |\n|---|---|---|---|---|")
     for case in cases:
         print(f"| {case.name} | {case.seconds:.1f} | {case.kills} | {case.old} | {case.new} |")
-    print(*wrong, f"{arguments.kills} kills, {len(wrong)} faults", sep="\n")
+    print(*wrong, f"{sum(c.kills for c in cases)} kills, {len(wrong)} faults", sep="\n")
     return 1 if wrong else 0
 
 
@@ -156,13 +156,18 @@ def _kill(cases: Sequence[Case], kills: int, chance: random.Random) -> list[str]
             stderr=subprocess.DEVNULL,
             start_new_session=True,
         )
+        failed: list[str] = []
         try:
-            process.wait(moment)
+            if process.wait(moment):
+                failed = [f"ended with exit code {process.returncode}"]
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
             case.kills += 1
-        faults = [f"{case.name}, kill {number} after {moment:.2f} s: {f}" for f in _faults(case)]
+        faults = [
+            f"{case.name}, kill {number} after {moment:.2f} s: {f}"
+            for f in (*failed, *_faults(case))
+        ]
         wrong += faults
         case.new += not faults and _shown(case) == which
         case.old += not faults and _shown(case) == before

@@ -22,7 +22,6 @@ CONNECT_SECONDS = 60.0  # that a scheduler may take to answer
 LOST_SECONDS = 600.0  # after which a scheduler that was lost is given up
 RETRY_INTERVAL = 2.0  # seconds between two attempts to reach it
 MAX_QUEUED = 1000  # objects given to the scheduler at a time: its memory does not grow with all
-WRONG_INPUT = 2  # exit code of commands; another attempt would end in the same way
 NEEDED = (
     "a batch needs the package dask.distributed; install the Python package patina with its extra "
     "'farm'"
@@ -167,7 +166,7 @@ def _submitted(
             run_process, list(one.words), environment, str(out / name),
             str(record_file(out, name)), one.inputs, attempts[name], limits.gigabytes,
             limits.seconds, key=f"{name}-{attempts[name]}-{time.monotonic_ns()}", pure=False,
-            retries=limits.attempts,  # of a worker that was lost
+            retries=0,  # only after a lost worker, which Dask does on its own
         )  # fmt: skip
 
     of_future = {}
@@ -183,7 +182,7 @@ def _submitted(
             one = of_future.pop(future.key)
             name = one.item.name
             error, found = _result(future)
-            if error and found.get("code") != WRONG_INPUT and attempts[name] < limits.attempts:
+            if error and attempts[name] < limits.attempts:
                 attempts[name] += 1
                 again = submit(one)
                 of_future[again.key] = one

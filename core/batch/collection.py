@@ -52,13 +52,18 @@ def read_collection(path: Path) -> tuple[Item, ...]:
 
 def _lines(path: Path) -> list[str]:
     """The lines of a list that are neither empty nor comments."""
-    content = read_regular(path, MAX_LIST_BYTES).decode("utf-8", "replace")
-    lines = (line.strip() for line in content.splitlines())
+    lines = (line.strip() for line in _text(path).splitlines())
     return [line for line in lines if line and not line.startswith("#")]
 
 
+def _text(path: Path) -> str:
+    """The text of a list or table; spreadsheets write a mark before it."""
+    return read_regular(path, MAX_LIST_BYTES).decode("utf-8-sig", "replace")
+
+
 def _table(path: Path) -> Iterator[tuple[Path, str, str]]:
-    rows = csv.DictReader(_lines(path), delimiter=TABLES[path.suffix.lower()])
+    lines = [line for line in _text(path).splitlines() if line.strip()]
+    rows = csv.DictReader(lines, delimiter=TABLES[path.suffix.lower()])
     if "capture" not in (rows.fieldnames or ()):
         raise InputError(
             f"has the columns {', '.join(rows.fieldnames or ()) or 'none'}; expected "

@@ -6,8 +6,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -74,8 +74,25 @@ def input_hash(capture: Path, words: Sequence[str], version: str) -> str:
 
 
 def _files(capture: Capture) -> set[Path]:
-    """The files that a capture names."""
-    named = {capture.scan.cameras, capture.scan.mesh, capture.scan.extra}
-    for photo in capture.photos:
-        named |= {*photo.files, *photo.masks.values()}
-    return {file for file in named if file is not None}
+    """The files that a capture names, also in the folder of a camera model."""
+    named: set[Path | None] = set()
+    for entry in (capture.scan, capture.tone.chart, *capture.lights, *capture.photos):
+        named |= set(_paths(entry))
+    found = {file for file in named if file is not None}
+    inside = {one for file in found if file.is_dir() for one in file.iterdir()}
+    return {file for file in found | inside if file.is_file()}
+
+
+def _paths(entry: object) -> Iterator[Path]:
+    """The paths in a table of a capture, and in those within it."""
+    if isinstance(entry, Path):
+        yield entry
+    elif is_dataclass(entry):
+        for one in fields(entry):
+            yield from _paths(getattr(entry, one.name))
+    elif isinstance(entry, Mapping):
+        for value in entry.values():
+            yield from _paths(value)
+    elif isinstance(entry, tuple | list):
+        for value in entry:
+            yield from _paths(value)

@@ -3,6 +3,7 @@ the workers as it is, so that it uses only the standard library and psutil, whic
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -45,7 +46,12 @@ def run_process(
             stderr=messages,
             env={**os.environ, **environment},
         )
-        peak, stopped = _watch(process, since, max_gb, max_seconds)
+        try:
+            peak, stopped = _watch(process, since, max_gb, max_seconds)
+        finally:
+            if process.poll() is None:
+                process.kill()
+                process.wait()
         messages.seek(0)
         text = messages.read().decode("utf-8", "replace")
     found = {
@@ -105,10 +111,10 @@ def _watch(
             stopped = f"takes more than {max_seconds:g} seconds"
         if stopped:
             for one in reversed(family):
-                one.terminate()
-            psutil.wait_procs(family, END_SECONDS)
-            for one in family:
-                if one.is_running():
+                with contextlib.suppress(psutil.Error):  # it has ended meanwhile
+                    one.terminate()
+            for one in psutil.wait_procs(family, END_SECONDS)[1]:
+                with contextlib.suppress(psutil.Error):
                     one.kill()
 
 

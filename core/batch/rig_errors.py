@@ -69,8 +69,10 @@ def rig_errors(summaries: Sequence[Summary]) -> list[RigError]:
             if len(having) < max(MIN_OBJECTS, MIN_SHARE * len(own)):
                 continue
             values = []
-            for key in having[0].parameters:
+            for key in sorted({key for c in having for key in c.parameters}):
                 rows = [c.parameters[key] for c in having if key in c.parameters]
+                if len(rows) < max(MIN_OBJECTS, MIN_SHARE * len(having)):
+                    continue  # of an object, such as that of one of its photos
                 numbers, errors = np.array([(value, error) for value, error, _ in rows]).T
                 mean, error, spread = common_mean(numbers, errors)
                 if abs(mean) > MIN_Z * error and spread < abs(mean):

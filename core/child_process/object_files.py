@@ -33,6 +33,7 @@ class _Known:
         self._of_path: dict[str, weakref.ref[Any]] = {}
         self._of_object: dict[int, tuple[weakref.ref[Any], str]] = {}
         self._owned: set[str] = set()
+        self._unused: set[Path] = set()  # files that could not be deleted yet
 
     def add(self, path: Path, value: object) -> None:
         name, number = str(path), id(value)
@@ -50,26 +51,54 @@ class _Known:
         return None if reference is None else reference()
 
     def path(self, value: object) -> str | None:
-        """The file of an object, None where it has none."""
+        """The file of an object, None where it has none, or where it is gone: temporary folders are
+        cleaned at times."""
         reference, name = self._of_object.get(id(value), (None, None))
-        return name if reference is not None and reference() is value else None
+        if name is None or reference is None or reference() is not value:
+            return None
+        return name if all(file.is_file() for file in _files(Path(name))) else None
 
     def own(self, folder: Path) -> None:
-        """Delete the folder when none of its objects is in memory any more."""
+        """Delete each file of the folder when its object is not in memory any more, and then the
+        folder."""
         self._owned.add(str(folder))
-        self._delete_unused(str(folder))
+        kept = {file for name in self._of_path for file in _files(Path(name))}
+        self._unused |= {file for file in folder.iterdir() if file not in kept}
+        self.delete_unused()
+
+    def delete_unused(self) -> None:
+        """Delete what can be deleted: Windows keeps files whose arrays are still in memory."""
+        for file in list(self._unused):
+            try:
+                if file.is_dir():
+                    shutil.rmtree(file)
+                else:
+                    file.unlink(missing_ok=True)
+            except OSError:
+                continue
+            self._unused.discard(file)
+        for folder in list(self._owned):
+            try:
+                Path(folder).rmdir()
+            except FileNotFoundError:
+                pass
+            except OSError:  # it is not empty
+                continue
+            self._owned.discard(folder)
 
     def _forget(self, name: str, number: int, gone: weakref.ref[Any]) -> None:
         if self._of_path.get(name) is gone:
             del self._of_path[name]
         if self._of_object.get(number, (None,))[0] is gone:
             del self._of_object[number]
-        self._delete_unused(str(Path(name).parent))
+        if str(Path(name).parent) in self._owned:
+            self._unused |= set(_files(Path(name)))
+            self.delete_unused()
 
-    def _delete_unused(self, folder: str) -> None:
-        if folder in self._owned and not any(str(Path(p).parent) == folder for p in self._of_path):
-            self._owned.discard(folder)
-            shutil.rmtree(folder, ignore_errors=True)
+
+def _files(path: Path) -> tuple[Path, Path]:
+    """The two files of an object."""
+    return path.with_name(path.name + OBJECT), path.with_name(path.name + ARRAYS)
 
 
 _known = _Known()
@@ -89,8 +118,15 @@ def read_object(path: Path, changes: bool = False) -> Any:
 
 
 def own_folder(folder: Path) -> None:
-    """Delete the folder as soon as no object of its files is in memory."""
-    _known.own(folder)
+    """Delete each file of the folder as soon as its object is not in memory, and the folder with
+    the last one."""
+    if folder.is_dir():
+        _known.own(folder)
+
+
+def delete_unused() -> None:
+    """Try again to delete files of objects that are not in memory."""
+    _known.delete_unused()
 
 
 def _write(path: Path, value: object, written: dict[int, str]) -> None:

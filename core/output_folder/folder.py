@@ -6,6 +6,7 @@ import contextlib
 import os
 import secrets
 import shutil
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,6 +17,7 @@ from .folder_lock import lock_folder
 from .publication import Kept, Owner, complete_publication, publish
 
 STAGING = ".patina-part-"  # start of the names of staging folders
+SCRATCH = "patina-scratch-"  # the same, of folders for temporary files
 UNPUBLISHED = "patina-unpublished-"  # the same, of results that could not move to their places
 MIN_AGE = 60.0  # seconds, of a staging folder that counts as abandoned: it is locked long before
 SHOWN_FILES = 3  # names in the sentence on files of the user
@@ -82,6 +84,22 @@ def staged_folder(
         say(_sentence(done, out))
 
 
+@contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """A folder for temporary files on this computer's own disk. What killed processes have left is
+    removed. Raises OSError."""
+    location = Path(tempfile.gettempdir())
+    _remove_abandoned(location, SCRATCH)
+    folder = Path(tempfile.mkdtemp(prefix=SCRATCH))
+    held = lock_folder(folder)
+    try:
+        yield folder
+    finally:
+        if held is not None:
+            held.close()
+        shutil.rmtree(folder, ignore_errors=True)
+
+
 def _unpublished(staging: Path, out: Path, error: Exception) -> Exception:
     """The error of a result that cannot move to its place, with where it is. It may have taken
     hours."""
@@ -95,9 +113,9 @@ def _unpublished(staging: Path, out: Path, error: Exception) -> Exception:
     return InputError(f"{error}; the complete result is in {kept}", file=out, key="--out")
 
 
-def _remove_abandoned(location: Path) -> None:
-    """Remove the staging folders of processes that were killed: no process has them locked."""
-    for folder in location.glob(f"{STAGING}*"):
+def _remove_abandoned(location: Path, prefix: str = STAGING) -> None:
+    """Remove the temporary folders of processes that were killed: no process has them locked."""
+    for folder in location.glob(f"{prefix}*"):
         with contextlib.suppress(OSError):
             if folder.is_symlink() or time.time() - folder.stat().st_mtime < MIN_AGE:
                 continue

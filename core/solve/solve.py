@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..counted import counted
 from ..errors import PatinaError
+from ..output_folder import scratch_folder
 from ..photo import read_exif
 from .background import Work
 from .database import FeatureStore
@@ -46,19 +46,12 @@ class PhotoFeatures:
     colours: NDArray[np.uint8]
 
 
-def solve(
-    photos: Sequence[PhotoFile],
-    lens: str,
-    threads: int | None,
-    work: Work,
-    scratch: Path | None = None,
-) -> Solution:
-    """Cameras of all photos that can be placed. scratch: folder for temporary files; None: that of
-    the system. Raises PatinaError where there are too few."""
+def solve(photos: Sequence[PhotoFile], lens: str, threads: int | None, work: Work) -> Solution:
+    """Cameras of all photos that can be placed. Raises PatinaError where there are too few."""
     _check_count(len(photos), "")
     cores = threads or os.cpu_count() or 1
-    with tempfile.TemporaryDirectory(prefix="patina-solve-", dir=scratch) as folder:
-        store = FeatureStore(Path(folder) / "features.db", lens)
+    with scratch_folder() as folder:  # a database on a network drive would be slow, or fail
+        store = FeatureStore(folder / "features.db", lens)
         try:
             colours, first, unreadable = _extract(photos, store, cores, work)
             _check_count(

@@ -33,7 +33,6 @@ class SolveJob(Job):
         if not self.photos:
             raise InputError("holds no photos; expected at least 3", file=folder)
         self.lens, self.threads = lens, threads
-        self.scratch: Path | None = None  # folder for temporary files, None for the system's
         self._work: Background[Solution] | None = None
 
     @property
@@ -43,9 +42,7 @@ class SolveJob(Job):
 
     def run(self) -> Iterator[Step]:
         """Follow the progress of the thread."""
-        self._work = Background(
-            lambda work: solve(self.photos, self.lens, self.threads, work, self.scratch)
-        )
+        self._work = Background(lambda work: solve(self.photos, self.lens, self.threads, work))
         yield from self._work.steps()
 
     def cancel(self) -> None:
@@ -77,11 +74,10 @@ class SolveToFolderJob(Job):
 
     def run(self) -> Iterator[Step]:
         """The steps of the solve; then the files are written."""
+        yield from self.solve.run()
+        solution = self.solve.solution
+        yield Step(WRITING, 1.0)
         with staged_folder(self.out, "solve", self.notes.append) as staging:
-            self.solve.scratch = staging  # is removed by the next command after a SIGKILL
-            yield from self.solve.run()
-            solution = self.solve.solution
-            yield Step(WRITING, 1.0)
             written = solution.write(staging, self.out, self.folder)
         self.summary, self.report = solution.summary(), solution.report()
         self.missing = solution.photos - solution.placed

@@ -180,7 +180,7 @@ def look_at_photo(
             list(where.values()),
             _excluded(masks, view),
             photo.usable.ravel().take(view.pixel),
-            None if limit is None else below_curvature_limit(view.curvature, limit),
+            None if limit is None else below_curvature_limit(view.curvature, limit * factor),
         )
         material = np.full(len(view.pixel), -1, np.int16)
         for index, pixels in enumerate(where.values()):
@@ -201,7 +201,9 @@ def look_at_photo(
     yield (1 + len(windows)) / (2 + len(windows))
     if used is not None:
         row, column = np.divmod(np.asarray(used, np.intp), full.width)
-        used = row // factor * camera.width + column // factor
+        row, column = row // factor, column // factor
+        inside = (row < camera.height) & (column < camera.width)  # of those that are left out
+        used = (row * camera.width + column)[inside]
     return _cropped(capture, camera, photo, canvas, place, used, factor)
 
 

@@ -11,6 +11,7 @@ import bpy
 
 from ...core.basis import default_basis
 from ...core.child_process import ChildJob
+from ...core.child_process.object_files import delete_unused
 from ...core.concurrency.job import Job, Step
 
 AnyJob = TypeVar("AnyJob", bound=Job)
@@ -34,6 +35,9 @@ def in_child(job: AnyJob) -> Generator[Step, None, AnyJob]:
         while child.step():
             yield child.now
         return child.result
+    except GeneratorExit:  # the caller removes folders that the child writes to
+        child.end()
+        raise
     finally:
         end_child(child)
 
@@ -64,6 +68,7 @@ def end_all() -> None:
 def _look() -> float | None:
     """Timer callback: see which children have ended. Returns the seconds until the next call."""
     _ending[:] = [child for child in _ending if not child.ended()]
+    delete_unused()
     return POLL_INTERVAL if _ending else None
 
 

@@ -18,7 +18,9 @@ import numpy as np
 import pytest
 
 from patina.commands import command_line
+from patina.core.batch.cluster import Limits
 from patina.core.batch.collection import Item, read_collection
+from patina.core.batch.farm_files import write_openjd
 from patina.core.batch.page import write_page
 from patina.core.batch.record import finished, input_hash
 from patina.core.batch.rig_errors import common_mean, rig_errors
@@ -58,11 +60,15 @@ def test_folder_list_and_table_name_the_same_objects(tmp_path):
     assert [item.name for item in read_collection(listed)] == ["second", "shot"]
     table = tmp_path / "table.csv"
     table.write_text(
-        "capture,name,session\nall/vase/shot.capture.toml,Vase 3/7,monday\n"
+        "\ufeffcapture,name,session\nall/vase/shot.capture.toml,Vase 3/7,monday\n"
         "all/bowl/shot.capture.toml,,\n"
     )
     items = read_collection(table)
     assert [(item.name, item.session) for item in items] == [("Vase 3_7", "monday"), ("shot", "")]
+    tabs = tmp_path / "table.tsv"
+    tabs.write_text("name\tcapture\tsession\n\tall/vase/shot.capture.toml\tmonday\n")
+    (item,) = read_collection(tabs)
+    assert (item.name, item.session) == ("shot", "monday"), "an empty first cell"
     assert items[0].capture == (path / "vase" / "shot.capture.toml").resolve()
 
 
@@ -93,7 +99,7 @@ def test_every_object_runs_once_and_finished_ones_are_not_run_again(tmp_path, ca
     assert batch(path, out) == 2
     assert "2 objects failed (bad, crash)" in capsys.readouterr().err
     assert runs(path, "one") == ["started", "finished"]
-    assert runs(path, "bad") == ["started"], "a wrong input is not tried again"
+    assert runs(path, "bad") == ["started"] * 2
     assert runs(path, "crash") == ["started"] * 2
     assert runs(path, "flaky") == ["started", "started", "finished"]
     table = (out / "collection.csv").read_text()
@@ -216,6 +222,13 @@ def test_a_cause_of_all_objects_is_an_error_of_the_rig():
     varied = [diagnosed(f"o{k}", 0.03 * (-1) ** k, 0.002) for k in range(8)]
     assert not rig_errors(varied)
     assert not rig_errors(common[:2]), "two may agree by chance"
+    # a parameter of one object says nothing about the others
+    cause = Cause(
+        "light_direction", True, {"tilt": (0.0, 0.01, "rad"), "photo 39": (0.4, 0.02, "")}
+    )
+    alone = Summary(Item("own", Path("own"), "monday"), FINISHED, causes=(cause,))
+    (found,) = rig_errors([alone, *common])
+    assert [one.name for one in found.values] == ["tilt"]
     few = [*common[:3], *(diagnosed(f"n{k}", 0.0, 0.002, named=False) for k in range(5))]
     assert not rig_errors(few), "most objects do not have it"
 
@@ -262,11 +275,18 @@ def test_openjd_template_is_valid_and_runs(tmp_path):
     checked = subprocess.run([*tool, "check", template], capture_output=True, text=True)
     assert checked.returncode == 0, checked.stdout + checked.stderr
     done = subprocess.run(
-        [*tool, "run", template, "--step", "Objects"], capture_output=True, text=True, timeout=120
+        [*tool, "run", template, "--step", "Objects 1"], capture_output=True, text=True, timeout=120
     )
     assert done.returncode == 0, done.stdout + done.stderr
     for name in ("one", "it_s"):
         assert (tmp_path / "out" / name / "result.json").is_file()
+    assert batch(path, tmp_path / "out") == 0
+    assert runs(path, "one") == ["started", "finished"], "the result of the task is known"
+    many = write_openjd(tmp_path, [f"o{k}" for k in range(2500)], ["true"], Limits())
+    checked = subprocess.run([*tool, "check", many], capture_output=True, text=True)
+    assert checked.returncode == 0, checked.stdout + checked.stderr
+    with pytest.raises(InputError, match="rename it"):
+        write_openjd(tmp_path, ["a"], ["fit", "/x/{{y}}/a.toml"], Limits())
 
 
 def test_flamenco_job_type_makes_a_task_for_each_object(tmp_path):

@@ -106,3 +106,14 @@ def test_reduction_keeps_the_object_large_enough(fitted):
     assert factor > 1 and max(look(fitted, 50).measured.shape[:2]) >= 50
     turned_away = replace(camera, pose=replace(camera.pose, rotation=-camera.pose.rotation))
     assert reduction(turned_away, fitted.rays, 50) >= 1
+
+
+def test_curvature_of_the_papers_method_is_that_of_the_photo(fitted):
+    """Curvature is per pixel, of which a reduced photo has larger ones."""
+    paper = replace(fitted.capture.fit, method="paper")
+    bent = replace(fitted, capture=replace(fitted.capture, fit=paper))
+    whole = look(bent, None)
+    small = look(bent, max(whole.measured.shape[:2]) // 3)
+    assert small.factor > 1
+    share = whole.shares.get(Criterion.CURVED, 0)
+    assert 0.01 < share and abs(small.shares.get(Criterion.CURVED, 0) - share) < 0.5 * share
