@@ -21,6 +21,7 @@ COMMANDS = {
     "experiments": ("tools.experiments", "run the experiments of docs/method/experiments.md"),
     "hunt": ("tools.hunt.table", "diagnose simulated captures with a hidden effect"),
     "torture": ("tools.torture", "kill commands at random, and check that no result is lost"),
+    "fuzz": ("tools.fuzz", "give changed files to the readers, and look for faults"),
     "bench": ("tools.bench_main", "run the benchmarks behind the figures in docs/"),
 }
 """Command → (entry point, help text). A MODULE:FUNCTION is called in this process with the

@@ -116,4 +116,4 @@ def test_curvature_of_the_papers_method_is_that_of_the_photo(fitted):
     small = look(bent, max(whole.measured.shape[:2]) // 3)
     assert small.factor > 1
     share = whole.shares.get(Criterion.CURVED, 0)
-    assert 0.01 < share and abs(small.shares.get(Criterion.CURVED, 0) - share) < 0.5 * share
+    assert share > 0.01 and abs(small.shares.get(Criterion.CURVED, 0) - share) < 0.5 * share
