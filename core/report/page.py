@@ -21,7 +21,6 @@ from .material_section import material_section
 
 STYLE = Path(__file__).parents[2] / "assets" / "report" / "style.css"
 MAX_SIDE = 640  # pixels of a picture in a row of photos
-LOOK_SIDE = 960  # pixels along the object that are predicted: more than a picture shows
 PHOTOS_AT_ONCE = 2  # limits memory: each has a photo in its full size for a moment
 
 
@@ -85,7 +84,7 @@ def _looked_at(result: CaptureResult, place: int) -> photo_view.PhotoView:
             place,
             photo_view.chosen_pixels([m.fit for m in result.materials], place),
             result.varying,
-            LOOK_SIDE,
+            MAX_SIDE,
         )
     )
 

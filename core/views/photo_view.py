@@ -151,8 +151,8 @@ def look_at_photo(
 
     brdfs: of some or all materials of the capture, of any fit. used: (k,) flat indices in the
     photo of the pixels that a fit uses (see chosen_pixels). varying: how these materials vary over
-    the surface, None if they are even. side: the photo is reduced so far that the object is still
-    so many pixels long; None: it is not reduced.
+    the surface, None if they are even. side: the photo is reduced for a picture of
+    so many pixels (reduced_photo.py); None: it is not reduced.
     """
     full = capture_data.camera_of(capture, scan, place)
     factor = 1 if side is None else reduction(full, rays, side)

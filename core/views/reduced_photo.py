@@ -16,14 +16,15 @@ from ..scan.lens import resized_parameters
 
 
 def reduction(camera: Camera, rays: RayScene, side: int) -> int:
-    """The whole number by which a photo can be reduced so that the object is still ``side`` pixels
-    long."""
+    """The whole number by which a photo is reduced for a picture whose longest side is at most
+    ``side`` pixels: its pixels are then means of at least two by two predicted ones."""
     windows = list(bands(camera, 0, rays.cover.columns(camera)))
-    if not windows:
-        return max(1, max(camera.width, camera.height) // side)
-    width = max(w.right for w in windows) - min(w.left for w in windows)
-    height = max(w.last for w in windows) - min(w.first for w in windows)
-    return max(1, max(width, height) // side)
+    longest = max(camera.width, camera.height)
+    if windows:
+        width = max(w.right for w in windows) - min(w.left for w in windows)
+        height = max(w.last for w in windows) - min(w.first for w in windows)
+        longest = max(width, height)
+    return max(1, -(-longest // side) // 2)
 
 
 def reduced_camera(camera: Camera, factor: int) -> Camera:
