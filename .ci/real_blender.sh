@@ -89,8 +89,8 @@ session | own | ended)
       -P "$@"' "$here" "${script[@]}" "$out"
   if [ "$what" = ended ]; then # the process of the last fit ends with Blender
     left=$(grep -A1 '"left"' "$out/ended.json" | grep -oE '[0-9]+')
-    sleep 1.5
-    if [ -d "/proc/$left" ]; then echo "process $left has outlived its Blender"; exit 1; fi
+    sleep 2 # it may still be starting
+    if grep -qs '^State:[[:space:]]*[^ZX]' "/proc/$left/status"; then echo "process $left has outlived its Blender"; exit 1; fi
   fi ;;
 *) sed -n '2,12p' "$0"; exit 2 ;;
 esac

@@ -36,13 +36,20 @@ class _Cancelled(BaseException):
 
 def main(words: Sequence[str]) -> int:
     """Run the job that is stored in a folder. words: the path of the folder."""
-    messages = MessageWriter(os.dup(1))
-    os.dup2(2, 1)  # what a library prints must not get between the messages
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in a terminal reaches the parent too
-    signal.signal(signal.SIGTERM, _cancel)
-    end_with_parent()
-    _give_way()
-    folder = Path(words[0])
+    try:
+        messages = MessageWriter(os.dup(1))
+        os.dup2(2, 1)  # what a library prints must not get between the messages
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in a terminal reaches the parent too
+        signal.signal(signal.SIGTERM, _cancel)
+        end_with_parent()
+        _give_way()
+        return _answer(Path(words[0]), messages)
+    except _Cancelled:
+        return CANCELLED
+
+
+def _answer(folder: Path, messages: MessageWriter) -> int:
+    """Read the job, run it and write it; returns the exit code."""
     try:
         job: Job = read_object(folder / REQUEST, changes=True)
         signal.signal(signal.SIGTERM, _cancel)  # a library that was imported may have its own
@@ -50,8 +57,6 @@ def main(words: Sequence[str]) -> int:
         messages.write(stage="reading the result", fraction=1.0)
         write_object(folder / ANSWER, job)
         messages.write(done=True)
-    except _Cancelled:
-        return CANCELLED
     except PatinaError as error:
         messages.write(error=str(error))
         return FAILED
