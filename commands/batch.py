@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..core.batch.cluster import Limits, Work, run_on_cluster
-from ..core.batch.collection import read_collection
+from ..core.batch.collection import Item, read_collection
 from ..core.batch.farm_files import write_flamenco, write_openjd
 from ..core.batch.page import PAGE, write_page
 from ..core.batch.record import Finished, finished, input_hash, record_file
@@ -75,19 +75,20 @@ def run(arguments: argparse.Namespace) -> None:
         if value < 1:
             raise InputError("found a number that is too small", key=key)
     out = check_out(arguments.out)
-    work = _work(arguments, out)
+    items = read_collection(arguments.collection)
     out.mkdir(parents=True, exist_ok=True)
     if arguments.only is not None:
-        _run_only(arguments.only, work, out, limits)
+        _run_only(arguments, items, out, limits)
         return
     if arguments.to:
-        names, words = [one.item.name for one in work], _farm_words(arguments, out)
+        names, words = [item.name for item in items], _farm_words(arguments, out)
         if arguments.to == "openjd":
             path = write_openjd(out, names, words, limits)
         else:
             path = write_flamenco(out, names, words)
         print(f"wrote {path}")
         return
+    work = _work(arguments, items, out)
     summaries, left = _known(out, work)
     if len(left) < len(work):
         print_note(f"{counted(len(work) - len(left), 'object')} finished before.")
@@ -107,10 +108,10 @@ def run(arguments: argparse.Namespace) -> None:
         )
 
 
-def _work(arguments: argparse.Namespace, out: Path) -> list[Work]:
+def _work(arguments: argparse.Namespace, items: Sequence[Item], out: Path) -> list[Work]:
     """What to run for each object."""
     found = []
-    for item in read_collection(arguments.collection):
+    for item in items:
         words = [arguments.task, str(item.capture), "--out", str(out / item.name)]
         if arguments.varying != "never":
             words += ["--varying", arguments.varying]
@@ -148,11 +149,15 @@ def _farm_words(arguments: argparse.Namespace, out: Path) -> list[str]:
     return ["env", f"PYTHONPATH={ROOT.parent}", *own]
 
 
-def _run_only(name: str, work: Sequence[Work], out: Path, limits: Limits) -> None:
+def _run_only(
+    arguments: argparse.Namespace, items: Sequence[Item], out: Path, limits: Limits
+) -> None:
     """Run one object here, without a cluster and without a page."""
-    found = next((one for one in work if one.item.name == name), None)
-    if found is None:
+    name = arguments.only
+    chosen = [item for item in items if item.name == name]
+    if not chosen:
         raise InputError(f"found no object {name!r} in the collection", key="--only")
+    (found,) = _work(arguments, chosen, out)
     if finished(out, name, found.inputs) is not None:
         print(f"{name}: finished before")
         return

@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import NoReturn
 
 from ..core.child_process.parent_watch import END_WITH_PARENT, end_with_parent
-from ..core.errors import PatinaError
+from ..core.errors import PatinaError, system_error
 from .plain_output import plain_output
 
 DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130  # exit codes; shells use 130 for SIGINT
@@ -69,8 +69,7 @@ def _run(command: ModuleType, parsed: argparse.Namespace) -> int:
         print(f"patina: {error}", file=sys.stderr)
         return WRONG_INPUT
     except OSError as error:  # such as a full disk, or a network folder that is gone
-        where = "" if error.filename is None else f"{error.filename}: "
-        print(f"patina: {where}{error.strerror or error}", file=sys.stderr)
+        print(f"patina: {system_error(error)}", file=sys.stderr)
         return WRONG_INPUT
     except MemoryError:
         print(

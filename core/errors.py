@@ -25,6 +25,12 @@ class PatinaError(Exception):
     """An error that a user can resolve; its message is one line, shown without traceback."""
 
 
+def system_error(error: OSError) -> str:
+    """The message of an error of the system, such as a full disk, with the file that it names."""
+    where = "" if error.filename is None else f"{error.filename}: "
+    return f"{where}{error.strerror or error}"
+
+
 class InputError(PatinaError):
     """Something is wrong in a file, key or option of the user.
 

@@ -187,7 +187,7 @@ def _shown(case: Case) -> int:
 def _faults(case: Case) -> list[str]:
     """What is wrong with the result, as a program finds it that reads it."""
     from patina.core.output_folder import complete_publication
-    from patina.core.output_folder.publication import RECORD
+    from patina.core.output_folder.publication import RECORD, content_hash
 
     complete_publication(case.out)
     files = _files(case.out)
@@ -199,17 +199,10 @@ def _faults(case: Case) -> list[str]:
     if not record.is_file():
         return [f"empty: {empty}"] if empty else []
     known = json.loads(record.read_text("utf-8"))
-    other = [n for n in files if n in known and _content(case.out / n) != known[n]["content"]]
+    other = [n for n in files if n in known and content_hash(case.out / n) != known[n]["content"]]
     unknown = sorted(files - set(known))
     faults = [f"not of one result: {other}"] if other else []
     return [*faults, f"not recorded: {unknown}"] if unknown else faults
-
-
-def _content(path: Path) -> str:
-    """The hash of a file as in the record."""
-    import hashlib
-
-    return hashlib.blake2b(path.read_bytes()).hexdigest()[:32]
 
 
 def _left(case: Case) -> list[str]:

@@ -9,15 +9,14 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import Any
 
 from ..capture import Capture, read_capture
 from ..errors import PatinaError
 from ..files import read_regular
-from ..output_folder.publication import RECORD as WRITTEN_FILES
+from .remote import recorded
 
 ENDING = ".batch.json"  # of a record, beside the folder of the result
-MAX_RECORD_BYTES = 1 << 20
+MAX_CAPTURE_BYTES = 1 << 26
 
 
 @dataclass(frozen=True)
@@ -37,22 +36,13 @@ def record_file(out: Path, name: str) -> Path:
 def finished(out: Path, name: str, inputs: str) -> Finished | None:
     """What is recorded of an object, if its result is there, and was computed from the same inputs;
     else None. out: folder of the batch; inputs: of ``input_hash``."""
+    found = recorded(str(out / name), str(record_file(out, name)), inputs)
     try:
-        found: Any = json.loads(read_regular(record_file(out, name), MAX_RECORD_BYTES))
-        if found["inputs"] != inputs or found["result"] != result_hash(out / name):
+        if found is None:
             return None
         return Finished(float(found["seconds"]), float(found["peak_mb"]), int(found["attempts"]))
-    except (OSError, PatinaError, ValueError, KeyError, TypeError):
+    except (ValueError, TypeError):
         return None
-
-
-def result_hash(folder: Path) -> str:
-    """A hash of a result: of the record of its files, with a hash of each. Raises OSError where
-    one of the files is missing."""
-    content = (folder / WRITTEN_FILES).read_bytes()
-    for name in json.loads(content):
-        os.stat(folder / name)
-    return hashlib.blake2b(content).hexdigest()[:32]
 
 
 def input_hash(capture: Path, words: Sequence[str], version: str) -> str:
@@ -60,7 +50,7 @@ def input_hash(capture: Path, words: Sequence[str], version: str) -> str:
     capture file, and size and time of change of the files that it names."""
     digest = hashlib.blake2b(json.dumps([version, *words]).encode())
     try:
-        digest.update(read_regular(capture, MAX_RECORD_BYTES * 64))
+        digest.update(read_regular(capture, MAX_CAPTURE_BYTES))
         files = sorted(_files(read_capture(capture)))
     except (OSError, PatinaError):  # the run will say what is wrong with it
         files = []

@@ -15,6 +15,7 @@ from typing import Any
 
 LOOK_INTERVAL = 0.2  # seconds between two looks at the process
 END_SECONDS = 5.0  # that a process has to remove its incomplete files before it is killed
+MAX_RECORD_BYTES = 1 << 20
 MAX_MESSAGE = 2000  # characters of an error that are kept
 
 
@@ -34,7 +35,7 @@ def run_process(
     result: folder that the process writes; record: file to write where it succeeds; inputs: hash of
     what the result depends on. max_gb, max_seconds: limits, 0 for none.
     """
-    known = _recorded(result, record, inputs)
+    known = recorded(result, record, inputs)
     if known is not None:  # by a worker that was lost before it could report
         return known
     since = time.monotonic()
@@ -67,9 +68,12 @@ def run_process(
     return found
 
 
-def _recorded(result: str, record: str, inputs: str) -> dict[str, Any] | None:
-    """The record of an object that is finished, else None."""
+def recorded(result: str, record: str, inputs: str) -> dict[str, Any] | None:
+    """The record of an object whose result is there, and was computed from the same inputs; else
+    None."""
     try:
+        if not os.path.isfile(record) or os.path.getsize(record) > MAX_RECORD_BYTES:
+            return None
         known = json.loads(Path(record).read_bytes())
         if known["inputs"] != inputs or known["result"] != _content(result):
             return None

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from ..concurrency.job import Job, Step
-from ..errors import PatinaError
+from ..errors import PatinaError, system_error
 from .messages import MessageWriter
 from .object_files import read_object, write_object
 from .parent_watch import CANCELLED, end_with_parent
@@ -64,8 +64,7 @@ def _answer(folder: Path, messages: MessageWriter) -> int:
         messages.write(memory=True)
         return FAILED
     except OSError as error:
-        where = "" if error.filename is None else f"{error.filename}: "
-        messages.write(error=f"{where}{error.strerror or error}")
+        messages.write(error=system_error(error))
         return FAILED
     except Exception as error:
         traceback.print_exc()

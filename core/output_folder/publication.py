@@ -118,7 +118,7 @@ def record_again(out: Path, path: Path) -> None:
     with locked_folder(out):
         record = _read_record(out)
         if name in record:
-            record[name]["content"] = _content(path)
+            record[name]["content"] = content_hash(path)
             _write_record(out, record)
 
 
@@ -157,8 +157,8 @@ def _complete(out: Path) -> Kept:
     for name in files_in(ready):
         target = _inside(out, name)
         if plan is not None and os.path.lexists(target):
-            known = (plan.known.get(name), _content(ready / name))
-            if _content(target) not in known:
+            known = (plan.known.get(name), content_hash(ready / name))
+            if content_hash(target) not in known:
                 away = _inside(out, f"{earlier}/{name}")
                 away.parent.mkdir(parents=True, exist_ok=True)
                 os.replace(target, away)
@@ -168,7 +168,7 @@ def _complete(out: Path) -> Kept:
     for name, content in ({} if plan is None else plan.remove).items():
         with contextlib.suppress(ValueError):  # behind a link now
             target = _inside(out, name)
-            if target.is_file() and _content(target) == content:
+            if target.is_file() and content_hash(target) == content:
                 target.unlink()
                 with contextlib.suppress(OSError):  # it has other files
                     target.parent.rmdir()
@@ -237,13 +237,13 @@ def _recorded(folder: Path, names: list[str], owner: Owner) -> Record:
     return {
         name: {
             "owner": owner if isinstance(owner, str) else owner(name),
-            "content": _content(folder / name),
+            "content": content_hash(folder / name),
         }
         for name in names
     }
 
 
-def _content(path: Path) -> str:
+def content_hash(path: Path) -> str:
     """A hash of a file's content; that of a link is its target."""
     if path.is_symlink():
         return f"link to {os.readlink(path)}"

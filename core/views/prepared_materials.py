@@ -3,6 +3,7 @@ seconds; afterwards Blender only has to store them."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
@@ -19,6 +20,8 @@ from ..jobs import CaptureResult
 from ..varying.split import split_body
 from .sphere import lit_sphere
 from .surface_view import at_vertices
+
+log = logging.getLogger(__name__)
 
 PREVIEW_SIZE, ICON_SIZE = 256, 32  # width of a preview and of an icon, pixels
 JOB_FRACTION = 0.96  # share of the fit in the progress of a PreparedJob
@@ -116,4 +119,5 @@ class EditedMaterialJob(Job):
             try:
                 self.found[piece] = material_piece(self.brdf, piece)
             except Exception:  # extreme sliders may fail; the other pieces must still be updated
+                log.exception("The %s of an edited material could not be computed.", piece)
                 self.found[piece] = None

@@ -29,7 +29,6 @@ from ...core.views.prepared_materials import (
     SAMPLING,
     SPHERE,
     EditedMaterialJob,
-    material_piece,
 )
 from ..property_keys import SHOWN_TRAITS
 from ..session.child_processes import end_child, start_child
@@ -106,16 +105,9 @@ def finish_updates() -> None:
     """Update all pieces of all materials and wait for them. For scripts, where no timer runs."""
     while (todo := _next()) is not None:
         now, brdf, pieces = todo
-        _apply(pieces[0], now, _computed(brdf, pieces[0]))
-
-
-def _computed(brdf: PrincipalBRDF, piece: str) -> Any:
-    """A piece, None where it cannot be computed: extreme sliders may fail."""
-    try:
-        return material_piece(brdf, piece)
-    except Exception:
-        log.exception("The %s of an edited material could not be computed.", piece)
-        return None
+        job = EditedMaterialJob(brdf, pieces[:1])
+        job.drain()
+        _apply(pieces[0], now, job.found[pieces[0]])
 
 
 def _pieces(material: bpy.types.Material) -> list[str]:
