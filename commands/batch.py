@@ -13,8 +13,8 @@ from pathlib import Path
 from ..core.batch.cluster import Limits, Work, run_on_cluster
 from ..core.batch.collection import Item, read_collection
 from ..core.batch.farm_files import write_flamenco, write_openjd
-from ..core.batch.page import PAGE, write_page
-from ..core.batch.record import Finished, finished, input_hash, record_file
+from ..core.batch.page import PAGE, TABLE, write_page
+from ..core.batch.record import ENDING, Finished, finished, input_hash, record_file
 from ..core.batch.remote import run_process
 from ..core.batch.rig_errors import rig_errors
 from ..core.batch.summary import FAILED, Summary, summary_of
@@ -22,8 +22,9 @@ from ..core.child_process.parent_watch import END_WITH_PARENT
 from ..core.child_process.python_command import ROOT, python_command, python_environment
 from ..core.counted import counted
 from ..core.errors import InputError, PatinaError
+from ..core.files import remove_unfinished
 from ..core.jobs.varying.variation_estimator import MODES
-from ..core.output_folder import check_out
+from ..core.output_folder import check_out, only_writer
 from ..core.report.result_json import program_version
 from .needs_blender import has_blender
 from .progress import print_note
@@ -88,6 +89,16 @@ def run(arguments: argparse.Namespace) -> None:
             path = write_flamenco(out, names, words)
         print(f"wrote {path}")
         return
+    with only_writer(out):
+        _run_batch(arguments, items, out, limits)
+
+
+def _run_batch(
+    arguments: argparse.Namespace, items: Sequence[Item], out: Path, limits: Limits
+) -> None:
+    """Run what is not finished, and write the page. Raises PatinaError where an object fails."""
+    for pattern in (PAGE, TABLE, f"*{ENDING}"):
+        remove_unfinished(out, pattern)
     work = _work(arguments, items, out)
     summaries, left = _known(out, work)
     if len(left) < len(work):

@@ -8,10 +8,13 @@ import errno
 import os
 import secrets
 import stat
+import time
 import unicodedata
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
+
+MIN_AGE = 60.0  # seconds, of an unfinished file that counts as abandoned: each takes less to write
 
 
 @contextlib.contextmanager
@@ -37,6 +40,15 @@ def write_text_atomic(path: Path, text: str) -> None:
     """Write a text as UTF-8, atomically. Raises OSError."""
     with atomic_path(path) as partial:
         partial.write_text(text, "utf-8")
+
+
+def remove_unfinished(folder: Path, pattern: str) -> None:
+    """Remove the unfinished files that killed processes have left. pattern: of the names of the
+    finished ones."""
+    for path in folder.glob(f"{pattern}.*.part"):
+        with contextlib.suppress(OSError):
+            if time.time() - os.lstat(path).st_mtime > MIN_AGE:
+                path.unlink()
 
 
 def as_file_name(name: str) -> str:

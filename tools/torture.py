@@ -28,27 +28,37 @@ from .common import ROOT
 from .package import load_patina
 
 MEGAPIXELS, TRIANGLES, PHOTOS, VIEWS = 0.02, 2000, 3, 4
-COMMANDS = ("fit", "masks", "material", "diagnose", "maps", "solve")
+COMMANDS = ("fit", "masks", "material", "diagnose", "maps", "solve", "batch")
 NAMES = ("alpha", "beta")  # of the material in the two captures
 LATE_SHARE = 0.5  # of the kills happen in the last part of a run, where its result is moved
 LATE = 0.85  # start of this part
 AGE = 120.0  # seconds by which abandoned folders are aged: younger ones may belong to a process
 LEFTOVERS = (".patina-part-", ".patina-ready", "patina-unpublished-", "earlier-")
+PARTIAL = ".part"  # ending of files that are being written
+OBJECT = "object"  # name of the object of a batch
+END_SECONDS = 10.0  # after which the processes of a killed command must have ended
 
 
 @dataclass
 class Case:
-    """A command. words: its arguments with a capture (0 or 1), without --out; listed: the files of
-    a whole result, for each capture; seconds: an uninterrupted run."""
+    """A command. out: its folder; words: its arguments with a capture (0 or 1), without --out;
+    inner: folder of the result in ``out``; listed: the files of a whole result, for each capture;
+    seconds: an uninterrupted run."""
 
     name: str
     out: Path
     words: Callable[[int], list[str]]
+    inner: str = ""
     listed: list[set[str]] = field(default_factory=list)
     seconds: float = 0.0
     kills: int = 0
     old: int = 0
     new: int = 0
+
+    @property
+    def result(self) -> Path:
+        """The folder of the result."""
+        return self.out / self.inner
 
     def command(self, which: int) -> list[str]:
         """The words of the process."""
@@ -92,6 +102,9 @@ def _cases(folder: Path, chosen: Sequence[str]) -> list[Case]:
         for i, view in enumerate(islice(made.ring(30, heights=(height,)), VIEWS)):
             made.write_picture(shoot / f"photo {i}.jpg", made.photo(view, seed=i))
     results = [folder / f"result {name}" for name in NAMES]
+    tables = [folder / f"{name}.csv" for name in NAMES]
+    for table, capture in zip(tables, captures, strict=True):
+        table.write_text(f"capture,name\n{capture},{OBJECT}\n", "utf-8")
     cases = [
         Case("fit", folder / "fit", lambda which: [str(captures[which])]),
         Case("masks", folder / "masks", lambda which: [str(captures[which]), "--shadows"]),
@@ -107,6 +120,7 @@ def _cases(folder: Path, chosen: Sequence[str]) -> list[Case]:
             lambda which: [str(captures[which]), str(results[which]), "--size", "64"],
         ),
         Case("solve", folder / "solve", lambda which: [str(shoots[which]), "--threads", "2"]),
+        Case("batch", folder / "batch", lambda which: [str(tables[which])], inner=OBJECT),
     ]
     cases = [case for case in cases if not chosen or case.name in chosen]
     if {case.name for case in cases} & {"material", "maps"}:
@@ -129,7 +143,7 @@ def _prepare(case: Case) -> None:
         since = time.monotonic()
         _run(case.command(which))
         case.seconds = time.monotonic() - since
-        case.listed.insert(0, _files(case.out))
+        case.listed.insert(0, _files(case.result))
     assert case.name == "masks" or case.listed[0] != case.listed[1], case.name
 
 
@@ -149,7 +163,7 @@ def _kill(cases: Sequence[Case], kills: int, chance: random.Random) -> list[str]
         which = 1 - before
         late = chance.random() < LATE_SHARE
         moment = case.seconds * (chance.uniform(LATE, 1.05) if late else chance.random())
-        _age(case.out)
+        _age(case)
         process = subprocess.Popen(
             case.command(which),
             stdout=subprocess.DEVNULL,
@@ -161,9 +175,10 @@ def _kill(cases: Sequence[Case], kills: int, chance: random.Random) -> list[str]
             if process.wait(moment):
                 failed = [f"ended with exit code {process.returncode}"]
         except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
+            process.kill()  # alone: its own processes must end with it
             process.wait()
             case.kills += 1
+            failed = _survivors(process.pid)
         faults = [
             f"{case.name}, kill {number} after {moment:.2f} s: {f}"
             for f in (*failed, *_faults(case))
@@ -176,9 +191,22 @@ def _kill(cases: Sequence[Case], kills: int, chance: random.Random) -> list[str]
     return wrong
 
 
+def _survivors(group: int) -> list[str]:
+    """Whether processes of a killed command still run after END_SECONDS; they are killed then."""
+    until = time.monotonic() + END_SECONDS
+    while time.monotonic() < until:
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return []
+        time.sleep(0.05)
+    os.killpg(group, signal.SIGKILL)
+    return [f"processes still ran {END_SECONDS:g} s after the kill"]
+
+
 def _shown(case: Case) -> int:
     """Which capture the result is of."""
-    text = " ".join(sorted(_files(case.out)))
+    text = " ".join(sorted(_files(case.result)))
     if case.name == "masks":
         return int(NAMES[1] in text)
     return int(text == " ".join(sorted(case.listed[1])))
@@ -189,17 +217,21 @@ def _faults(case: Case) -> list[str]:
     from patina.core.output_folder import complete_publication
     from patina.core.output_folder.publication import RECORD, content_hash
 
-    complete_publication(case.out)
-    files = _files(case.out)
+    complete_publication(case.result)
+    files = _files(case.result)
     if files not in case.listed:
         nearest = min(case.listed, key=lambda one: len(one ^ files))
         return [f"missing {sorted(nearest - files)}, stale {sorted(files - nearest)}"]
-    empty = [name for name in files if not (case.out / name).stat().st_size]
-    record = case.out / RECORD
+    empty = [name for name in files if not (case.result / name).stat().st_size]
+    record = case.result / RECORD
     if not record.is_file():
         return [f"empty: {empty}"] if empty else []
     known = json.loads(record.read_text("utf-8"))
-    other = [n for n in files if n in known and content_hash(case.out / n) != known[n]["content"]]
+    other = [
+        name
+        for name in files
+        if name in known and content_hash(case.result / name) != known[name]["content"]
+    ]
     unknown = sorted(files - set(known))
     faults = [f"not of one result: {other}"] if other else []
     return [*faults, f"not recorded: {unknown}"] if unknown else faults
@@ -207,18 +239,19 @@ def _faults(case: Case) -> list[str]:
 
 def _left(case: Case) -> list[str]:
     """What is left beside a result after another run."""
-    _age(case.out)
+    _age(case)
     _run(case.command(0))
-    names = [p.name for folder in (case.out, case.out.parent) for p in folder.iterdir()]
-    left = [name for name in names if name.startswith(LEFTOVERS)]
+    folders = {case.result, case.out, case.out.parent}
+    names = [path.name for folder in folders for path in folder.iterdir()]
+    left = [name for name in names if name.startswith(LEFTOVERS) or name.endswith(PARTIAL)]
     return [f"{case.name}: left behind: {left}"] if left else _faults(case)
 
 
-def _age(out: Path) -> None:
-    """Let the folders of killed processes be as old as those that are removed."""
+def _age(case: Case) -> None:
+    """Let what killed processes have left be as old as what is removed."""
     then = time.time() - AGE
-    for folder in (out, out.parent):
-        for path in folder.glob(".patina-part-*"):
+    for folder in (case.result, case.out, case.out.parent):
+        for path in (*folder.glob(".patina-part-*"), *folder.glob(f"*{PARTIAL}")):
             os.utime(path, (then, then))
 
 

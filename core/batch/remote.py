@@ -7,6 +7,7 @@ import contextlib
 import hashlib
 import json
 import os
+import secrets
 import subprocess
 import tempfile
 import time
@@ -62,7 +63,7 @@ def run_process(
     }  # fmt: skip
     if process.returncode == 0 and not stopped:
         own = {"inputs": inputs, "result": _content(result), **found}
-        partial = Path(f"{record}.{os.getpid()}.part")
+        partial = Path(f"{record}.{secrets.token_hex(8)}.part")  # as core/files.py names it
         partial.write_text(json.dumps(own), "utf-8")
         os.replace(partial, record)
     return found

@@ -1,6 +1,14 @@
 """Write results completely or not at all, and without losing work of the user."""
 
 from .folder import check_out, scratch_folder, staged_folder
+from .folder_lock import only_writer
 from .publication import complete_publication, record_again
 
-__all__ = ["check_out", "complete_publication", "record_again", "scratch_folder", "staged_folder"]
+__all__ = [
+    "check_out",
+    "complete_publication",
+    "only_writer",
+    "record_again",
+    "scratch_folder",
+    "staged_folder",
+]

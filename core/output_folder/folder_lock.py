@@ -74,6 +74,22 @@ def locked_folder(folder: Path) -> Iterator[None]:
         held.close()
 
 
+@contextlib.contextmanager
+def only_writer(folder: Path) -> Iterator[None]:
+    """Hold the lock of a folder for a long time. Raises InputError at once where another process
+    holds it."""
+    held = lock_folder(folder)
+    if held is None:
+        raise InputError(
+            "another process is writing to it; wait until it ends, or choose another folder",
+            file=folder,
+        )
+    try:
+        yield
+    finally:
+        held.close()
+
+
 def _try_lock(handle: int) -> bool | None:
     """Lock an open file without waiting. None: another process has it; False: no locks here."""
     if sys.platform == "win32":

@@ -26,6 +26,7 @@ from patina.core.batch.record import finished, input_hash
 from patina.core.batch.rig_errors import common_mean, rig_errors
 from patina.core.batch.summary import FAILED, FINISHED, Cause, Summary
 from patina.core.errors import InputError
+from patina.core.output_folder import only_writer
 
 pytest.importorskip("distributed")
 FAKE = Path(__file__).parents[1] / "fake_command.py"
@@ -205,6 +206,22 @@ def test_a_record_of_other_inputs_or_of_a_damaged_result_does_not_count(tmp_path
     assert first == input_hash(capture, ["fit"], "1") != input_hash(capture, ["fit"], "2")
     capture.write_text("other")
     assert input_hash(capture, ["fit"], "1") != first
+
+
+def test_two_batches_at_once_are_refused_and_unfinished_files_are_removed(tmp_path, capsys):
+    path = collection(tmp_path / "all", one="")
+    out = tmp_path / "out"
+    out.mkdir()
+    old, new = out / "one.batch.json.0123.part", out / "collection.html.4567.part"
+    for file in (old, new):
+        file.write_text("half")
+    os.utime(old, (0, 0))
+    with only_writer(out):
+        assert batch(path, out) == 2
+    assert "another process is writing to it" in capsys.readouterr().err
+    assert batch(path, out) == 0
+    assert new.is_file() and not old.exists(), "another process may be writing the new one"
+    assert not list(out.glob(".patina-lock"))
 
 
 def diagnosed(name: str, value: float, error: float, named: bool = True) -> Summary:
