@@ -20,7 +20,8 @@ COMMANDS = {
     "pictures": ("tools.make_pictures", "render the pictures of docs/images again"),
     "experiments": ("tools.experiments", "run the experiments of docs/method/experiments.md"),
     "hunt": ("tools.hunt.table", "diagnose simulated captures with a hidden effect"),
-    "torture": ("tools.torture", "kill commands at random, and check that no result is lost"),
+    "torture": ("tools.faults.kills", "kill commands at random, and check that no result is lost"),
+    "faults": ("tools.faults.conditions", "run commands on a full disk, in a read-only folder ..."),
     "fuzz": ("tools.fuzz", "give changed files to the readers, and look for faults"),
     "bench": ("tools.bench_main", "run the benchmarks behind the figures in docs/"),
 }

@@ -3,6 +3,7 @@
 #   real_blender.sh install [DIR]       Blender 4.3 with Python 3.13 (about 2 minutes, 1.5 GB)
 #   real_blender.sh blender DIR ARGS    run that Blender; the current folder, the checkout, the
 #                                       folder ../shared and Patina's cache have the same paths
+#   real_blender.sh python DIR ARGS     run its Python 3.13 in the same way
 #   real_blender.sh session DIR OUT     tools/window/session.py in a real window on a virtual screen:
 #                                       screenshots of every stage in OUT (with the extension
 #                                       that `run.py headless` installed)
@@ -61,14 +62,16 @@ unset IN_NAMESPACE
 shift || true
 case $what in
 install) install "${1:-/opt/blender-trixie}" ;;
-blender)
+blender | python)
+  program=blender
+  [ "$what" = blender ] || program=python3
   dir=$1; shift
   system "$dir"
   bind "$dir" "$here"
   bind "$dir" "$(dirname "$here")/shared"
   bind "$dir" "${PATINA_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/patina}"
   bind "$dir" "$PWD"
-  exec chroot "$dir" /bin/bash -c 'cd "$0" && exec blender "$@"' "$PWD" "$@" ;;
+  exec chroot "$dir" /bin/bash -c 'cd "$0" && exec "$@"' "$PWD" "$program" "$@" ;;
 session | own | ended)
   dir=$1; shift
   script=(tools/window/session.py --)

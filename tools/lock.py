@@ -14,19 +14,10 @@ import sys
 import tempfile
 from pathlib import Path
 
+from .check_extension import RELEASES
 from .common import Failure, say
 from .environment import BPY, LOCKS, TEST_TOOLS, lock_file
-from .wheels import PINS, PLATFORMS, checksums, requirements, wheel_name
-
-TAGS = {
-    "linux-x64": ["manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux_2_17_x86_64",
-                  "manylinux2014_x86_64", "manylinux_2_12_x86_64", "manylinux2010_x86_64",
-                  "manylinux_2_5_x86_64", "manylinux1_x86_64", "linux_x86_64"],
-    "windows-x64": ["win_amd64"],
-    "macos-arm64": ["macosx_14_0_arm64", "macosx_13_0_arm64", "macosx_12_0_arm64",
-                    "macosx_11_0_arm64", "macosx_10_13_universal2", "macosx_10_9_universal2"],
-}  # fmt: skip
-"""Platform → platform tags that pip accepts there."""
+from .wheels import PINS, PIP_TAGS, PLATFORMS, checksums, requirements, wheel_name
 
 ALSO = {"windows-x64": ["colorama==0.4.6"]}
 """Platform → packages that others need there: pip evaluates conditions on the platform for the one
@@ -53,6 +44,10 @@ def main() -> int:
                 lock_file(version, platform, True),
                 {name: sums for name, sums in tests.items() if name not in base},
             )
+    for one in RELEASES:
+        exact = [f"bpy=={one.bpy}", f"numpy=={one.numpy}"]
+        found = _resolved(exact, one.python, "linux-x64")
+        _write(one.lock, {name: found[name] for name in exact})
     return 0
 
 
@@ -66,7 +61,7 @@ def _resolved(wanted: list[str], version: tuple[int, int], platform: str) -> Pac
             "--only-binary=:all:", "--ignore-requires-python", "--target", folder,
             "--python-version", number, "--implementation", "cp",
             "--abi", abi, "--abi", "abi3", "--abi", "none",
-            *(word for tag in TAGS[platform] for word in ("--platform", tag)),
+            *(word for tag in PIP_TAGS[platform] for word in ("--platform", tag)),
             "--report", str(report), *wanted,
         ]  # fmt: skip
         done = subprocess.run(command, capture_output=True, text=True)

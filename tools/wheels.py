@@ -55,6 +55,16 @@ TAGS = {
 scipy also has a wheel for macOS 14; the one for macOS 12 runs on both.
 """
 
+PIP_TAGS = {
+    "linux-x64": ["manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux_2_17_x86_64",
+                  "manylinux2014_x86_64", "manylinux_2_12_x86_64", "manylinux2010_x86_64",
+                  "manylinux_2_5_x86_64", "manylinux1_x86_64", "linux_x86_64"],
+    "windows-x64": ["win_amd64"],
+    "macos-arm64": ["macosx_14_0_arm64", "macosx_13_0_arm64", "macosx_12_0_arm64",
+                    "macosx_11_0_arm64", "macosx_10_13_universal2", "macosx_10_9_universal2"],
+}  # fmt: skip
+"""Platform → platform tags that pip accepts there."""
+
 PURE = {"defusedxml": "py2.py3"}  # Python tag of a pure wheel, if not py3
 
 FOLDER = ROOT / "wheels"
