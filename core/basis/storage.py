@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UNREADABLE_NPZ, InputError
-from ..files import atomic_path, open_regular
+from ..files import atomic_path
+from ..npz_file import open_npz
 from .basis import Basis
 from .grid import AngleGrid
 
@@ -24,6 +25,7 @@ FINE_COUNT = 10  # components with the finer step
 LOG_STEP = 0.0005
 TRAINING_STEP = 1e-4  # of the training coefficients, whose standard deviation is 0.06
 FORMAT = 2
+MAX_BYTES = 1 << 28  # unpacked; a basis of the MERL database has 24 MB
 
 Steps = Sequence[float] | NDArray[np.floating]
 
@@ -53,7 +55,7 @@ def load(path: Path) -> Basis:
     """Read a basis written by :func:`save`, also by earlier versions (which kept no training
     coefficients). Raises InputError for anything else."""
     try:
-        with open_regular(path) as file, np.load(file, allow_pickle=False) as data:
+        with open_npz(path, MAX_BYTES) as data:
             version = int(data["format"])
             if version not in (1, FORMAT):
                 raise InputError(f"basis format {version}; expected {FORMAT} or 1", file=path)

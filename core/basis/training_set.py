@@ -16,13 +16,15 @@ from numpy.typing import NDArray
 
 from ..angles import Angles
 from ..errors import UNREADABLE_NPZ, InputError, PatinaError
-from ..files import atomic_path, open_regular
+from ..files import atomic_path
+from ..npz_file import open_npz
 from . import components, mapping
 from .basis import Basis, Progress
 from .grid import AngleGrid
 from .training import BLOCK, DEFAULT_COUNT, DEFAULT_GRID, Observations, fill_unmeasured
 
 FORMAT = 1
+MAX_BYTES = 1 << 30  # unpacked; the 100 materials of the MERL database have 0.3 GB
 
 
 @dataclass(frozen=True)
@@ -142,7 +144,7 @@ class TrainingSet:
     def load(path: Path) -> TrainingSet:
         """Read a set written by :meth:`save`. Raises InputError for anything else."""
         try:
-            with open_regular(path) as file, np.load(file, allow_pickle=False) as data:
+            with open_npz(path, MAX_BYTES) as data:
                 if int(data["format"]) != FORMAT:
                     raise InputError(f"format {int(data['format'])}; expected {FORMAT}", file=path)
                 n_h, n_d, n_p, knee = (float(x) for x in data["grid"])

@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 
 from ..angles import Angles
 from ..errors import UNREADABLE_NPZ, InputError
-from ..files import open_regular
+from ..npz_file import open_npz
 
 WEIGHTS = 675  # 6·21 + 21 + 21·21 + 21 + 21·3 + 3
+MAX_BYTES = 1 << 26  # unpacked; the encodings of the MERL database have 0.3 MB
 
 
 def load(path: Path) -> tuple[list[str], NDArray[np.float32]]:
     """(names, weights (n, 675)) from an .npz of encodings. Raises InputError for anything else."""
     try:
-        with open_regular(path) as file, np.load(file) as data:
+        with open_npz(path, MAX_BYTES) as data:
             names = [str(n) for n in data["names"]]
             weights = np.asarray(data["weights"]).astype(np.float32)
     except UNREADABLE_NPZ as error:

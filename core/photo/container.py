@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..errors import InputError
+from .exr_check import check_exr
 from .jpeg_check import check_jpeg, check_jpeg_header
 from .per_file import once_per_file
 from .png_check import SIGNATURE, check_png, check_png_header
@@ -100,6 +101,8 @@ def _check(path: Path, whole: bool) -> Container:
             (check_jpeg if whole else check_jpeg_header)(path)
         elif kind == "tiff":
             check_tiff(path)
+        elif kind == "openexr":
+            check_exr(path)
         elif kind == "hdr":
             return Container(kind, scale=check_hdr(path))
         return Container(kind)

@@ -6,9 +6,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import InputError
+from .metadata_limit import MAX_METADATA_BYTES, check_metadata_size
 from .tiff_tags import Value, read_tiff_tags
 
 PHOTOMETRIC, STRIP_OFFSETS, STRIP_BYTES, TILE_OFFSETS, TILE_BYTES = 262, 273, 279, 324, 325
+LAYERS = 37724  # ImageSourceData: the layers of Photoshop
+MAX_LAYERS_BYTES = 1 << 30
 UNSUPPORTED = {  # values of PhotometricInterpretation
     4: "a transparency mask",
     5: "CMYK colours for printing",
@@ -21,8 +24,8 @@ UNSUPPORTED = {  # values of PhotometricInterpretation
 
 
 def check_tiff(path: Path) -> None:
-    """Raise InputError for a TIFF that is not RGB or grey, or is truncated (TIFF 6.0; tags of the
-    first directory)."""
+    """Raise InputError for a TIFF that is not RGB or grey, is truncated, or has a value of too many
+    bytes (TIFF 6.0; tags of the first directory)."""
     with path.open("rb") as file:
         tags = read_tiff_tags(file)
     if tags is None or not tags.main:
@@ -35,6 +38,8 @@ def check_tiff(path: Path) -> None:
             "its own suffix (.dng …)",
             file=path,
         )
+    for tag, size in tags.sizes.items():
+        check_metadata_size(path, size, MAX_LAYERS_BYTES if tag == LAYERS else MAX_METADATA_BYTES)
     size = path.stat().st_size
     for offsets, lengths in ((STRIP_OFFSETS, STRIP_BYTES), (TILE_OFFSETS, TILE_BYTES)):
         starts, byte_counts = _integers(tags.main.get(offsets)), _integers(tags.main.get(lengths))

@@ -7,7 +7,7 @@ Panasonic use. Every count, offset and denominator is checked, because files may
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import BinaryIO
 
@@ -29,13 +29,15 @@ class TiffTags:
     """Tags of the directories that describe a photo: {tag number: value}.
 
     A value is text (type ASCII, cut at the first NUL), bytes (type UNDEFINED) or a tuple of
-    numbers; rationals are Fractions, and None where the denominator is zero.
+    numbers; rationals are Fractions, and None where the denominator is zero. sizes: bytes of each
+    value, also of those that are not read.
     """
 
     main: dict[int, Value]
     exif: dict[int, Value]
     gps: dict[int, Value]
     interoperability: dict[int, Value]
+    sizes: dict[int, int] = field(default_factory=dict)
 
 
 def read_tiff_tags(file: BinaryIO, start: int = 0) -> TiffTags | None:
@@ -52,15 +54,19 @@ def read_tiff_tags(file: BinaryIO, start: int = 0) -> TiffTags | None:
     if big and len(head) < 16:
         return None
     offset = struct.unpack_from(order + ("Q" if big else "I"), head, 8 if big else 4)[0]
-    main = _directory(file, start, offset, order, big)
+    sizes: dict[int, int] = {}
+    main = _directory(file, start, offset, order, big, sizes)
 
     def pointed(directory: dict[int, Value], tag: int) -> dict[int, Value]:
         value = directory.get(tag)
         place = value[0] if isinstance(value, tuple) else None
-        return _directory(file, start, place, order, big) if isinstance(place, int) else {}
+        if not isinstance(place, int):
+            return {}
+        return _directory(file, start, place, order, big, sizes)
 
     exif = pointed(main, 0x8769)
-    return TiffTags(main, exif, pointed(main, 0x8825), pointed(exif, 0xA005))
+    gps, more = pointed(main, 0x8825), pointed(exif, 0xA005)
+    return TiffTags(main, exif, gps, more, sizes)
 
 
 def _read(file: BinaryIO, place: int, size: int) -> bytes:
@@ -70,8 +76,11 @@ def _read(file: BinaryIO, place: int, size: int) -> bytes:
     return file.read(size)
 
 
-def _directory(file: BinaryIO, start: int, offset: int, order: str, big: bool) -> dict[int, Value]:
-    """{tag: value} of one directory; entries that point outside the file are ignored."""
+def _directory(
+    file: BinaryIO, start: int, offset: int, order: str, big: bool, sizes: dict[int, int]
+) -> dict[int, Value]:
+    """{tag: value} of one directory; entries that point outside the file are ignored. sizes: gets
+    {tag: bytes} of all entries."""
     count_code, entry_code, inline = ("Q", "HHQ8s", 8) if big else ("H", "HHI4s", 4)
     width = struct.calcsize(order + count_code)
     head = _read(file, start + offset, width)
@@ -84,6 +93,7 @@ def _directory(file: BinaryIO, start: int, offset: int, order: str, big: bool) -
     for place in range(0, len(entries) - size + 1, size):
         tag, kind, number, field = struct.unpack_from(order + entry_code, entries, place)
         length = SIZES.get(kind, 0) * number
+        sizes[tag] = max(length, sizes.get(tag, 0))
         if not 0 < length <= MAX_VALUE_BYTES or tag in found:
             continue
         if length > inline:

@@ -201,6 +201,10 @@ def test_storage_round_trip_and_truncated_file(basis: Basis, tmp_path: Path) -> 
     path.write_bytes(path.read_bytes()[:5000])
     with pytest.raises(InputError, match=r"b\.npz"):
         storage.load(path)
+    np.savez_compressed(path, format=np.int32(2), components=np.zeros(1 << 27, np.int32))
+    assert path.stat().st_size < 1 << 20
+    with pytest.raises(InputError, match="unpacks to 537 MB; expected at most 268 MB"):
+        storage.load(path)
 
 
 def test_interpolation_is_exact_at_nodes_and_periodic(basis: Basis) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import struct
 import time
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 
 from patina.core.errors import InputError
 from patina.core.photo import image_size, read_encoded, read_exif
+from patina.core.photo.image import write_exr
 from patina.core.photo.per_file import once_per_file
 from tests import make_photos as made
 
@@ -34,6 +36,45 @@ def test_size_needs_no_pixels(tmp_path: Path, name: str) -> None:
     assert read_exif(path).exposure_time == 1 / 50
     with pytest.raises(InputError, match="is truncated"):
         read_encoded(path)
+
+
+LARGE = 1 << 26  # bytes of a value: more than any photo has
+
+
+def test_values_that_no_photo_has_are_refused_before_a_library_reads_them(tmp_path: Path) -> None:
+    path = tmp_path / "a.exr"
+    write_exr(path, np.ones((8, 8, 3), np.float32))
+    content = path.read_bytes()
+    for size, refused in ((1 << 20, False), (LARGE, True)):
+        attribute = b"notes\0string\0" + size.to_bytes(4, "little") + bytes(size)
+        path.write_bytes(content[:8] + attribute + content[8:])
+        if refused:
+            with pytest.raises(InputError, match=r"declares .* of 67 MB"):
+                read_encoded(path)
+        else:
+            assert read_encoded(path).max() == 1.0
+    path.write_bytes(content[:60])
+    with pytest.raises(InputError, match="EXR header"):
+        read_encoded(path)
+
+
+@pytest.mark.parametrize(("tag", "refused"), [(34675, True), (700, True), (37724, False)])
+def test_large_values_of_a_tiff(tmp_path: Path, tag: int, refused: bool) -> None:
+    path = tmp_path / "a.tif"
+    entries = [(256, 4, 8), (257, 4, 8), (258, 3, 8), (259, 3, 1), (262, 3, 1), (273, 4, 512),
+               (277, 3, 1), (278, 4, 8), (279, 4, 64)]  # fmt: skip
+    head = b"II*\0" + (8).to_bytes(4, "little") + (len(entries) + 1).to_bytes(2, "little")
+    for number, kind, value in entries:
+        head += struct.pack("<HHII", number, kind, 1, value)
+    head += struct.pack("<HHIII", tag, 7, LARGE, 1024, 0)
+    with path.open("wb") as file:
+        file.write(head.ljust(1024, b"\x80"))
+        file.truncate(1024 + LARGE)
+    if refused:
+        with pytest.raises(InputError, match=r"declares .* of 67 MB"):
+            read_encoded(path)
+    else:  # layers of Photoshop
+        assert read_encoded(path).shape == (8, 8, 3)
 
 
 def test_a_file_is_read_again_only_after_a_change(tmp_path: Path) -> None:

@@ -1,0 +1,29 @@
+"""Read an .npz only up to a size: a file of 6 MB can unpack to gigabytes."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .files import open_regular
+
+
+@contextmanager
+def open_npz(path: Path, max_bytes: int) -> Iterator[Any]:
+    """The arrays of an .npz without pickled objects. max_bytes: of all, unpacked. Raises
+    ValueError where they have more, and UNREADABLE_NPZ where it is no such file."""
+    with open_regular(path) as file:
+        with zipfile.ZipFile(file) as archive:  # reads no more of an entry than it declares
+            declared = sum(entry.file_size for entry in archive.infolist())
+        if declared > max_bytes:
+            raise ValueError(
+                f"it unpacks to {declared / 1e6:.0f} MB; expected at most {max_bytes / 1e6:.0f} MB"
+            )
+        file.seek(0)
+        with np.load(file, allow_pickle=False) as data:
+            yield data
