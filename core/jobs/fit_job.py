@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -13,12 +12,12 @@ from numpy.typing import NDArray
 from ..appearance.lobe_fit import LobeStackFit
 from ..appearance.principled_fit import PrincipledFit
 from ..basis import Basis, default_basis
-from ..capture import Capture, LightEntry
+from ..capture import Capture
 from ..concurrency.background import in_background
 from ..concurrency.job import Job, Step, finished
 from ..concurrency.steps import relayed
 from ..counted import counted
-from ..errors import FitError
+from ..errors import FitError, InputError
 from ..fit import PaperFit
 from ..fit.fit_quality import FitQuality
 from ..fit.held_out import HeldOutErrors, Judge
@@ -33,14 +32,16 @@ from ..samples.level import multiplied, typical_factor
 from ..scan import Scan
 from ..varying.varying_surface import VaryingSurface
 from .applied_effects import AppliedEffect
+from .axis_exchange import better_axes, with_axes
 from .estimators import Estimate, estimate
 from .face_assignment import face_materials
 from .fit_times import ASSIGNING, FitTimes
 from .fit_warnings import black_photo_warnings, material_warnings, quality_warnings
 from .portable_materials import Portable, fit_portable
+from .sample_checks import check_light, check_samples, material_entry
 from .sampling import PhotoSamples, take_samples
 
-MIN_RHO, MAX_RHO = 1e-6, 1e4  # 1/sr: black velvet has 1e-3, peaks of mirrors 1e4
+AXES_ERROR = 0.3  # typical error of held-out photos from which other axes of the mesh are tried
 
 
 @dataclass(frozen=True)
@@ -127,12 +128,6 @@ def with_portable(
     return replace(material, portable=found, warnings=warnings)
 
 
-def _location_key(entry: LightEntry) -> str:
-    """The key of a [[light]] table that gives the light's direction or position."""
-    keys = ("sphere", "sun", "position", "mounted")
-    return next((key for key in keys if getattr(entry, key) is not None), "direction")
-
-
 class FitJob(Job):
     """Fit every material of a capture; ``result`` is set when the job is done.
 
@@ -194,14 +189,17 @@ class FitJob(Job):
                 refined(lights, capture, scan, photos, rays, basis),
                 lambda done: Step("refining the lights", (0.5 + 0.5 * done) * self._times.read),
             )
-        taken = yield from self._take_samples(scan, rays, photos, lights)
-        counts = [int(taken.counts[material.name].sum()) for material in capture.materials]
-        self._times = FitTimes.of(len(capture.photos), pixels, counts, self.portable)
-        results = []
         known = lights.known and capture.fit.absolute
-        tables = [taken.kept.pop(material.name).table() for material in capture.materials]
-        for index, material in enumerate(capture.materials):
-            self._check_samples(index, tables[index], taken.marked[material.name], known)
+        try:
+            taken = yield from self._take_samples(scan, rays, photos, lights)
+            counts = [int(taken.counts[material.name].sum()) for material in capture.materials]
+            tables = [taken.kept.pop(material.name).table() for material in capture.materials]
+            for index, material in enumerate(capture.materials):
+                check_samples(capture, index, tables[index], taken.marked[material.name], known)
+        except InputError as error:
+            raise with_axes(error, capture, scan, rays, photos, lights) from error
+        self._times = FitTimes.of(len(capture.photos), pixels, counts, self.portable)
+        results: list[MaterialResult] = []
         unit = known, 1.0 if known else typical_factor(tables, basis)
         for index, material in enumerate(capture.materials):
             table = multiplied(tables.pop(0), unit[1])
@@ -213,6 +211,12 @@ class FitJob(Job):
             results.append(
                 (yield from self._material(index, table, basis, unit, each, start, share))
             )
+        odd = [m.held_out is not None and m.held_out.typical > AXES_ERROR for m in results]
+        if any(odd) and (hint := better_axes(capture, scan, rays, photos, lights)):
+            results = [
+                replace(material, warnings=(hint, *material.warnings)) if large else material
+                for material, large in zip(results, odd, strict=True)
+            ]
         yield Step("assigning materials to the mesh", 1 - ASSIGNING / self._times.total)
         self.result = CaptureResult(
             capture=capture,
@@ -243,7 +247,7 @@ class FitJob(Job):
             take_samples(self.capture, scan, rays, photos, lights, sinks, self.threads),
             lambda done: Step("sampling the photos", read + (sampled - read) * done),
         )
-        self._check_light(taken)
+        check_light(self.capture, taken)
         return taken
 
     def samples_to_fit(self, index: int, table: SampleTable) -> SampleTable:
@@ -334,59 +338,10 @@ class FitJob(Job):
                 found: Estimate = end.value
                 return found
             except FitError as error:
-                raise self.capture.error(str(error), *self._entry(index)) from error
+                raise self.capture.error(
+                    str(error), *material_entry(self.capture, index)
+                ) from error
             yield Step(stage, start + share * done)
-
-    def _check_light(self, taken: PhotoSamples) -> None:
-        seen_by, lit_by = (Counter[str](), Counter[str]())
-        for place, photo in enumerate(self.capture.photos):
-            seen_by[photo.light] += int(taken.seen[place])
-            lit_by[photo.light] += int(taken.lit[place])
-        if not any(seen_by.values()):
-            raise self.capture.error(
-                "no lit photo shows any part of the mesh; check that mesh and cameras belong "
-                "together",
-                "scan",
-                "mesh",
-            )
-        for place, light in enumerate(self.capture.lights):
-            if seen_by[light.name] and lit_by[light.name] == 0:
-                raise self.capture.error(
-                    f"the light {light.name!r} is behind every surface that its photos show: no "
-                    "pixel is lit; "
-                    + (
-                        "expected a direction from the surface TO the light, in the scan's frame"
-                        if light.distant
-                        else "expected a position outside the object, in scan units"
-                    ),
-                    "light", place, _location_key(light),
-                )  # fmt: skip
-
-    def _check_samples(self, index: int, table: SampleTable, marked: int, known: bool) -> None:
-        name = self.capture.materials[index].name
-        if len(table):
-            level = float(np.median(table.rho.mean(axis=1)))
-            if level <= 0 or (known and not MIN_RHO < level < MAX_RHO):
-                raise self.capture.error(
-                    f"the median BRDF of {name!r} is {level:.3g} 1/sr, which no real surface has; "
-                    "check that light directions point from the surface TO the light, that the "
-                    "photos are linear and not black, and check exposure and irradiance",
-                    *self._entry(index),
-                )
-            return
-        painted = self.capture.named_by_masks(name)
-        found = (
-            f"all pixels are masked out: no mask marks any part of the mesh as {name!r}"
-            if painted and marked == 0
-            else f"none of the {marked} pixels of {name!r} is lit and away from shadow edges"
-        )
-        raise self.capture.error(found, *self._entry(index))
-
-    def _entry(self, index: int) -> tuple[str | int, ...]:
-        """The key that errors about a material name: its own, or the first photo's file where the
-        capture has no [[material]] table."""
-        own = ("material", index, "name")
-        return own if own in self.capture.lines else ("photo", 0, "file")
 
 
 def _pixels(capture: Capture, scan: Scan) -> int:

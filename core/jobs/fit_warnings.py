@@ -20,6 +20,7 @@ MAX_LISTED_PHOTOS = 4  # names in a sentence
 MAX_NORMAL_ERROR = 5.0  # degrees along each tangent
 VIEW_ANGLES = (0.0, 20.0, 40.0, 60.0, 70.0, 80.0)  # degrees from the normal
 MAX_ALBEDO = 1.01  # reflected over incident light: 1 plus the error of the quadrature
+MIN_ALBEDO = 0.004  # along the normal; the darkest material of MERL has 0.005
 BLACK_LEVEL, MAX_BLACK_SHARE = 0.002, 0.1  # of a photo's 95th percentile; of its samples
 
 
@@ -58,15 +59,22 @@ def material_warnings(
 
 
 def _energy_warnings(brdf: PrincipalBRDF) -> list[str]:
-    """A warning where the BRDF reflects more light than it receives (directional albedo > 1)."""
+    """A warning where the BRDF reflects more light than it receives (directional albedo > 1), or
+    less than any material: then the stated irradiance is wrong."""
     albedo = directional_albedo(brdf.evaluate, np.radians(VIEW_ANGLES)).max(axis=1)
     worst = int(albedo.argmax())
+    if albedo[0] < MIN_ALBEDO:
+        return [
+            f"The material reflects only {100 * albedo[0]:.2g} % of the light that comes along "
+            f"the normal; the darkest measured materials reflect {100 * MIN_ALBEDO:g} %. Check the "
+            "irradiance of the lights and the exposures."
+        ]
     if albedo[worst] <= MAX_ALBEDO:
         return []
     return [
         f"Viewed {VIEW_ANGLES[worst]:.0f}° from the normal, the material reflects "
         f"{100 * albedo[worst]:.0f} % of the incident light. Renders limit it to 100 %. Check the "
-        "irradiance of the lights."
+        f"irradiance of the lights: it must be at least {albedo[worst]:.2g} times as large."
     ]
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..appearance.energy import directional_albedo
 from ..fit import PaperFit
 from ..fit.measured_result import NINETY_PERCENT, MeasuredResult
 from ..fit.spread import Spread
@@ -26,6 +27,7 @@ def figures(material: MaterialResult, photos: Sequence[str]) -> list[tuple[str, 
     return [
         ("Held-out photos", _held_out(material)),
         *own,
+        ("Reflected light", _reflected(material)),
         (
             "Principled",
             f"Base colour {colour} · metallic {p.metallic:.2f} · roughness {p.roughness:.2f} · "
@@ -44,6 +46,17 @@ def half_width(deviation: float) -> float:
     """Upper half width of the 90 % interval as a fraction of ρ; deviation: the standard deviation
     of the logarithm of ρ."""
     return float(np.expm1(NINETY_PERCENT * deviation))
+
+
+def _reflected(material: MaterialResult) -> str:
+    """The albedo at normal incidence: an error of the lights' irradiance shows in it."""
+    if not material.irradiance_known:
+        return "Unknown, as is the irradiance of the lights."
+    red, green, blue = 100 * directional_albedo(material.fit.brdf.evaluate, np.zeros(1))[0]
+    return (
+        f"With the irradiance of the capture, the material reflects {red:.0f} % of red, "
+        f"{green:.0f} % of green and {blue:.0f} % of blue light that comes along the normal."
+    )
 
 
 def _held_out(material: MaterialResult) -> str:
