@@ -29,13 +29,15 @@ OBJECT = "object"  # name of the object of a batch
 @dataclass
 class Case:
     """A command. out: its folder; words: its arguments with a capture (0 or 1), without --out;
-    inner: folder of the result in ``out``; listed: the files of a whole result, for each capture;
-    seconds: an uninterrupted run."""
+    inner: folder of the result in ``out``; keeps: whether files of another result stay, as those of
+    exports do; listed: the files of a whole result, for each capture; seconds: an uninterrupted
+    run."""
 
     name: str
     out: Path
     words: Callable[[int], list[str]]
     inner: str = ""
+    keeps: bool = False
     listed: list[set[str]] = field(default_factory=list)
     seconds: float = 0.0
     kills: int = 0
@@ -76,6 +78,7 @@ def make_cases(folder: Path, chosen: Sequence[str]) -> list[Case]:
             "material",
             folder / "material",
             lambda which: [str(results[which]), "--to", "mtlx", "binary"],
+            keeps=True,
         ),
         Case("diagnose", folder / "diagnose", lambda which: [str(captures[which])]),
         Case(
@@ -121,7 +124,7 @@ def run(command: Sequence[str]) -> None:
 def shown_capture(case: Case) -> int:
     """Which capture the result is of."""
     text = " ".join(sorted(files_of(case.result)))
-    if case.name == "masks":
+    if case.name == "masks" or case.keeps:
         return int(NAMES[1] in text)
     return int(text == " ".join(sorted(case.listed[1])))
 
@@ -133,8 +136,9 @@ def result_faults(case: Case) -> list[str]:
 
     complete_publication(case.result)
     files = files_of(case.result)
-    if files not in case.listed:
-        nearest = min(case.listed, key=lambda one: len(one ^ files))
+    whole = [*case.listed, set().union(*case.listed)] if case.keeps else case.listed
+    if files not in whole:
+        nearest = min(whole, key=lambda one: len(one ^ files))
         return [f"missing {sorted(nearest - files)}, stale {sorted(files - nearest)}"]
     empty = [name for name in files if not (case.result / name).stat().st_size]
     record = case.result / RECORD
