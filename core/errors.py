@@ -24,6 +24,9 @@ MAX_WORD = 320  # characters of a quoted name; paths that callers have shortened
 class PatinaError(Exception):
     """An error that a user can resolve; its message is one line, shown without traceback."""
 
+    def __init__(self, message: object = "") -> None:
+        super().__init__(" ".join(str(message).splitlines()))  # others' messages have several
+
 
 def system_error(error: OSError) -> str:
     """The message of an error of the system, such as a full disk, with the file that it names."""

@@ -23,7 +23,7 @@ from .cases import COMMANDS, LEFTOVERS, Case, make_cases, prepare, result_faults
 FREE = 8 << 20  # bytes that are left on the full disk: less than one table of a BRDF
 PAGE = 4096  # bytes: the unit of space in a tmpfs
 TEMPORARY = 1 << 20  # bytes of the full folder for temporary files
-LATE = 0.7  # of the time of a run: the folder vanishes then
+MIDDLE = 0.5  # of the time of a run: the folder vanishes then
 INSIDE = "results"  # name of the folder of the result in the mounted one
 NAMESPACE = ("unshare", "--map-root-user", "--mount")
 UNCHANGED, NEW, GONE = "unchanged", "the new one", "–"
@@ -106,7 +106,7 @@ def read_only(case: Case, mount: Path) -> Iterator[Row]:
 
 def vanished(case: Case, mount: Path) -> Iterator[Row]:
     """The folder vanishes while the command runs, as that of a network that is lost."""
-    lost = f"(sleep {LATE * case.seconds}; exec umount -l {mount}) &"
+    lost = f"(sleep {MIDDLE * case.seconds}; exec umount -l {mount}) &"
     yield _mounted(case, mount, "vanished", then=lost)
 
 
@@ -132,7 +132,7 @@ def _mounted(case: Case, mount: Path, condition: str, options: str = "", then: s
     mount: folder for it; options: of `mount`; then: shell commands after it has been filled.
     """
     mount.mkdir()
-    copy = mount.with_name("copy")
+    copy, vanished = mount.with_name("copy"), mount.with_name("vanished")
     script = f"""set -e
         mount -t tmpfs {options} tmpfs {mount}
         cp -a {case.out} {mount}/{INSIDE}
@@ -140,6 +140,7 @@ def _mounted(case: Case, mount: Path, condition: str, options: str = "", then: s
         set +e
         "$@"
         code=$?
+        if ! mountpoint -q {mount}; then touch {vanished}; fi
         cp -a {mount} {copy}
         exit $code"""
     own = replace(case, out=mount / INSIDE)
@@ -148,6 +149,9 @@ def _mounted(case: Case, mount: Path, condition: str, options: str = "", then: s
         [*NAMESPACE, "sh", "-c", script, "sh", *own.command(1)],
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=env,
     )  # fmt: skip
+    if "umount" in then and not vanished.exists():
+        condition += " after its end"
+    vanished.unlink(missing_ok=True)
     row = _row(replace(case, out=copy / INSIDE), condition, done.stderr, done.returncode)
     shutil.rmtree(copy)
     shutil.rmtree(mount)  # with what was written after the file system had vanished
