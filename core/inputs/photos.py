@@ -20,7 +20,7 @@ from ..photo.exif import Exif, read_exif
 from ..photo.noise_estimate import estimate_noise
 from ..photo.photo import read_photo
 from ..photo.transfer import Transfer
-from .same_content import check_different_photos
+from .same_content import copied_photos
 
 LINEAR_SUFFIXES, ENCODED_SUFFIXES = (".exr", ".hdr"), (".jpg", ".jpeg")
 """Of files whose values are nearly always linear, and nearly never."""
@@ -59,13 +59,18 @@ class LitPhotos:
     @classmethod
     def open(cls, capture: Capture) -> LitPhotos:
         """Measure the tone curve from the chart, if any, and read the exposures. Raises
-        InputError, also for a photo that is a copy of another."""
-        check_different_photos(capture)
+        InputError."""
         chart = _chart(capture)
         exposures, first, notes = _exposures(capture)
         if chart is not None:
             notes = (*notes, *chart.notes)
-        return cls(capture, chart, exposures, first, (*notes, *_unusual_curves(capture)))
+        return cls(
+            capture,
+            chart,
+            exposures,
+            first,
+            (*notes, *_unusual_curves(capture), *copied_photos(capture)),
+        )
 
     def read(self, place: int) -> LitPhoto:
         """One lit photo. Raises InputError naming the capture's key."""

@@ -8,29 +8,36 @@ import hashlib
 from pathlib import Path
 
 from ..capture import Capture
+from ..counted import listed
 from ..files import open_regular, regular_size
 
 PART_BYTES = 1 << 16  # of each part of a file that is compared before the whole
 
 
-def check_different_photos(capture: Capture) -> None:
-    """Raise InputError where a photo has the same bytes as another. Reads few bytes of each file,
-    and only equal ones completely. Files that cannot be read are left to those that read them."""
-    known: dict[tuple[int, bytes], list[tuple[int, Path]]] = {}
-    for place, photo in enumerate(capture.photos):
+def copied_photos(capture: Capture) -> list[str]:
+    """A sentence on photos with the same bytes as another, none where there are no such. Reads few
+    bytes of each file, and only equal ones completely. Files that cannot be read are left to those
+    that read them."""
+    known: dict[tuple[int, bytes], list[Path]] = {}
+    copies: dict[str, str] = {}
+    for photo in capture.photos:
         for file in photo.files:
             try:
                 alike = known.setdefault(_part(file), [])
-                for other, earlier in alike:
-                    if filecmp.cmp(file, earlier, shallow=False):
-                        raise capture.error(
-                            f"{file.name!r} has the same content as {earlier.name!r} (photo "
-                            f"{other + 1}); expected each photo once: remove one of the entries",
-                            "photo", place, "file",
-                        )  # fmt: skip
-                alike.append((place, file))
+                first = next((f for f in alike if filecmp.cmp(file, f, shallow=False)), None)
             except OSError:
                 continue
+            if first is None:
+                alike.append(file)
+            else:
+                copies[file.name] = first.name
+    if not copies:
+        return []
+    found = [f"{name} of {first}" for name, first in copies.items()]
+    return [
+        f"Copies of other photos: {listed(found)}. They count twice, and held-out photos are "
+        "predicted from their own copies, so that errors are too small. Remove the copies."
+    ]
 
 
 def _part(file: Path) -> tuple[int, bytes]:
