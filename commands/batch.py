@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
 import shlex
 import sys
 import time
@@ -49,7 +50,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--workers", type=int, default=1,
         help="processes at a time on this computer (default %(default)s)",
     )  # fmt: skip
-    parser.add_argument("--threads", type=int, help="threads of each process")
+    parser.add_argument(
+        "--threads", type=int,
+        help="threads of each process (default: the cores of this computer for its workers, all "
+        "cores of the others)",
+    )  # fmt: skip
     parser.add_argument("--scheduler", help="address of a Dask scheduler, in place of --workers")
     parser.add_argument("--memory", type=float, default=0.0, help="limit of a process, GB")
     parser.add_argument("--time", type=float, default=0.0, help="limit of a process, seconds")
@@ -89,6 +94,8 @@ def run(arguments: argparse.Namespace) -> None:
             path = write_flamenco(out, names, words)
         print(f"wrote {path}")
         return
+    if arguments.threads is None and arguments.scheduler is None:
+        arguments.threads = max(1, (os.cpu_count() or 1) // arguments.workers)
     with only_writer(out):
         _run_batch(arguments, items, out, limits)
 

@@ -4,19 +4,24 @@ loop in a shell."""
 from __future__ import annotations
 
 import hashlib
+import json
+import random
 import shlex
-import shutil
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from .common import ROOT
+from .faults.killed_cluster import KilledCluster
 
 EMPTY = (250, 500, 1000, 2000)  # objects of no work
-CAPTURES, WORKERS = 12, 2  # small captures that are fitted, and processes at a time
+CAPTURES, WORKERS = 200, 2  # small captures that are fitted, and processes at a time
+KILLS, PAUSES = 30, (10.0, 40.0)  # of schedulers and workers; seconds between two
 MEGAPIXELS, TRIANGLES, PHOTOS = 0.02, 2000, 3
+IRRADIANCE = 3.0  # that the captures are made with
 PEAK = "import resource; print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)"
 
 
@@ -45,14 +50,9 @@ def _empty(folder: Path) -> None:
         )
 
 
-def _real(folder: Path) -> None:
-    """The same captures by a batch and by a loop, with equal numbers of processes."""
-    from .bench_speed_scene import make_capture
-
-    path = folder / "captures"
-    for k in range(CAPTURES):
-        make_capture(path / f"{k:03d}", MEGAPIXELS, TRIANGLES, PHOTOS)
-    captures = sorted(path.rglob("*.capture.toml"))
+def _real(folder: Path, count: int = CAPTURES) -> None:
+    """The same captures by a loop, by a batch, and by a batch whose cluster is killed."""
+    captures = _captures(folder / "captures", count)
     since = time.monotonic()
     program = [sys.executable, str(ROOT / "headless.py"), "fit"]
     loop = (
@@ -62,16 +62,66 @@ def _real(folder: Path) -> None:
     )
     subprocess.run(["sh", "-c", loop], check=True)
     looped = time.monotonic() - since
-    words = [str(path), "--out", str(folder / "batch"), "--workers", str(WORKERS), "--threads", "1"]
-    batched, _ = _batch(words)
-    same = [_tables(folder / "loop" / c.parent.name) == _tables(folder / "batch" / c.parent.name)
-            for c in captures]  # fmt: skip
+    words = [str(folder / "captures"), "--threads", "1", "--out"]
+    batched, _ = _batch([*words, str(folder / "batch"), "--workers", str(WORKERS)])
     print(
-        f"\n{CAPTURES} captures, {WORKERS} processes: loop {looped:.1f} s, batch {batched:.1f} s "
-        f"({100 * (batched / looped - 1):+.1f} %); {sum(same)} of {len(same)} results with the "
-        "same bytes"
+        f"\n{count} captures, {WORKERS} processes: loop {looped:.1f} s, batch {batched:.1f} s "
+        f"({100 * (batched / looped - 1):+.1f} %); {_equal(folder, 'batch', captures)}",
+        flush=True,
     )
-    shutil.rmtree(path)
+    with KilledCluster(folder / "dask") as cluster:
+        command = [sys.executable, str(ROOT / "headless.py"), "batch", *words, f"{folder}/killed"]
+        since = time.monotonic()
+        code, said = cluster.run(
+            [*command, "--scheduler", cluster.address],
+            random.Random(0), KILLS, PAUSES, 3 * looped + 300,
+        )  # fmt: skip
+        seconds, kills = time.monotonic() - since, cluster.kills
+    if code != 0:
+        raise RuntimeError(f"exit code {code}: {said}")
+    finished = (folder / "killed" / "collection.csv").read_text("utf-8").count(",finished,")
+    print(
+        f"With {kills} kills of scheduler and workers: {seconds:.1f} s, {finished} of {count} "
+        f"objects finished; {_equal(folder, 'killed', captures)}"
+    )
+
+
+def _captures(folder: Path, count: int) -> list[Path]:
+    """Small captures that differ in the irradiance of their lamps."""
+    from .bench_speed_scene import make_capture
+
+    found = []
+    for k in range(count):
+        capture = make_capture(folder / f"{k:03d}", MEGAPIXELS, TRIANGLES, PHOTOS)
+        text, level = capture.read_text("utf-8"), f"{IRRADIANCE * (1 + k / 1000):.4f}"
+        changed = text.replace(f"{IRRADIANCE}", level)
+        assert k == 0 or changed != text
+        capture.write_text(changed, "utf-8")
+        found.append(capture)
+    return found
+
+
+def _equal(folder: Path, name: str, captures: Sequence[Path]) -> str:
+    """How many results have the bytes of those of the loop."""
+    both = [(folder / "loop" / c.parent.name, folder / name / c.parent.name) for c in captures]
+    same = sum(_content(one) == _content(other) for one, other in both)
+    return f"{same} of {len(both)} results with the same bytes"
+
+
+def _content(folder: Path) -> dict[str, str]:
+    """Hash of each file of a result. Left out: the times in result.json, the record that has its
+    hash, and scene.blend, in which Blender writes addresses of its memory."""
+    found = {}
+    for file in sorted(folder.rglob("*")):
+        if not file.is_file() or file.name in (".patina-files", "scene.blend"):
+            continue
+        content = file.read_bytes()
+        if file.name == "result.json":
+            result = json.loads(content)
+            del result["stages"]
+            content = json.dumps(result).encode()
+        found[file.relative_to(folder).as_posix()] = hashlib.sha256(content).hexdigest()
+    return found
 
 
 def _batch(words: list[str]) -> tuple[float, int]:
@@ -87,8 +137,3 @@ def _batch(words: list[str]) -> tuple[float, int]:
     if done.returncode:
         raise RuntimeError(done.stderr)
     return time.monotonic() - since, int(done.stdout.split()[-1])
-
-
-def _tables(folder: Path) -> list[str]:
-    """Hashes of the tables of a result; result.json has the seconds of each run."""
-    return [hashlib.sha256(f.read_bytes()).hexdigest() for f in sorted(folder.glob("*.binary"))]
