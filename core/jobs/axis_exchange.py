@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..capture import Capture
-from ..errors import InputError
+from ..errors import InputError, PatinaError
 from ..geometry import RayScene
 from ..geometry.lift import facet_lift
 from ..inputs import capture_data
@@ -39,7 +39,10 @@ def with_axes(
 ) -> InputError:
     """The error of a capture whose photos do not fit its mesh, with the axes that would fit, if
     there are any."""
-    hint = better_axes(capture, scan, rays, photos, lights)
+    try:
+        hint = better_axes(capture, scan, rays, photos, lights)
+    except PatinaError:  # such as a photo that cannot be read, which ``error`` may be about
+        return error
     if not hint:
         return error
     return InputError(f"{error.detail}. {hint}", file=error.file, key=error.key, line=error.line)
