@@ -21,6 +21,7 @@ from ..core.batch.rig_errors import rig_errors
 from ..core.batch.summary import FAILED, Summary, summary_of
 from ..core.child_process.parent_watch import END_WITH_PARENT
 from ..core.child_process.python_command import ROOT, python_command, python_environment
+from ..core.concurrency.thread_pool import MAX_THREADS
 from ..core.counted import counted
 from ..core.errors import InputError, PatinaError
 from ..core.files import remove_unfinished
@@ -52,8 +53,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--threads", type=int,
-        help="threads of each process (default: the cores of this computer for its workers, all "
-        "cores of the others)",
+        help="threads of each process (default: an equal share of the cores; with --scheduler one "
+        "for each core; at most four)",
     )  # fmt: skip
     parser.add_argument("--scheduler", help="address of a Dask scheduler, in place of --workers")
     parser.add_argument("--memory", type=float, default=0.0, help="limit of a process, GB")
@@ -95,7 +96,8 @@ def run(arguments: argparse.Namespace) -> None:
         print(f"wrote {path}")
         return
     if arguments.threads is None and arguments.scheduler is None:
-        arguments.threads = max(1, (os.cpu_count() or 1) // arguments.workers)
+        cores = os.cpu_count() or 1
+        arguments.threads = min(MAX_THREADS, max(1, cores // arguments.workers))
     with only_writer(out):
         _run_batch(arguments, items, out, limits)
 

@@ -25,7 +25,9 @@ class PatinaError(Exception):
     """An error that a user can resolve; its message is one line, shown without traceback."""
 
     def __init__(self, message: object = "") -> None:
-        super().__init__(" ".join(str(message).splitlines()))  # others' messages have several
+        super().__init__(
+            " ".join(line.strip() for line in str(message).splitlines())
+        )  # others' messages have several
 
 
 def system_error(error: OSError) -> str:

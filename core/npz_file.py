@@ -25,5 +25,11 @@ def open_npz(path: Path, max_bytes: int) -> Iterator[Any]:
                 f"it unpacks to {declared / 1e6:.0f} MB; expected at most {max_bytes / 1e6:.0f} MB"
             )
         file.seek(0)
-        with np.load(file, allow_pickle=False) as data:
-            yield data
+        data = np.load(file, allow_pickle=False)
+        if isinstance(data, np.ndarray):  # a single array, with an archive behind it
+            raise ValueError("it is not an archive of arrays")
+        with data:
+            try:
+                yield data
+            except MemoryError as error:  # the shape of an array is damaged
+                raise ValueError(f"an array is too large ({error})") from error

@@ -7,7 +7,7 @@ Blender contains and no other libraries. Some tests of tests/blender run there, 
 headless.py fits the demo. The last line counts the tests as pytest does.
 
 bpy 5.2 needs a `python3.13` on the PATH. It may be one in a chroot that has the same folders
-(.ci/python3.13), without pip: that of another Python unpacks the wheels.
+(.ci/python/python3.13), without pip: that of another Python unpacks the wheels.
 """
 
 from __future__ import annotations
@@ -74,7 +74,8 @@ class Release:
         folder = cache_dir() / f"bpy-{self.bpy}-numpy-{self.numpy}"
         if not folder.exists():
             say(f"unpacking bpy {self.bpy} (about 400 MB, once) ...")
-            making = Path(tempfile.mkdtemp(dir=cache_dir(), prefix="making-"))
+            making = folder.with_suffix(".making")
+            shutil.rmtree(making, ignore_errors=True)
             quietly(
                 [
                     sys.executable, "-m", "pip", "install", "--quiet", "--target", making,
@@ -99,6 +100,9 @@ RELEASES = (
 
 def main() -> int:
     """Check the chosen versions; return 1 if a test failed or no version could be checked."""
+    labels = [one.label for one in RELEASES]
+    if unknown := [word for word in sys.argv[1:] if word not in labels]:
+        sys.exit(f"found {unknown[0]!r}; expected one of {', '.join(labels)}")
     chosen = [one for one in RELEASES if one.label in sys.argv[1:] or not sys.argv[1:]]
     if this_platform() != "linux-x64":
         sys.exit("the wheels of this check are those of Linux")
@@ -127,7 +131,7 @@ def _check(release: Release, archive: Path, home: Path) -> dict[str, int]:
     found = re.findall(r"(\d+) (passed|failed|skipped)", "".join(counted))
     for number, kind in found:
         counts[kind] += int(number)
-    sound = bool(found) and not done.returncode
+    sound = bool(found) and not done.returncode and all(word in done.stdout for word in TESTS)
     counts["failed"] += not sound and not counts["failed"]
     program = home / "extensions" / "user_default" / "patina" / "headless.py"
     out = home / "fitted"
@@ -156,7 +160,8 @@ def _reasons(done: subprocess.CompletedProcess[str]) -> str:
 def _errors(result: Path) -> dict[str, float]:
     """Material → error of held-out photos."""
     content = json.loads(result.read_text("utf-8"))
-    return {one["name"]: float(one["held_out"]["typical"]) for one in content["materials"]}
+    held = {one["name"]: one["held_out"] for one in content["materials"]}
+    return {name: float(one["typical"]) if one else float("inf") for name, one in held.items()}
 
 
 def _run(release: Release, home: Path, *words: str | Path) -> subprocess.CompletedProcess[str]:

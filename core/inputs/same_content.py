@@ -19,7 +19,7 @@ def copied_photos(capture: Capture) -> list[str]:
     bytes of each file, and only equal ones completely. Files that cannot be read are left to those
     that read them."""
     known: dict[tuple[int, bytes], list[Path]] = {}
-    copies: dict[str, str] = {}
+    found = []
     for photo in capture.photos:
         for file in photo.files:
             try:
@@ -30,14 +30,20 @@ def copied_photos(capture: Capture) -> list[str]:
             if first is None:
                 alike.append(file)
             else:
-                copies[file.name] = first.name
-    if not copies:
+                found.append(f"{_shown(file, capture)} of {_shown(first, capture)}")
+    if not found:
         return []
-    found = [f"{name} of {first}" for name, first in copies.items()]
     return [
-        f"Copies of other photos: {listed(found)}. They count twice, and held-out photos are "
-        "predicted from their own copies, so that errors are too small. Remove the copies."
+        f"Photos with the same content as others: {listed(found)}. They count twice, and held-out "
+        "photos are predicted from their own copies, so that errors are too small. Remove copies "
+        "from the capture."
     ]
+
+
+def _shown(file: Path, capture: Capture) -> str:
+    """The path relative to the capture's folder, where it is in it."""
+    folder = capture.file.parent
+    return (file.relative_to(folder) if file.is_relative_to(folder) else file).as_posix()
 
 
 def _part(file: Path) -> tuple[int, bytes]:

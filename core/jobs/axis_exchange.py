@@ -27,6 +27,10 @@ WIDTH = 160  # pixels of a reduced photo
 MIN_HITS = 200  # reduced pixels that show the mesh
 MIN_CORRELATION = 0.5  # of shading and brightness with the right axes; real objects: 0.6 to 0.95
 MIN_GAIN = 0.3  # of the correlation, for axes to be proposed
+SYMMETRY = (
+    0.02  # a vase agrees after several rotations; differences of the correlation are as small
+)
+USUAL_EXCHANGES = ("x, -z, y", "x, z, -y")  # y up → z up and z up → y up
 
 
 def with_axes(
@@ -39,10 +43,7 @@ def with_axes(
 ) -> InputError:
     """The error of a capture whose photos do not fit its mesh, with the axes that would fit, if
     there are any."""
-    try:
-        hint = better_axes(capture, scan, rays, photos, lights)
-    except PatinaError:  # such as a photo that cannot be read, which ``error`` may be about
-        return error
+    hint = better_axes(capture, scan, rays, photos, lights)
     if not hint:
         return error
     return InputError(f"{error.detail}. {hint}", file=error.file, key=error.key, line=error.line)
@@ -51,17 +52,23 @@ def with_axes(
 def better_axes(
     capture: Capture, scan: Scan, rays: RayScene, photos: LitPhotos, lights: Lights
 ) -> str:
-    """A sentence that proposes other axes of the mesh, "" where none fit the photos far better."""
+    """A sentence that proposes other axes of the mesh, "" where none fit the photos far better, or
+    the photos cannot be read."""
     places = range(0, len(capture.photos), -(-len(capture.photos) // MAX_PHOTOS))
-    seen = [_Reduced.of(capture, scan, photos, lights, place) for place in places]
-    found = [(_agreement(rotation, seen, rays), rotation) for rotation in _rotations()]
-    now = found[0][0]  # the identity is the first
-    best, rotation = max(found, key=lambda one: one[0])
+    try:
+        seen = [_Reduced.of(capture, scan, photos, lights, place) for place in places]
+    except (PatinaError, OSError):  # the network may have been lost since they were sampled
+        return ""
+    found = [(_agreement(rotation, seen, rays), _axes(rotation)) for rotation in _rotations()]
+    now = dict((axes, value) for value, axes in found)["x, y, z"]
+    best = max(value for value, _ in found)
+    alike = [axes for value, axes in found if value > best - SYMMETRY]
+    shown = next((axes for axes in USUAL_EXCHANGES if axes in alike), alike[0])
     if best < MIN_CORRELATION or best < now + MIN_GAIN:
         return ""
     return (
         f"The mesh would agree with the photos if its axes were exchanged: (x, y, z) → "
-        f"({_axes(rotation)}), correlation of shading and brightness {best:.2f} instead of "
+        f"({shown}), correlation of shading and brightness {best:.2f} instead of "
         f"{max(now, 0.0):.2f}. Export it again with the axes of the cameras (usually z up, not y "
         "up)."
     )

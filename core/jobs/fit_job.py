@@ -190,14 +190,21 @@ class FitJob(Job):
                 lambda done: Step("refining the lights", (0.5 + 0.5 * done) * self._times.read),
             )
         known = lights.known and capture.fit.absolute
+        taken = yield from self._take_samples(scan, rays, photos, lights)
+        counts = [int(taken.counts[material.name].sum()) for material in capture.materials]
+        tables = [taken.kept.pop(material.name).table() for material in capture.materials]
+        comparing = Step("comparing the axes of the mesh", self._times.sampled)
         try:
-            taken = yield from self._take_samples(scan, rays, photos, lights)
-            counts = [int(taken.counts[material.name].sum()) for material in capture.materials]
-            tables = [taken.kept.pop(material.name).table() for material in capture.materials]
+            check_light(capture, taken)
             for index, material in enumerate(capture.materials):
                 check_samples(capture, index, tables[index], taken.marked[material.name], known)
         except InputError as error:
-            raise with_axes(error, capture, scan, rays, photos, lights) from error
+            found = error
+            raise (
+                yield from in_background(
+                    lambda: with_axes(found, capture, scan, rays, photos, lights), comparing
+                )
+            ) from error
         self._times = FitTimes.of(len(capture.photos), pixels, counts, self.portable)
         results: list[MaterialResult] = []
         unit = known, 1.0 if known else typical_factor(tables, basis)
@@ -212,9 +219,15 @@ class FitJob(Job):
                 (yield from self._material(index, table, basis, unit, each, start, share))
             )
         odd = [m.held_out is not None and m.held_out.typical > AXES_ERROR for m in results]
-        if any(odd) and (hint := better_axes(capture, scan, rays, photos, lights)):
+        if any(odd):
+            hint = yield from in_background(
+                lambda: better_axes(capture, scan, rays, photos, lights),
+                replace(comparing, fraction=1 - ASSIGNING / self._times.total),
+            )
             results = [
-                replace(material, warnings=(hint, *material.warnings)) if large else material
+                replace(material, warnings=(hint, *material.warnings))
+                if hint and large
+                else material
                 for material, large in zip(results, odd, strict=True)
             ]
         yield Step("assigning materials to the mesh", 1 - ASSIGNING / self._times.total)
@@ -247,7 +260,6 @@ class FitJob(Job):
             take_samples(self.capture, scan, rays, photos, lights, sinks, self.threads),
             lambda done: Step("sampling the photos", read + (sampled - read) * done),
         )
-        check_light(self.capture, taken)
         return taken
 
     def samples_to_fit(self, index: int, table: SampleTable) -> SampleTable:

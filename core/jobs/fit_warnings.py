@@ -20,7 +20,8 @@ MAX_LISTED_PHOTOS = 4  # names in a sentence
 MAX_NORMAL_ERROR = 5.0  # degrees along each tangent
 VIEW_ANGLES = (0.0, 20.0, 40.0, 60.0, 70.0, 80.0)  # degrees from the normal
 MAX_ALBEDO = 1.01  # reflected over incident light: 1 plus the error of the quadrature
-MIN_ALBEDO = 0.004  # along the normal; the darkest material of MERL has 0.005
+DARKEST = 0.005  # albedo along the normal of the darkest material of MERL
+MIN_ALBEDO = 0.8 * DARKEST
 BLACK_LEVEL, MAX_BLACK_SHARE = 0.002, 0.1  # of a photo's 95th percentile; of its samples
 
 
@@ -66,7 +67,7 @@ def _energy_warnings(brdf: PrincipalBRDF) -> list[str]:
     if albedo[0] < MIN_ALBEDO:
         return [
             f"The material reflects only {100 * albedo[0]:.2g} % of the light that comes along "
-            f"the normal; the darkest measured materials reflect {100 * MIN_ALBEDO:g} %. Check the "
+            f"the normal; the darkest measured material reflects {100 * DARKEST:g} %. Check the "
             "irradiance of the lights and the exposures."
         ]
     if albedo[worst] <= MAX_ALBEDO:
@@ -74,7 +75,8 @@ def _energy_warnings(brdf: PrincipalBRDF) -> list[str]:
     return [
         f"Viewed {VIEW_ANGLES[worst]:.0f}° from the normal, the material reflects "
         f"{100 * albedo[worst]:.0f} % of the incident light. Renders limit it to 100 %. Check the "
-        f"irradiance of the lights: it must be at least {albedo[worst]:.2g} times as large."
+        "irradiance of the lights: it must be at least "
+        f"{np.ceil(100 * albedo[worst]) / 100:g} times as large."
     ]
 
 

@@ -34,7 +34,7 @@ def check_exr(path: Path) -> None:
             (length,) = struct.unpack("<i", size)
             if length < 0:
                 break
-            check_metadata_size(path, length)
+            check_metadata_size(path, f"the attribute {name.decode('utf-8', 'replace')!r}", length)
             file.seek(length, 1)
     raise InputError("is truncated or damaged (its EXR header); export it again", file=path)
 

@@ -11,7 +11,8 @@ from .tiff_tags import Value, read_tiff_tags
 
 PHOTOMETRIC, STRIP_OFFSETS, STRIP_BYTES, TILE_OFFSETS, TILE_BYTES = 262, 273, 279, 324, 325
 LAYERS = 37724  # ImageSourceData: the layers of Photoshop
-MAX_LAYERS_BYTES = 1 << 30
+MAX_LAYERS_BYTES = 1_000_000_000
+PROFILE = 34675  # InterColorProfile
 UNSUPPORTED = {  # values of PhotometricInterpretation
     4: "a transparency mask",
     5: "CMYK colours for printing",
@@ -39,7 +40,9 @@ def check_tiff(path: Path) -> None:
             file=path,
         )
     for tag, size in tags.sizes.items():
-        check_metadata_size(path, size, MAX_LAYERS_BYTES if tag == LAYERS else MAX_METADATA_BYTES)
+        most = MAX_LAYERS_BYTES if tag == LAYERS else MAX_METADATA_BYTES
+        name = "a colour profile" if tag == PROFILE else f"a value (tag {tag})"
+        check_metadata_size(path, name, size, most)
     size = path.stat().st_size
     for offsets, lengths in ((STRIP_OFFSETS, STRIP_BYTES), (TILE_OFFSETS, TILE_BYTES)):
         starts, byte_counts = _integers(tags.main.get(offsets)), _integers(tags.main.get(lengths))

@@ -54,8 +54,8 @@ def _reflected(material: MaterialResult) -> str:
         return "Unknown, as is the irradiance of the lights."
     red, green, blue = 100 * directional_albedo(material.fit.brdf.evaluate, np.zeros(1))[0]
     return (
-        f"With the irradiance of the capture, the material reflects {red:.0f} % of red, "
-        f"{green:.0f} % of green and {blue:.0f} % of blue light that comes along the normal."
+        f"With the irradiance of the capture, the material reflects {red:.2g} % of red, "
+        f"{green:.2g} % of green and {blue:.2g} % of blue light that comes along the normal."
     )
 
 

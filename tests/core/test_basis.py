@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import io
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -204,6 +206,23 @@ def test_storage_round_trip_and_truncated_file(basis: Basis, tmp_path: Path) -> 
     np.savez_compressed(path, format=np.int32(2), components=np.zeros(1 << 27, np.int32))
     assert path.stat().st_size < 1 << 20
     with pytest.raises(InputError, match="unpacks to 537 MB; expected at most 268 MB"):
+        storage.load(path)
+
+
+def test_damaged_archives_are_one_sentence(tmp_path: Path) -> None:
+    path, array, archive = tmp_path / "b.npz", io.BytesIO(), io.BytesIO()
+    np.save(array, np.zeros(3))
+    np.savez(archive, format=np.int32(2))
+    path.write_bytes(array.getvalue() + archive.getvalue())
+    with pytest.raises(InputError, match="not an archive of arrays"):
+        storage.load(path)
+    huge = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        huge, {"descr": "<f8", "fortran_order": False, "shape": (10**13,)}
+    )
+    with zipfile.ZipFile(path, "w") as made:
+        made.writestr("format.npy", huge.getvalue())
+    with pytest.raises(InputError, match="an array is too large"):
         storage.load(path)
 
 

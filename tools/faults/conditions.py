@@ -25,7 +25,9 @@ PAGE = 4096  # bytes: the unit of space in a tmpfs
 TEMPORARY = 1 << 20  # bytes of the full folder for temporary files
 MIDDLE = 0.5  # of the time of a run: the folder vanishes then
 INSIDE = "results"  # name of the folder of the result in the mounted one
+PROGRESS = re.compile(r"\[ *\d+ %\] ")
 NAMESPACE = ("unshare", "--map-root-user", "--mount")
+VANISHED, TWO = "vanished", "two at once"
 UNCHANGED, NEW, GONE = "unchanged", "the new one", "–"
 
 
@@ -43,8 +45,12 @@ class Row:
 
     @property
     def sound(self) -> bool:
-        """One sentence and a whole result."""
-        whole = self.result in (UNCHANGED, NEW, GONE) and not self.left
+        """A new result and no error, or one sentence and the old result; nothing else is left."""
+        lost = self.condition == VANISHED  # the folder and its result, but not by the command
+        expected = (NEW,) if self.code == 0 else (UNCHANGED, GONE) if lost else (UNCHANGED,)
+        if self.condition.startswith(TWO):  # either may be the last
+            expected = (NEW, UNCHANGED)
+        whole = self.result in expected and not self.left
         return whole and len(self.said) == (self.code != 0) and self.code in (0, 2)
 
     @property
@@ -107,7 +113,7 @@ def read_only(case: Case, mount: Path) -> Iterator[Row]:
 def vanished(case: Case, mount: Path) -> Iterator[Row]:
     """The folder vanishes while the command runs, as that of a network that is lost."""
     lost = f"(sleep {MIDDLE * case.seconds}; exec umount -l {mount}) &"
-    yield _mounted(case, mount, "vanished", then=lost)
+    yield _mounted(case, mount, VANISHED, then=lost)
 
 
 def two_at_once(case: Case, mount: Path) -> Iterator[Row]:
@@ -122,7 +128,7 @@ def two_at_once(case: Case, mount: Path) -> Iterator[Row]:
     ]
     ended = [(process.communicate()[1], process.returncode) for process in running]
     for number, (said, code) in enumerate(ended, 1):
-        yield _row(both, f"two at once, no. {number}", said, code)
+        yield _row(both, f"{TWO}, no. {number}", said, code)
     shutil.rmtree(mount)
 
 
@@ -160,10 +166,8 @@ def _mounted(case: Case, mount: Path, condition: str, options: str = "", then: s
 
 def _row(case: Case, condition: str, stderr: str, code: int) -> Row:
     """What is found in the folder of a result and in the one around it."""
-    lines = [line for line in stderr.splitlines() if line.startswith("patina: ")]
+    lines = [line for line in stderr.splitlines() if line and not PROGRESS.match(line)]
     said = [line.removeprefix("patina: ") for line in lines]
-    if "Traceback" in stderr:
-        said.append("Traceback: " + stderr.splitlines()[-1])
     if not case.result.is_dir():
         return Row(case.name, condition, code, tuple(said), GONE, tuple(_names(case.out.parent)))
     wrong = result_faults(case)

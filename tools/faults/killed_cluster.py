@@ -8,12 +8,14 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
 WORKERS = 2
 DEATH_SECONDS = 60  # that a worker waits for a scheduler
+MAX_MESSAGES = 4000  # characters, of the end
 Process = subprocess.Popen[bytes]
 
 
@@ -50,9 +52,9 @@ class KilledCluster:
         """Run a command, and kill up to ``most`` parts meanwhile: of three, one scheduler and two
         workers. pauses: shortest and longest time between two, seconds; limit: of the command,
         seconds. Returns (exit code, messages); the code is None beyond the limit."""
-        running = subprocess.Popen(list(command), stderr=subprocess.PIPE, text=True)
         until = time.monotonic() + limit
-        try:
+        with tempfile.TemporaryFile("w+", encoding="utf-8") as messages:
+            running = subprocess.Popen(list(command), stderr=messages)
             while running.poll() is None and time.monotonic() < until:
                 time.sleep(chance.uniform(*pauses))
                 if self.kills < most and running.poll() is None:
@@ -62,11 +64,12 @@ class KilledCluster:
                 for place, part in enumerate(self._parts):  # a worker ends with its scheduler
                     if part.poll() is not None:
                         self._parts[place] = self._start(place)
-            if running.poll() is None:
-                return None, ""
-            return running.returncode, running.communicate()[1]
-        finally:
-            running.kill()
+            code = running.poll()
+            if code is None:
+                running.kill()
+                running.wait()
+            messages.seek(0)
+            return code, messages.read()[-MAX_MESSAGES:]
 
     def _start(self, place: int) -> Process:
         kind, words = "scheduler", ["--port", str(self._port), "--host", "127.0.0.1"]

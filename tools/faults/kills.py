@@ -49,6 +49,8 @@ def main() -> int:
             prepare(case)
         wrong = _kill(cases, arguments.kills, random.Random(arguments.seed))
         wrong += [fault for case in cases for fault in _left(case)]
+    if not any(case.kills for case in cases):
+        wrong.append("every command ended before it was killed")
     print("| command | seconds | killed | old result | new result |\n|---|---|---|---|---|")
     for case in cases:
         print(f"| {case.name} | {case.seconds:.1f} | {case.kills} | {case.old} | {case.new} |")
