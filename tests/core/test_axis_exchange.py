@@ -14,7 +14,7 @@ from patina.core.geometry import RayScene
 from patina.core.inputs import capture_data
 from patina.core.inputs.lights import find_lights
 from patina.core.inputs.photos import LitPhotos
-from patina.core.jobs import FitJob, finished
+from patina.core.jobs import FitJob
 from patina.core.jobs.axis_exchange import better_axes
 from patina.core.scan import Scan
 
@@ -27,14 +27,22 @@ def y_up(scan: Scan) -> Scan:
     return replace(scan, mesh=replace(scan.mesh, vertices=np.stack([x, z, -y], axis=1)))
 
 
-def test_a_fit_with_exchanged_axes_names_the_right_ones():
-    job = FitJob(read_capture(DEMO), prepare=y_up, portable=False)
-    job.drain()
-    warnings = [text for one in finished(job.result).materials for text in one.warnings]
-    assert any("(x, y, z) → (x, -z, y)" in text and "not y up" in text for text in warnings)
+def opened():
+    """The demo's capture, scan, photos and lights."""
+    capture = read_capture(DEMO)
+    scan = capture_data.open_scan(capture)
+    photos = LitPhotos.open(capture)
+    return capture, scan, photos, find_lights(capture, scan, photos)
 
 
-def test_so_does_the_error_where_nothing_can_be_fitted(shared):
+def test_the_right_axes_are_named():
+    capture, scan, photos, lights = opened()
+    mesh = y_up(scan).mesh
+    text = better_axes(capture, scan, RayScene.build(mesh), photos, lights)
+    assert "(x, y, z) → (x, -z, y)" in text and "z up, not y up" in text
+
+
+def test_the_error_names_them_where_nothing_can_be_fitted(shared):
     bunny = shared / "data" / "scans" / "bunny_red" / "scan.capture.toml"
     job = FitJob(read_capture(bunny), prepare=y_up, portable=False)
     with pytest.raises(InputError, match=r"\(x, y, z\) → \(x, -z, y\)") as raised:
@@ -43,10 +51,7 @@ def test_so_does_the_error_where_nothing_can_be_fitted(shared):
 
 
 def test_right_axes_and_other_errors_propose_nothing():
-    capture = read_capture(DEMO)
-    scan = capture_data.open_scan(capture)
-    photos = LitPhotos.open(capture)
-    lights = find_lights(capture, scan, photos)
+    capture, scan, photos, lights = opened()
     assert better_axes(capture, scan, RayScene.build(scan.mesh), photos, lights) == ""
     size = scan.mesh.size
     offset = np.array([0.2 * size, 0.0, 0.0])

@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from tools.check_extension import RELEASES
 from tools.environment import BPY, LOCKS, TEST_TOOLS, lock_file
 from tools.wheels import PLATFORMS, SUMS, requirements
 
@@ -42,4 +43,11 @@ def test_libraries_are_those_of_the_zips(version, platform):
 
 def test_no_other_lists():
     expected = {lock_file(*target, tests) for target in TARGETS for tests in (False, True)}
-    assert set(LOCKS.iterdir()) == expected
+    assert set(LOCKS.iterdir()) == expected | {release.lock for release in RELEASES}
+
+
+@pytest.mark.parametrize("release", RELEASES, ids=lambda release: release.label)
+def test_lists_of_the_other_versions_follow_theirs(release):
+    lines = release.lock.read_text("utf-8").splitlines()[1:]
+    found = [LINE.fullmatch(line).group(1, 2) for line in lines]
+    assert found == [("bpy", release.bpy), ("numpy", release.numpy)]
