@@ -25,9 +25,8 @@ class PatinaError(Exception):
     """An error that a user can resolve; its message is one line, shown without traceback."""
 
     def __init__(self, message: object = "") -> None:
-        super().__init__(
-            " ".join(line.strip() for line in str(message).splitlines())
-        )  # others' messages have several
+        lines = str(message).splitlines()  # messages of other libraries have several
+        super().__init__(" ".join(line.strip() for line in lines))
 
 
 def system_error(error: OSError) -> str:

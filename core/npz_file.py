@@ -13,13 +13,18 @@ import numpy as np
 from .files import open_regular
 
 
+def unpacked_bytes(archive: zipfile.ZipFile) -> int:
+    """What the entries declare; zipfile reads no more of an entry than that."""
+    return sum(entry.file_size for entry in archive.infolist())
+
+
 @contextmanager
 def open_npz(path: Path, max_bytes: int) -> Iterator[Any]:
     """The arrays of an .npz without pickled objects. max_bytes: of all, unpacked. Raises
     ValueError where they have more, and UNREADABLE_NPZ where it is no such file."""
     with open_regular(path) as file:
-        with zipfile.ZipFile(file) as archive:  # reads no more of an entry than it declares
-            declared = sum(entry.file_size for entry in archive.infolist())
+        with zipfile.ZipFile(file) as archive:
+            declared = unpacked_bytes(archive)
         if declared > max_bytes:
             raise ValueError(
                 f"it unpacks to {declared / 1e6:.0f} MB; expected at most {max_bytes / 1e6:.0f} MB"

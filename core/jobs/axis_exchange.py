@@ -27,9 +27,7 @@ WIDTH = 160  # pixels of a reduced photo
 MIN_HITS = 200  # reduced pixels that show the mesh
 MIN_CORRELATION = 0.5  # of shading and brightness with the right axes; real objects: 0.6 to 0.95
 MIN_GAIN = 0.3  # of the correlation, for axes to be proposed
-SYMMETRY = (
-    0.02  # a vase agrees after several rotations; differences of the correlation are as small
-)
+SYMMETRY = 0.02  # difference of the correlation of rotations that a symmetric object cannot tell
 USUAL_EXCHANGES = ("x, -z, y", "x, z, -y")  # y up → z up and z up → y up
 
 
@@ -59,10 +57,9 @@ def better_axes(
         seen = [_Reduced.of(capture, scan, photos, lights, place) for place in places]
     except (PatinaError, OSError):  # the network may have been lost since they were sampled
         return ""
-    found = [(_agreement(rotation, seen, rays), _axes(rotation)) for rotation in _rotations()]
-    now = dict((axes, value) for value, axes in found)["x, y, z"]
-    best = max(value for value, _ in found)
-    alike = [axes for value, axes in found if value > best - SYMMETRY]
+    found = {_axes(rotation): _agreement(rotation, seen, rays) for rotation in _rotations()}
+    now, best = found["x, y, z"], max(found.values())
+    alike = [axes for axes, value in found.items() if value > best - SYMMETRY]
     shown = next((axes for axes in USUAL_EXCHANGES if axes in alike), alike[0])
     if best < MIN_CORRELATION or best < now + MIN_GAIN:
         return ""
@@ -137,7 +134,7 @@ def _agreement(rotation: Array, seen: list[_Reduced], rays: RayScene) -> float:
 
 
 def _rotations() -> Iterator[Array]:
-    """The 24 rotations by right angles, the identity first."""
+    """The 24 rotations by right angles."""
     for order in permutations(range(3)):
         for signs in product((1.0, -1.0), repeat=3):
             rotation = np.zeros((3, 3))

@@ -256,11 +256,12 @@ class FitJob(Job):
         """Sample all photos; each material's samples go to its sinks as they are taken."""
         sinks = {material.name: self.sinks(material.name) for material in self.capture.materials}
         read, sampled = self._times.read, self._times.sampled
-        taken = yield from relayed(
-            take_samples(self.capture, scan, rays, photos, lights, sinks, self.threads),
-            lambda done: Step("sampling the photos", read + (sampled - read) * done),
+        return (
+            yield from relayed(
+                take_samples(self.capture, scan, rays, photos, lights, sinks, self.threads),
+                lambda done: Step("sampling the photos", read + (sampled - read) * done),
+            )
         )
-        return taken
 
     def samples_to_fit(self, index: int, table: SampleTable) -> SampleTable:
         """The samples that a material is fitted to, from all of its samples. Subclasses override

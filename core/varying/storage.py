@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..files import regular_size
+from ..errors import UNREADABLE_NPZ, InputError
+from ..npz_file import open_npz, unpacked_bytes
 from ..scan import Mesh
 from .node_model import COUNT, LIMITS
 from .surface_grid import MAX_DIVISIONS, SurfaceGrid
@@ -48,16 +47,10 @@ def read(path: Path, mesh: Mesh, materials: int) -> VaryingSurface:
     """Read the file for the mesh of its fit, with so many materials. Raises InputError where it is
     not such a file, or of another mesh."""
     try:
-        regular_size(path)
-        with zipfile.ZipFile(path) as archive:
-            declared = sum(entry.file_size for entry in archive.infolist())
-        if declared > MAX_NODES * (4 * COUNT + 2) + len(mesh.faces) + MAX_OTHER_BYTES:
-            raise InputError("is too large for a surface; the file is damaged", file=path)
-        with np.load(path, allow_pickle=False) as stored:
-            return _surface(stored, path, mesh, materials, declared)
-    except InputError:
-        raise
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile, EOFError) as error:
+        most = MAX_NODES * (4 * COUNT + 2) + len(mesh.faces) + MAX_OTHER_BYTES
+        with open_npz(path, most) as stored:
+            return _surface(stored, path, mesh, materials, unpacked_bytes(stored.zip))
+    except (*UNREADABLE_NPZ, TypeError) as error:
         raise InputError(
             f"is not a file that `fit --varying` wrote ({error}); fit again", file=path
         ) from error
