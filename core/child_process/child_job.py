@@ -21,7 +21,7 @@ from .python_command import python_command, python_environment
 log = logging.getLogger(__name__)
 
 AnyJob = TypeVar("AnyJob", bound=Job)
-END_SECONDS = 1.0  # after which a child that was requested to end is killed
+END_SECONDS = 0.6  # after which a child that was requested to end is killed
 POLL_INTERVAL = 0.02  # seconds
 MEMORY_ADVICE = "Close other programs, or use fewer or smaller photos or a smaller mesh"
 LOWER_PRIORITY = getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)

@@ -11,7 +11,7 @@ import time
 
 END_WITH_PARENT = "PATINA_END_WITH_PARENT"
 """Environment variable of a command whose parent holds its standard input open."""
-CLEANUP_SECONDS = 0.7  # that the process has to remove its incomplete files
+CLEANUP_SECONDS = 0.4  # that the process has to remove its incomplete files
 CANCELLED = 130  # exit code
 
 

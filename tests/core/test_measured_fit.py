@@ -13,7 +13,7 @@ from patina.core.basis.log_table import LogTable
 from patina.core.errors import FitError
 from patina.core.fit.measured import MeasuredSettings, fit_measured
 from patina.core.fit.measured.cells import gather
-from patina.core.fit.measured.forward import CellModel, _distinct
+from patina.core.fit.measured.forward import CellModel, CellNodes
 from patina.core.fit.measured.grazing_prior import GrazingPrior, directions
 from patina.core.fit.measured.lobes import Lobes, fit_lobes
 from patina.core.fit.measured.normal_quadrature import quadrature_angles, rings
@@ -261,10 +261,18 @@ def test_shrinkage_darkens_only_uncertain_directions() -> None:
     assert abs(change[certain].mean()) < 0.02
 
 
-def test_distinct_quadrature_nodes_of_each_cell() -> None:
-    index = np.random.default_rng(1).integers(0, 9, (40, 12))
-    slot, indptr, node = _distinct(index)
-    for i, row in enumerate(index):
-        own = node[indptr[i] : indptr[i + 1]]
-        assert np.array_equal(own, np.unique(row))
-        assert np.array_equal(node[slot.reshape(index.shape)[i]], row)
+def test_distinct_nodes_of_each_cell_with_their_sums() -> None:
+    rng = np.random.default_rng(1)
+    normals = 3
+    index = rng.integers(0, 9, (40, 8 * normals)).astype(np.int32)
+    weight = rng.random(index.shape, np.float32)
+    pairs = CellNodes.of(index, weight)
+    values = rng.random((40, normals))
+    some = rng.random(40) < 0.5
+    for found, rows in ((pairs, np.arange(40)), (pairs.select(some), np.flatnonzero(some))):
+        sums = found.sums @ values[rows].ravel()
+        for i, row in enumerate(rows):
+            own = slice(found.indptr[i], found.indptr[i + 1])
+            assert np.array_equal(found.node[own], np.unique(index[row]))
+            each = weight[row] * np.repeat(values[row], 8)
+            assert np.allclose(sums[own], np.bincount(index[row], each)[found.node[own]])

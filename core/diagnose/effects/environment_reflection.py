@@ -19,6 +19,7 @@ from .base.parameters import Parameters
 LOBES = 64  # lobes that describe the radiance of the surroundings
 SHARP = 21.0  # sharpness of a lobe: half as bright 15° from its axis; the next axis is 24° away
 FINER = 8  # factor in number and sharpness of the lobes that are added where it is bright
+CHUNK = 32  # pixels at a time, so that the processor's cache holds their directions
 MAX_FINE_LOBES = 128  # added lobes at most
 DIM = 0.1  # of the largest radiance; no lobes are added where it is darker
 
@@ -46,12 +47,17 @@ class EnvironmentReflection(AddsRadiance, BuiltFromBRDFs):
     ) -> EnvironmentReflection:
         around = context.surroundings
         level = context.pixel_level / np.pi
-        open_ = around.open.astype(np.float32)
-        reflected = []
-        for d, k in zip(directions.astype(np.float32), sharp.astype(np.float32), strict=True):
-            bright = np.exp(k * (around.towards @ d - 1)) * open_
-            reflected.append(level * around.reflected_light(bright))
-        return cls(directions, sharp, np.stack(reflected))
+        reflected = np.empty((len(directions), len(level), 3), np.float32)
+        axes, sharpness = (sharp * directions.T).astype(np.float32), sharp.astype(np.float32)
+        for start in range(0, len(level), CHUNK):
+            rows = slice(start, start + CHUNK)
+            bright = around.towards[rows] @ axes  # (rows, d, lobes)
+            bright -= sharpness
+            np.exp(bright, out=bright)
+            of_open = around.reflected[rows] * around.open[rows, :, None]
+            of_lobes = np.matmul(of_open.transpose(0, 2, 1), bright)
+            reflected[:, rows] = (level[rows, :, None] * of_lobes).transpose(2, 0, 1)
+        return cls(directions, sharp, reflected)
 
     def at_pixels(self, context: DiagnosisContext, nearest: NearestPixels) -> EnvironmentReflection:
         return self._towards(context, self.directions, self.sharp)

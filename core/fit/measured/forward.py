@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
+from scipy.sparse import csr_array
 
 from ...angles import Angles, cosines
 from ...basis import Basis, mapping
@@ -16,6 +16,7 @@ from .cells import AngleCells
 from .normal_quadrature import quadrature_angles
 
 MIN_COSINE = 0.01  # cos θi and cos θo are clamped to it
+CORNERS = 8  # grid nodes that are interpolated at a direction
 
 
 @dataclass(frozen=True)
@@ -35,9 +36,8 @@ class CellModel:
 
     observed: (m, 3) like Prediction.level. scale: (m,) cosMap/cos θi of the cells. share: (j,)
     weights of the quadrature normals. factor: (m, j) what (exp(log) − ε) at a quadrature normal is
-    multiplied by before it is added to ρ·cos θi. index, weight: (m, j, 8) grid nodes and their
-    interpolation weights. slot: (m·j·8,) index of each into the distinct (cell, node) pairs; those
-    of cell i are node[indptr[i]:indptr[i + 1]].
+    multiplied by before it is added to ρ·cos θi. used: (u,) grid nodes that any cell needs.
+    corners: (m·j, u) interpolates between them. pairs: the distinct pairs of a cell and a node.
     """
 
     basis: Basis
@@ -46,11 +46,9 @@ class CellModel:
     scale: NDArray[np.float64]
     share: NDArray[np.float64]
     factor: NDArray[np.float32]
-    index: NDArray[np.int32]
-    weight: NDArray[np.float32]
-    slot: NDArray[np.int64]
-    indptr: NDArray[np.int64]
-    node: NDArray[np.int64]
+    used: NDArray[np.intp]
+    corners: csr_array
+    pairs: CellNodes
 
     @classmethod
     def of(cls, cells: AngleCells, basis: Basis) -> CellModel:
@@ -58,11 +56,14 @@ class CellModel:
         seen, cos_i, cos_o, share = quadrature_angles(cells.angles, cells.normal_error)
         m, j = cos_i.shape
         index, weight = basis.grid.corners(Angles(*(a.ravel() for a in seen)))
-        index = np.ascontiguousarray(index.T).reshape(m, j, 8)
-        weight = np.ascontiguousarray(weight.T).reshape(m, j, 8)
+        needed = np.zeros(basis.grid.size, bool)
+        needed[index] = True
+        number = np.cumsum(needed, dtype=np.int32) - np.int32(1)
+        index, weight = number[index.T].ravel(), np.ascontiguousarray(weight.T).ravel()
+        used = np.flatnonzero(needed)
+        starts = np.arange(m * j + 1, dtype=np.int32) * CORNERS
         cos_map = np.clip(cos_i * np.maximum(cos_o, MIN_COSINE), 0.01, 1.0)
         lit = np.maximum(cos_i, 0.0) / cos_map
-        slot, indptr, node = _distinct(index.reshape(m, -1))
         cell_cos_i, cell_cos_o = cosines(*cells.angles)
         scale = np.clip(cell_cos_i * cell_cos_o, 0.01, 1.0) / np.maximum(cell_cos_i, MIN_COSINE)
         observed = np.maximum(cells.reflected, 0.0) * scale[:, None] + mapping.EPSILON
@@ -73,18 +74,13 @@ class CellModel:
             scale=scale,
             share=share,
             factor=(share * lit).astype(np.float32),
-            index=index,
-            weight=weight,
-            slot=slot,
-            indptr=indptr,
-            node=node,
+            used=used,
+            corners=csr_array((weight, index, starts), shape=(m * j, len(used))),
+            pairs=CellNodes.of(index.reshape(m, -1), weight.reshape(m, -1)),
         )
 
     def select(self, which: NDArray[np.bool_]) -> CellModel:
         """The model of some of the cells (m,)."""
-        pairs = np.repeat(which, np.diff(self.indptr))
-        fresh = np.cumsum(pairs) - 1
-        slot = self.slot.reshape(self.index.shape)[which]
         return CellModel(
             self.basis,
             self.cells.select(which),
@@ -92,55 +88,81 @@ class CellModel:
             self.scale[which],
             self.share,
             self.factor[which],
-            self.index[which],
-            self.weight[which],
-            fresh[slot].ravel(),
-            np.concatenate([[0], np.cumsum(np.diff(self.indptr)[which])]),
-            self.node[pairs],
+            self.used,
+            self.corners[np.repeat(which, len(self.share))],
+            self.pairs.select(which),
         )
 
     def predict(self, coefficients: NDArray[np.floating], jacobian: bool = True) -> Prediction:
         """Expected levels, and with ``jacobian`` their derivatives, for coefficients (3, k)."""
-        k = coefficients.shape[1]
-        table = np.ascontiguousarray(LogTable.of(self.basis, coefficients).values.T)
-        nodes = self.basis.leading_nodes(1 + k)  # contiguous: a sparse product would copy others
-        m = len(self.cells)
-        level, spread = np.empty((m, 3)), np.empty((m, 3))
-        found: list[NDArray[np.float32]] = []
-        for channel in range(3):
-            logs = np.einsum("mjc,mjc->mj", table[channel][self.index], self.weight)
-            exponential = np.exp(np.clip(logs, -12.0, 12.0))
-            parts = self.factor * np.maximum(exponential - np.float32(mapping.EPSILON), 0)
-            total = parts.sum(axis=1, dtype=np.float64)
-            level[:, channel] = total * self.scale + mapping.EPSILON
-            second = (parts.astype(np.float64) ** 2 / self.share).sum(axis=1)
-            wide = np.maximum(second - total**2, 0.0)
-            spread[:, channel] = wide * (self.scale / level[:, channel]) ** 2
-            if jacobian:
-                each = (self.factor * exponential)[..., None] * self.weight
-                data = np.bincount(self.slot, each.ravel(), len(self.node))
-                matrix = sparse.csr_matrix(
-                    (data.astype(np.float32), self.node, self.indptr),
-                    shape=(m, self.basis.grid.size),
-                )
-                derivative = (matrix @ nodes)[:, 1:]
-                found.append(
-                    derivative * (self.scale / level[:, channel]).astype(np.float32)[:, None]
-                )
+        table = LogTable.of(self.basis, coefficients).values[self.used]
+        exponential = np.exp(np.clip(self.corners @ table, -12.0, 12.0))  # (m·j, 3)
+        exponential = exponential.reshape(*self.factor.shape, 3)
+        factor = self.factor[..., None]
+        parts = factor * np.maximum(exponential - np.float32(mapping.EPSILON), 0)
+        total = parts.sum(axis=1, dtype=np.float64)
+        scale = self.scale[:, None]
+        level = total * scale + mapping.EPSILON
+        second = np.einsum("mjc,mjc,j->mc", parts, parts, 1 / self.share)
+        wide = np.maximum(second - total**2, 0.0)
+        spread = wide * (scale / level) ** 2
+        if not jacobian:
+            return Prediction(level, spread, [])
+        each = self.pairs.sums @ (factor * exponential).reshape(-1, 3)
+        components = self._components(coefficients.shape[1])
+        shape = len(level), len(self.used)
+        found = []
+        for channel, to_log in enumerate((scale / level).astype(np.float32).T):
+            data = np.ascontiguousarray(each[:, channel])
+            matrix = csr_array((data, self.pairs.node, self.pairs.indptr), shape=shape)
+            found.append((matrix @ components) * to_log[:, None])
         return Prediction(level, spread, found)
 
+    def _components(self, k: int) -> NDArray[np.float32]:
+        """(u, k) the first components of the basis at the used nodes, contiguous: a sparse product
+        would copy others."""
+        return np.ascontiguousarray(self.basis.nodes[self.used, 1 : 1 + k])
 
-def _distinct(
-    index: NDArray[np.integer],
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """(slot (m·j,), indptr (m + 1,), node): the distinct nodes in each row of index (m, j), sorted.
-    Those of row i are node[indptr[i]:indptr[i + 1]]; slot is the position of each entry in node."""
-    order = np.argsort(index, axis=1)
-    ordered = np.take_along_axis(index, order, axis=1)
-    fresh = np.ones(index.shape, bool)
-    fresh[:, 1:] = ordered[:, 1:] != ordered[:, :-1]
-    place = np.cumsum(fresh.ravel(), dtype=np.int64).reshape(index.shape) - 1
-    slot = np.empty_like(place)
-    np.put_along_axis(slot, order, place, axis=1)
-    indptr = np.concatenate([[0], np.cumsum(fresh.sum(axis=1, dtype=np.int64))])
-    return slot.ravel(), indptr, ordered[fresh].astype(np.int64)
+
+@dataclass(frozen=True)
+class CellNodes:
+    """The distinct pairs (q,) of one of m cells and a grid node that its quadrature normals need.
+
+    sums: (q, m·j) adds up interpolation weights times values at the quadrature normals. indptr,
+    node: the nodes of cell i are node[indptr[i]:indptr[i + 1]], ascending.
+    """
+
+    sums: csr_array
+    indptr: NDArray[np.int32]
+    node: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, index: NDArray[np.int32], weight: NDArray[np.float32]) -> CellNodes:
+        """From the nodes (m, j·8) of all cells, and their weights."""
+        m, corners = index.shape
+        order = np.argsort(index, axis=1)
+        ordered = np.take_along_axis(index, order, axis=1)
+        fresh = np.ones(index.shape, bool)
+        fresh[:, 1:] = ordered[:, 1:] != ordered[:, :-1]
+        starts = np.append(np.flatnonzero(fresh.ravel()), fresh.size).astype(np.int32)
+        indptr = np.concatenate([[0], np.cumsum(fresh.sum(axis=1))]).astype(np.int32)
+        normals = corners // CORNERS
+        column = order // CORNERS + normals * np.arange(m)[:, None]
+        data = np.take_along_axis(weight, order, axis=1).ravel()
+        sums = csr_array(
+            (data, column.ravel().astype(np.int32), starts), shape=(len(starts) - 1, m * normals)
+        )
+        return cls(sums, indptr, ordered[fresh])
+
+    def select(self, which: NDArray[np.bool_]) -> CellNodes:
+        """The pairs of some of the cells (m,)."""
+        counts = np.diff(self.indptr)
+        kept = np.repeat(which, counts)
+        columns = np.repeat(which, self.sums.shape[1] // len(which))
+        sums = self.sums[kept]
+        number = np.cumsum(columns, dtype=np.int32) - np.int32(1)
+        sums = csr_array(
+            (sums.data, number[sums.indices], sums.indptr), shape=(sums.shape[0], columns.sum())
+        )
+        indptr = np.concatenate([[0], np.cumsum(counts[which])]).astype(np.int32)
+        return CellNodes(sums, indptr, self.node[kept])
