@@ -8,7 +8,7 @@ the results are passed on in order, so they do not depend on the number of threa
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
@@ -24,9 +24,18 @@ from ..inputs.lights import Lights
 from ..inputs.material_pixels import material_pixels
 from ..inputs.photos import LitPhoto, LitPhotos
 from ..light import Light
-from ..samples import SampleReservoir, SampleSink, SampleTable, sample_photo
+from ..samples import SampleReservoir, SampleSink, SampleTable
 from ..samples.face_votes import FaceVotes
-from ..samples.take import halo, inner_pixels, light_surface, trusted_pixels
+from ..samples.reservoir import ALL
+from ..samples.take import (
+    halo,
+    inner_pixels,
+    light_surface,
+    reached_rows,
+    rows_below,
+    sample_rows,
+    trusted_pixels,
+)
 from ..scan import Scan
 
 MAX_CLIPPED_SHARE = 1e-3  # of a photo's lit pixels; more gives a note
@@ -67,10 +76,12 @@ class _Shot:
 
 @dataclass(frozen=True)
 class _Band:
-    """The result of one band. tables, faces: one entry per material; faces: those of the pixels
-    that the material's masks mark."""
+    """The result of one band. tables, counts, faces: one entry per material; counts: of samples,
+    including those that the table leaves out; faces: those of the pixels that the material's masks
+    mark."""
 
     tables: list[SampleTable]
+    counts: list[int]
     faces: list[NDArray[np.int32]]
     seen: int
     lit: int
@@ -101,7 +112,7 @@ def take_samples(
         seen=np.zeros(count, np.int64),
         lit=np.zeros(count, np.int64),
     )
-    wanted = {name: (taken.kept[name], *((sinks or {}).get(name, ()))) for name in names}
+    others = {name: (sinks or {}).get(name, ()) for name in names}
     workers = thread_count(threads)
 
     def open_shot(place: int) -> _Shot:
@@ -115,38 +126,42 @@ def take_samples(
         shots = ordered_map(pool, open_shot, range(count), ahead=1)
         for place in range(count):
             yield place / count
-            yield from _take_photo(next(shots), taken, wanted, pool, workers)
+            yield from _take_photo(next(shots), taken, others, pool, workers)
     return taken
 
 
 def _take_photo(
     shot: _Shot,
     taken: PhotoSamples,
-    wanted: Mapping[str, Iterable[SampleSink]],
+    others: Mapping[str, Sequence[SampleSink]],
     pool: ThreadPoolExecutor | None,
     workers: int,
 ) -> Generator[float, None, None]:
-    """Sample one photo and add the result to ``taken``; yields the fraction of all photos done."""
+    """Sample one photo and add the result to ``taken``; yields the fraction of all photos done.
+    others: {material: sinks in addition to its reservoir}, which get all samples."""
     capture, place = shot.capture, shot.place
     camera, count = shot.lines.camera, len(capture.photos)
     trusted = clipped = 0
     faces: dict[str, list[NDArray[np.int32]]] = {m.name: [] for m in capture.materials}
     columns = shot.rays.cover.columns(camera)
     cut = list(bands(camera, halo(capture.fit.margins), columns))
-    results = ordered_map(pool, lambda window: _band(shot, window), cut, ahead=workers)
+    limits = [None if others[name] else kept for name, kept in taken.kept.items()]
+    results = ordered_map(pool, lambda window: _band(shot, window, limits), cut, ahead=workers)
     for window, band in zip(cut, results, strict=True):
         taken.seen[place] += band.seen
         taken.lit[place] += band.lit
         trusted += band.trusted
         clipped += band.clipped
-        for material, table, shown in zip(capture.materials, band.tables, band.faces, strict=True):
-            name = material.name
-            taken.counts[name][place] += len(table)
+        for name, table, number, shown in zip(
+            taken.kept, band.tables, band.counts, band.faces, strict=True
+        ):
+            taken.counts[name][place] += number
             taken.marked[name] += len(shown)
             if len(faces) > 1:  # with one material, every face is of that material
                 faces[name].append(shown)
-            for sink in wanted[name]:
-                if len(table):
+            if len(table):
+                taken.kept[name].add(place, table, number)
+                for sink in others[name]:
                     sink.add(place, table)
         yield (place + window.last / camera.height) / count
     for index, shown_by_band in enumerate(faces.values()):
@@ -160,8 +175,9 @@ def _take_photo(
     taken.notes.update(shot.photo.notes)
 
 
-def _band(shot: _Shot, window: Window) -> _Band:
-    """The samples of one band."""
+def _band(shot: _Shot, window: Window, limits: Sequence[SampleReservoir | None]) -> _Band:
+    """The samples of one band. limits: for each material, the reservoir that alone decides which
+    samples are kept, or None where all are needed."""
     capture, margins = shot.capture, shot.capture.fit.margins
     view = view_window(shot.rays, shot.lines, window)
     wanted = np.zeros(len(view.pixel), bool)
@@ -171,18 +187,19 @@ def _band(shot: _Shot, window: Window) -> _Band:
     trusted = trusted_pixels(view, lighting, margins) & ~in_shadow & wanted
     usable = shot.photo.usable.ravel().take(view.pixel)
     keep = trusted & usable
-    tables, faces = [], []
-    for material in capture.materials:
+    photo = shot.photo
+    tables, counts, faces = [], [], []
+    for material, reservoir in zip(capture.materials, limits, strict=True):
         pixels = where[material.name]
-        inner = inner_pixels(view, pixels, margins)
-        tables.append(
-            sample_photo(
-                view, lighting, shot.photo.radiance, keep & inner, shot.place, shot.photo.noise
-            )
-        )
+        rows = reached_rows(lighting, keep & inner_pixels(view, pixels, margins))
+        counts.append(len(rows))
+        limit = ALL if reservoir is None else reservoir.limit(shot.place)
+        rows = rows_below(limit, view, lighting, photo.radiance, rows, shot.place)
+        tables.append(sample_rows(view, lighting, photo.radiance, rows, shot.place, photo.noise))
         faces.append(view.face[pixels & wanted])
     return _Band(
         tables=tables,
+        counts=counts,
         faces=faces,
         seen=int(wanted.sum()),
         lit=int((wanted & ~lighting.shadowed).sum()),

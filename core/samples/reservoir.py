@@ -69,12 +69,18 @@ class SampleReservoir:
         )  # of a photo: samples with larger hashes are dropped
         self._brightest: tuple[float, int, SampleTable] | None = None  # L / E, −place, the sample
 
-    def add(self, photo: int, table: SampleTable) -> None:
-        """Add some samples of one photo."""
+    def limit(self, photo: int) -> np.uint64:
+        """Samples of a photo with larger hashes are dropped. It only falls, so that other threads
+        can use it at any time (take.rows_below)."""
+        return self._limits[photo]
+
+    def add(self, photo: int, table: SampleTable, count: int | None = None) -> None:
+        """Add some samples of one photo. count: how many there were where those that are dropped
+        anyway were left out of the table; None if it is complete."""
         if not len(table):
             return
         self._update_brightest(table)
-        self._counts[photo] += len(table)
+        self._counts[photo] += len(table) if count is None else count
         number = sample_hash(table.photo, table.pixel)
         if self._limits[photo] < ALL:
             rows = np.flatnonzero(number <= self._limits[photo])

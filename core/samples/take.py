@@ -16,6 +16,7 @@ from ..light import Incidence, Light
 from ..noise import PixelNoise
 from ..scan import Camera
 from .criterion import Criterion, criterion_where
+from .reservoir import ALL, sample_hash
 from .table import SampleTable
 
 MIN_IRRADIANCE = 1e-30
@@ -150,18 +151,58 @@ def sample_photo(
 
     radiance: (h, w, 3) of the whole photo, linear, in the units of the light's irradiance / sr.
     photo: index written to the table. noise: of the photo, None for none. Pixels that almost no
-    light reaches (outside a narrow beam) are skipped: their reflectance cannot be represented in
-    single precision.
+    light reaches are skipped (reached_rows).
     """
+    rows = reached_rows(lighting, keep)
+    return sample_rows(view, lighting, radiance, rows, photo, noise)
+
+
+def reached_rows(lighting: Lighting, keep: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """The rows of a view that are marked in ``keep`` (n,) and that light reaches. Outside a narrow
+    beam the reflectance cannot be represented in single precision."""
     rows = np.flatnonzero(keep)
+    reached = _reached(_single(lighting.incidence.select(rows).irradiance))
+    if reached.all():
+        return rows
+    return rows[reached] if len(reached) == len(rows) else rows[:0]
+
+
+def rows_below(
+    limit: np.uint64,
+    view: SurfaceView,
+    lighting: Lighting,
+    radiance: NDArray[np.float32],
+    rows: NDArray[np.intp],
+    photo: int,
+) -> NDArray[np.intp]:
+    """Those of some rows that a reservoir of this limit keeps (SampleReservoir.limit): those whose
+    hash is at most the limit, and the one with the largest mean of L / E. All other columns of a
+    sample are then computed for few of them."""
+    if limit == ALL or not len(rows):
+        return rows
+    pixel = view.pixel.take(rows)
+    kept = sample_hash(np.full(len(rows), photo), pixel) <= limit
+    irradiance = _single(lighting.incidence.select(rows).irradiance)
+    seen = radiance.reshape(-1, 3).take(pixel, axis=0)
+    light = np.zeros(len(rows), np.float32)
+    for channel in range(3):
+        light += seen[:, channel] / irradiance[:, channel]
+    kept[np.argmax(light)] = True
+    return rows[kept]
+
+
+def sample_rows(
+    view: SurfaceView,
+    lighting: Lighting,
+    radiance: NDArray[np.float32],
+    rows: NDArray[np.intp],
+    photo: int = 0,
+    noise: PixelNoise | None = None,
+) -> SampleTable:
+    """sample_photo of some rows of the view, all of which light reaches."""
     normal, towards = (_gathered(_single(v), rows) for v in (view.normal, view.view))
     incidence = lighting.incidence.select(rows)
     light, irradiance = _single(incidence.towards), _single(incidence.irradiance)
-    reached = _reached(irradiance)
-    if len(rows) and not reached.all():
-        kept = np.zeros(len(keep), bool)
-        kept[rows] = reached
-        return sample_photo(view, lighting, radiance, keep & kept, photo, noise)
     angles = half_difference(normal, light, towards)
     cos_i = lighting.cos_i.take(rows)
     pixel = view.pixel.take(rows)

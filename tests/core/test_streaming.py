@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,8 +23,8 @@ from patina.core.inputs.lights import find_lights
 from patina.core.inputs.photos import LitPhotos
 from patina.core.jobs import FitJob, sampling
 from patina.core.jobs.sampling import take_samples
-from patina.core.samples import Margins, SampleReservoir, SampleTable, sample_photo, weighted
-from patina.core.samples.reservoir import sample_hash, water_level
+from patina.core.samples import Margins, SampleReservoir, SampleTable, sample_photo, take, weighted
+from patina.core.samples.reservoir import ALL, sample_hash, water_level
 from patina.core.samples.take import halo, inner_pixels, light_surface, trusted_pixels
 from patina.core.scan import Camera, Mesh
 from patina.core.scan.camera import Pose
@@ -189,6 +190,36 @@ def test_threads_and_bands_do_not_change_bytes(ball: Path, monkeypatch: pytest.M
         assert taken.counts["surface"].sum() == len(table)
         assert np.array_equal(np.bincount(table.photo), taken.counts["surface"])
     assert all(one == found[0] for one in found)
+
+
+def test_samples_that_would_be_dropped_are_left_out_without_changing_bytes(
+    ball: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    capture = read_capture(ball)
+    scan = capture_data.open_scan(capture)
+    rays, photos = RayScene.build(scan.mesh), LitPhotos.open(capture)
+    lights = find_lights(capture, scan, photos)
+    taken_rows: list[int] = []
+
+    def counted(*arguments: Any) -> SampleTable:
+        taken_rows.append(len(arguments[3]))
+        return take.sample_rows(*arguments)
+
+    monkeypatch.setattr(sampling, "SampleReservoir", partial(SampleReservoir, size=2000))
+    monkeypatch.setattr(sampling, "bands", lambda c, halo, columns: bands(c, halo, columns, 2000))
+    monkeypatch.setattr(sampling, "sample_rows", counted)
+    found = []
+    for everything in (False, True):
+        if everything:
+            monkeypatch.setattr(SampleReservoir, "limit", lambda self, photo: ALL)
+        taken_rows.clear()
+        taken = drained(take_samples(capture, scan, rays, photos, lights, threads=2))
+        table = taken.kept["surface"].table()
+        found.append([getattr(table, f.name).tobytes() for f in fields(table)])
+        count = taken.counts["surface"].sum()
+        assert count > 3 * len(table)
+        assert sum(taken_rows) == count if everything else sum(taken_rows) < 0.8 * count
+    assert found[0] == found[1]
 
 
 @pytest.mark.slow
