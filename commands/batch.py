@@ -26,7 +26,7 @@ from ..core.counted import counted
 from ..core.errors import InputError, PatinaError
 from ..core.files import remove_unfinished
 from ..core.jobs.varying.variation_estimator import MODES
-from ..core.output_folder import check_out, only_writer
+from ..core.output_folder import check_out, only_writer, remove_abandoned
 from ..core.report.result_json import program_version
 from .needs_blender import has_blender
 from .progress import print_note
@@ -106,8 +106,7 @@ def _run_batch(
     arguments: argparse.Namespace, items: Sequence[Item], out: Path, limits: Limits
 ) -> None:
     """Run what is not finished, and write the page. Raises PatinaError where an object fails."""
-    for pattern in (PAGE, TABLE, f"*{ENDING}"):
-        remove_unfinished(out, pattern)
+    _remove_leftovers(out, items)
     work = _work(arguments, items, out)
     summaries, left = _known(out, work)
     if len(left) < len(work):
@@ -115,6 +114,7 @@ def _run_batch(
     _run_all(arguments, out, left, limits, summaries)
     done = list(summaries.values())
     write_page(out, done, running=False)
+    _remove_leftovers(out, items)
     for error in rig_errors(done):
         print(error.sentence)
     failed = [one for one in done if one.state == FAILED]
@@ -126,6 +126,15 @@ def _run_batch(
             f"{counted(len(failed), 'object')} failed ({names}{' …' if failed[5:] else ''}); "
             f"{out / PAGE} has the reasons. Run the command again to try only these"
         )
+
+
+def _remove_leftovers(out: Path, items: Sequence[Item]) -> None:
+    """Remove what killed processes have left. Objects that are finished are not run again, so no
+    later fit removes it from their folders."""
+    for pattern in (PAGE, TABLE, f"*{ENDING}"):
+        remove_unfinished(out, pattern)
+    for folder in (out, *(out / item.name for item in items)):
+        remove_abandoned(folder)
 
 
 def _work(arguments: argparse.Namespace, items: Sequence[Item], out: Path) -> list[Work]:

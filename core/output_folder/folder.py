@@ -59,7 +59,7 @@ def staged_folder(
         location = out if out.is_dir() else out.parent
         location.mkdir(parents=True, exist_ok=True)
         complete_publication(out)
-        _remove_abandoned(location)
+        remove_abandoned(location)
         staging = location / f"{STAGING}{secrets.token_hex(4)}"
         staging.mkdir()
         held = lock_folder(staging)
@@ -89,7 +89,7 @@ def scratch_folder() -> Iterator[Path]:
     """A folder for temporary files on this computer's own disk. What killed processes have left is
     removed. Raises OSError."""
     location = Path(tempfile.gettempdir())
-    _remove_abandoned(location, SCRATCH)
+    remove_abandoned(location, SCRATCH)
     folder = Path(tempfile.mkdtemp(prefix=SCRATCH))
     held = lock_folder(folder)
     try:
@@ -113,8 +113,9 @@ def _unpublished(staging: Path, out: Path, error: Exception) -> Exception:
     return InputError(f"{error}; the complete result is in {kept}", file=out, key="--out")
 
 
-def _remove_abandoned(location: Path, prefix: str = STAGING) -> None:
-    """Remove the temporary folders of processes that were killed: no process has them locked."""
+def remove_abandoned(location: Path, prefix: str = STAGING) -> None:
+    """Remove the temporary folders in ``location`` of processes that were killed: no process has
+    them locked."""
     for folder in location.glob(f"{prefix}*"):
         with contextlib.suppress(OSError):
             if folder.is_symlink() or time.time() - folder.stat().st_mtime < MIN_AGE:

@@ -182,6 +182,18 @@ def test_two_batches_at_once_are_refused_and_unfinished_files_are_removed(tmp_pa
     assert not list(out.glob(".patina-lock"))
 
 
+def test_unfinished_results_are_removed_from_folders_of_finished_objects(tmp_path):
+    path, out = collection(tmp_path / "all", one=""), tmp_path / "out"
+    assert batch(path, out) == 0
+    left = [out / ".patina-part-01234567", out / "one" / ".patina-part-89abcdef"]
+    for folder in left:
+        folder.mkdir(parents=True)
+        (folder / "half").write_text("half")
+        os.utime(folder, (0, 0))
+    assert batch(path, out) == 0
+    assert not any(folder.exists() for folder in left)
+
+
 def diagnosed(name: str, value: float, error: float, named: bool = True) -> Summary:
     cause = Cause("light_direction", named, {"tilt": (value, error, "rad")})
     return Summary(Item(name, Path(name), "monday"), FINISHED, causes=(cause,))
