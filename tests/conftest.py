@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -37,3 +38,14 @@ def shared() -> Path:
     if not (folder / "data").is_dir():
         pytest.skip("no reference data (../shared, or PATINA_SHARED)")
     return folder
+
+
+@pytest.fixture
+def simple_portable(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Simple fits for other renderers, in a fifth of the time, for tests that do not judge them."""
+    from patina.core.appearance.cube_root import COARSE
+    from patina.core.jobs import portable_materials as portable
+
+    principled = partial(portable.fit_principled, coat=False, nodes=COARSE)
+    monkeypatch.setattr(portable, "fit_principled", principled)
+    monkeypatch.setattr(portable, "fit_lobe_stack", partial(portable.fit_lobe_stack, most=1))

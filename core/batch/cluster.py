@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,14 @@ CONNECT_SECONDS = 60.0  # that a scheduler may take to answer
 LOST_SECONDS = 600.0  # after which a scheduler that was lost is given up
 RETRY_INTERVAL = 2.0  # seconds between two attempts to reach it
 MAX_QUEUED = 1000  # objects given to the scheduler at a time: its memory does not grow with all
+SETTINGS = {  # of Dask here: its processes look at themselves a hundred times a second otherwise
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "10s",
+    "distributed.admin.system-monitor.gil.enabled": False,
+    "distributed.scheduler.work-stealing": False,
+    "distributed.scheduler.active-memory-manager.start": False,
+}
 NEEDED = (
     "a batch needs the package dask.distributed; install the Python package patina with its extra "
     "'farm'"
@@ -71,19 +79,13 @@ def run_on_cluster(
     the processes; address: of an existing scheduler; None: ``workers`` processes here. waiting: is
     called when an object has ended or a second has passed. Raises PatinaError."""
     try:
-        from distributed import Client, LocalCluster
+        from distributed import Client
     except ImportError as error:
         raise PatinaError(NEEDED) from error
     left = {one.item.name: one for one in work}
     attempts = dict.fromkeys(left, 1)
     lost_at: float | None = None
-    local: AbstractContextManager[Any] = nullcontext(address)
-    if address is None:
-        local = LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, memory_limit=None,
-            dashboard_address=None,
-        )  # fmt: skip
-    with local as cluster:
+    with nullcontext(address) if address else _local_cluster(workers) as cluster:
         while left:
             try:
                 with _connected(Client, cluster) as client:
@@ -107,6 +109,22 @@ def run_on_cluster(
                     ) from error
                 waiting()
                 time.sleep(RETRY_INTERVAL)
+
+
+@contextmanager
+def _local_cluster(workers: int) -> Iterator[Any]:
+    """A scheduler and workers on this computer."""
+    import dask
+    from distributed import LocalCluster
+
+    with (
+        dask.config.set(SETTINGS),
+        LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=True, memory_limit=None,
+            dashboard_address=None,
+        ) as cluster,
+    ):  # fmt: skip
+        yield cluster
 
 
 class _SentByValue:

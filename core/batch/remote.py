@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-LOOK_INTERVAL = 0.2  # seconds between two looks at the process
+LOOK_INTERVAL = 0.5  # seconds between two looks at the process
 END_SECONDS = 5.0  # that a process has to remove its incomplete files before it is killed
 MAX_RECORD_BYTES = 1 << 20
 MAX_MESSAGE = 2000  # characters of an error that are kept

@@ -286,7 +286,7 @@ def test_clipped_pixels_are_excluded_from_the_samples(ball: Path) -> None:
     all_samples, _ = sampled(ball)
     text = ball.read_text()
     ball.write_text(text.replace('file = "lit_1.exr"', 'file = "lit_1.exr"\nsaturation = 0.2'))
-    job = FitJob(read_capture(ball))
+    job = FitJob(read_capture(ball), portable=False)
     job.drain()
     assert job.result is not None
     clipped = (all_samples.radiance[all_samples.photo == 0] >= 0.2 * 0.99).any(axis=1)
@@ -311,7 +311,7 @@ def test_materials_from_vertex_colours(ball: Path) -> None:
     extra = '[[material]]\nname = "red"\nvertex_colour = [255, 0, 0]\n'
     extra += '[[material]]\nname = "blue"\nvertex_colour = [0, 0, 255]\n'
     ball.write_text(ball.read_text() + extra)
-    job = FitJob(read_capture(ball))
+    job = FitJob(read_capture(ball), portable=False)
     job.drain()
     assert job.result is not None
     centre = vertices[faces].mean(axis=1)[:, 2]

@@ -76,7 +76,7 @@ def test_materials_by_face_attribute(tmp_path: Path) -> None:
     )
     upper = vertices[faces].mean(axis=1)[:, 2] > made.CENTRE[2]
     made.write_ply(path.parent / "mesh.ply", vertices, faces, upper.astype(int))
-    job = FitJob(read_capture(path))
+    job = FitJob(read_capture(path), portable=False)
     job.drain()
     assert job.result is not None
     lower, higher = job.result.materials
@@ -104,7 +104,9 @@ def test_degenerate_and_duplicate_faces_are_dropped_with_attributes(tmp_path: Pa
 
 
 def test_material_without_mask_covers_unmasked_pixels(tmp_path: Path) -> None:
-    path = made.make_capture(tmp_path / "ball", photos=3, extra="[fit]\nheld_out = false")
+    path = made.make_capture(
+        tmp_path / "ball", photos=3, extra='[fit]\nheld_out = false\nmethod = "paper"'
+    )
     mask = np.zeros((made.HEIGHT, made.WIDTH))
     mask[:, : made.WIDTH // 2] = 255
     made.write_png(path.parent / "left.png", mask)
@@ -116,7 +118,7 @@ def test_material_without_mask_covers_unmasked_pixels(tmp_path: Path) -> None:
     counts = {}
     for order in (("rest", "gold"), ("gold", "rest")):
         path.write_text(text + "".join(f'\n[[material]]\nname = "{n}"' for n in order))
-        job = FitJob(read_capture(path))
+        job = FitJob(read_capture(path), portable=False)
         job.drain()
         assert job.result is not None
         faces = np.bincount(job.result.face_material, minlength=2)

@@ -269,6 +269,7 @@ def test_result_is_valid(root: Path, measured: dict[str, Any]) -> None:
     validator(root, "result").validate(measured)
 
 
+@pytest.mark.usefixtures("simple_portable")
 def test_result_of_paper_method_is_valid(root: Path, tmp_path: Path) -> None:
     extra = '[fit]\nmethod = "paper"\ntrials = 2'
     written = fitted(made.make_capture(tmp_path / "ball", photos=3, extra=extra))
@@ -304,6 +305,7 @@ TESTED_CAUSES = {
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("simple_portable")
 def test_diagnosis_is_valid(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a capture in which one lamp was 30 % brighter than stated; five causes are tested."""
     tried = tuple(kind for kind in effects.EFFECTS if kind.cause in TESTED_CAUSES)

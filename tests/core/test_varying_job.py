@@ -122,6 +122,7 @@ def test_even_sphere_keeps_its_material(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("simple_portable")
 def test_fit_writes_the_variation_and_predict_uses_it(tmp_path, monkeypatch):
     monkeypatch.setattr("patina.commands.fit.has_blender", lambda: False)
     capture = str(made.make_capture(tmp_path, photos=8, brdf=painted))
@@ -146,6 +147,7 @@ def test_fit_writes_the_variation_and_predict_uses_it(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("simple_portable")
 def test_library_exports_the_variation(tmp_path, monkeypatch):
     monkeypatch.setattr("patina.commands.maps.has_blender", lambda: False)
     file = made.make_capture(tmp_path, photos=8, brdf=painted)
