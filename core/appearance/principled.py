@@ -144,7 +144,9 @@ class Configuration:
         half = light + view
         half = half / np.maximum(np.linalg.norm(half, axis=-1, keepdims=True), 1e-12)
         cos_d = np.einsum("...i,...i->...", light, half)
-        return cls(light[..., 2], view[..., 2], half[..., 2], cos_d)
+        # copies: the last bits of some functions of a strided array depend on where in memory NumPy
+        # puts the result (a part beyond the array's end counts as overlap with it)
+        return cls(*(np.ascontiguousarray(v[..., 2]) for v in (light, view, half)), cos_d)
 
     def followed_by(self, other: Configuration) -> Configuration:
         """Both sets of directions, one after the other."""

@@ -174,3 +174,17 @@ def test_more_lobes_never_increase_the_error():
     truth = LobeStack(GREY, 0.2, (SATIN, GLASS, GOLD))
     errors = fit_lobe_stack(truth.evaluate).errors
     assert list(errors.values()) == sorted(errors.values(), reverse=True)
+
+
+def test_functions_of_a_configuration_do_not_depend_on_memory():
+    """NumPy chooses another routine where the result lies behind a strided array."""
+    light, view = light_view(*quadrature(COARSE)[0])
+    where = Configuration.of(light, view)
+    rng = np.random.default_rng(0)
+    found = set()
+    for _ in range(300):
+        kept = [np.empty(n) for n in rng.integers(1, 3 * len(light), 20)]
+        del kept[::2]
+        found.add(np.cbrt(where.cos_i).tobytes())
+    assert len(found) == 1
+    assert all(a.flags.c_contiguous for a in (where.cos_i, where.cos_o, where.cos_h, where.cos_d))
