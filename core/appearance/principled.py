@@ -146,7 +146,8 @@ class Configuration:
         cos_d = np.einsum("...i,...i->...", light, half)
         # copies: the last bits of some functions of a strided array depend on where in memory NumPy
         # puts the result (a part beyond the array's end counts as overlap with it)
-        return cls(*(np.ascontiguousarray(v[..., 2]) for v in (light, view, half)), cos_d)
+        cos_i, cos_o, cos_h = (np.ascontiguousarray(v[..., 2]) for v in (light, view, half))
+        return cls(cos_i, cos_o, cos_h, cos_d)
 
     def followed_by(self, other: Configuration) -> Configuration:
         """Both sets of directions, one after the other."""
