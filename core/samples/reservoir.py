@@ -35,6 +35,17 @@ def sample_hash(photo: NDArray[np.integer], pixel: NDArray[np.integer]) -> NDArr
     return z
 
 
+def brightness(
+    radiance: NDArray[np.float32], irradiance: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """(n,) sum of L / E over the channels. radiance: (n, 3); irradiance: (n, 3), or (1, 3) for
+    all."""
+    light = radiance[:, 0] / irradiance[:, 0]
+    for channel in (1, 2):
+        light += radiance[:, channel] / irradiance[:, channel]
+    return light
+
+
 def water_level(counts: NDArray[np.integer], size: int) -> int:
     """The largest number that each may keep so that all together keep at most ``size``; counts:
     (c,) how many each has."""
@@ -114,9 +125,7 @@ class SampleReservoir:
 
     def _update_brightest(self, table: SampleTable) -> None:
         """Remember the sample with the largest mean of L / E."""
-        light = table.radiance[:, 0] / table.irradiance[:, 0]
-        for channel in (1, 2):
-            light += table.radiance[:, channel] / table.irradiance[:, channel]
+        light = brightness(table.radiance, table.irradiance)
         row = int(np.argmax(light))
         one = table.select(np.array([row]))
         found = float(light[row]), -int(_place(one)[0])

@@ -16,7 +16,7 @@ from ..light import Incidence, Light
 from ..noise import PixelNoise
 from ..scan import Camera
 from .criterion import Criterion, criterion_where
-from .reservoir import ALL, sample_hash
+from .reservoir import ALL, brightness, sample_hash
 from .table import SampleTable
 
 MIN_IRRADIANCE = 1e-30
@@ -184,10 +184,7 @@ def rows_below(
     kept = sample_hash(np.full(len(rows), photo), pixel) <= limit
     irradiance = _single(lighting.incidence.select(rows).irradiance)
     seen = radiance.reshape(-1, 3).take(pixel, axis=0)
-    light = np.zeros(len(rows), np.float32)
-    for channel in range(3):
-        light += seen[:, channel] / irradiance[:, channel]
-    kept[np.argmax(light)] = True
+    kept[np.argmax(brightness(seen, irradiance))] = True
     return rows[kept]
 
 
