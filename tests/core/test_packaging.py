@@ -26,7 +26,8 @@ LIBRARIES = {"numpy", "scipy", "pycolmap", "OpenImageIO", "embreex"} | {
     "tomlkit",
     "rawpy",  # where it exists
     "flip_evaluator",  # likewise
-    "distributed",  # likewise, with the next two
+    "dask",  # likewise, with the next three
+    "distributed",
     "cloudpickle",
     "psutil",
 }
