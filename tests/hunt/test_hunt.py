@@ -20,7 +20,6 @@ if material_nodes.osl_missing():
 
 CASES = {
     "none": (0.0, 5, "none"),
-    "vignetting": (0.03, 2, "vignetting"),
     "cast_shadow": (0.03, 1, "cast_shadow"),
     "moire": (0.03, 1, "unknown"),
     "anisotropy": (0.1, 2, "anisotropy"),  # its step is weaker than that of unrelated effects
