@@ -18,6 +18,12 @@ HELP = "compute the embedded basis again from neural encodings (for developers)"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("encodings", type=Path, help="the neural encodings, nbrdf_merl.npz")
     parser.add_argument(
+        "--others",
+        type=Path,
+        help="encodings of materials that are not in MERL, nbrdf_validation.npz: the prior of a "
+        "fit is learnt from them too",
+    )
+    parser.add_argument(
         "--checksums", type=Path, help="merl_sha256.csv; also write the embedded checksums"
     )
     parser.add_argument("--out", type=Path, default=DEFAULT_FILE, help="the .npz file to write")
@@ -25,7 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     progress = Progress()
-    basis = build(arguments.encodings, progress=lambda stage, done: progress(Step(stage, done)))
+    basis = build(
+        arguments.encodings,
+        progress=lambda stage, done: progress(Step(stage, done)),
+        others=arguments.others,
+    )
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     storage.save(arguments.out, basis)
     size = arguments.out.stat().st_size

@@ -27,6 +27,7 @@ def run(data: Path) -> None:
     from patina.core.angles import Angles, cosines, merl_grid
     from patina.core.basis import PrincipalBRDF, default_basis
     from patina.core.basis.build_default import NeuralObservations
+    from patina.core.basis.residual_components import PRINCIPAL_COUNT
     from patina.core.basis.training import exact_rows, principal
     from patina.core.brdf import TabulatedBRDF, metrics, nbrdf
 
@@ -34,7 +35,8 @@ def run(data: Path) -> None:
     basis = default_basis()
     observations = NeuralObservations(nbrdf.load(data / "brdf" / "nbrdf_merl.npz")[1])
     start = time.perf_counter()
-    directions, explained = principal(observations, basis.count)
+    found = principal(observations, PRINCIPAL_COUNT)
+    directions, explained = found.weights, found.explained
     print(f"principal components of 300 columns: {time.perf_counter() - start:.1f} s")
     total = explained.cumsum()
     shares = ", ".join(f"{k}: {100 * total[k - 1]:.1f} %" for k in (1, 2, 3, 5, 10, 20, 40))
@@ -48,7 +50,7 @@ def run(data: Path) -> None:
         pick = rng.choice(visible, 60_000, replace=False)
         angles = Angles(*(a.ravel()[pick] for a in centres))
         exact = exact_rows(observations, directions, angles)
-        centre, rows = basis.rows(angles)
+        centre, rows = basis.rows(angles, PRINCIPAL_COUNT)
         difference = (centre[:, None] + rows @ directions.T.astype(np.float32)) - (
             (exact[0] + exact[1])[:, None] + exact[2:].T @ directions.T.astype(np.float32)
         )

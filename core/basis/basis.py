@@ -29,12 +29,15 @@ class Basis:
 
     mean: (n_h, n_d, n_p) float32, mean µ of the mapped observations.
     log_reference: the same shape, ln(ref + ε) (mapping.py).
-    components: (k, n_h, n_d, n_p) float32, the scaled components Q = V·Σ.
+    components: (k, n_h, n_d, n_p) float32, the scaled components Q = V·Σ; where there are
+    ``others``, the last ones are those of residual_components.py.
     explained: fraction of variance of every component, including those not stored.
     columns: number of training observations (300 for the 100 MERL materials).
     provenance: data, command and licence from which the basis was computed.
     training: (columns, k) coefficients of the training columns, R, G and B of each material in
     turn; None where unknown.
+    others: (m, k) the same of measured materials that are not among the training columns; None
+    where there are none.
     """
 
     STORED_APART: ClassVar[bool] = True
@@ -47,6 +50,7 @@ class Basis:
     columns: int
     provenance: str
     training: NDArray[np.float64] | None = None
+    others: NDArray[np.float64] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields, without what is computed from them."""

@@ -1,8 +1,9 @@
-"""Build the embedded basis: ``python run.py headless build-basis NBRDF.npz`` writes assets/basis.
+"""Build the embedded basis: ``python run.py headless build-basis NBRDF.npz --others NBRDF.npz``
+writes assets/basis.
 
-Input: the neural encodings of the 100 MERL materials by Sztrajman et al. 2021 (MIT licence), which
-are not part of this repository. Only the mean, the reference, the components and the coefficients
-of the encodings are kept.
+Input: the neural encodings of the 100 MERL materials, and of 25 others for the prior, by Sztrajman
+et al. 2021 (MIT licence), which are not part of this repository. Only the mean, the reference, the
+components and the coefficients of the encodings are kept.
 """
 
 from __future__ import annotations
@@ -25,6 +26,10 @@ PROVENANCE = (
     "the 100 MERL materials by Sztrajman, Rainer, Ritschel, Weyrich 2021 (asztr/Neural-BRDF, MIT "
     "licence), and the encodings' own coefficients. Computed by core/basis/build_default.py. "
     "Contains no MERL data."
+)
+OTHERS = (
+    " The last components and the further coefficients are those of %d other encodings of the same "
+    "authors: measurements of the RGL database (Dupuy, Jakob 2018) and of Nielsen et al. 2015."
 )
 
 
@@ -60,8 +65,10 @@ def build(
     encodings: Path,
     exclude: Sequence[str] = (),
     progress: Progress = lambda stage, fraction: None,
+    others: Path | None = None,
 ) -> Basis:
-    """The basis of an .npz of encodings, without the materials named in ``exclude``.
+    """The basis of an .npz of encodings, without the materials named in ``exclude``. others: an
+    .npz of encodings of materials that are not in the database, for the prior.
 
     Raises InputError for a file that is not one or has too few materials, ValueError for an unknown
     name.
@@ -78,7 +85,12 @@ def build(
         )
     kept = [i for i, name in enumerate(names) if name not in exclude]
     note = f" Without {', '.join(sorted(exclude))}." if exclude else ""
-    return train(NeuralObservations(weights[kept]), PROVENANCE + note, progress=progress)
+    more = None if others is None else NeuralObservations(nbrdf.load(others)[1])
+    if more is not None:
+        note += OTHERS % len(more.weights)
+    return train(
+        NeuralObservations(weights[kept]), PROVENANCE + note, progress=progress, others=more
+    )
 
 
 def write_checksums(table: Path, target: Path) -> int:

@@ -5,6 +5,9 @@ X is the n_columns × n_cells matrix of mapped observations after subtracting th
 (1)), X = W Σ Vᵀ its SVD (equation (2)). X Xᵀ = W Σ² Wᵀ is small (300 × 300 for MERL). The scaled
 components are Q = V·Σ = Xᵀ W, so W and the mapped observations in a direction give the components
 in ANY direction: there is no SVD of a million rows and no resampling.
+
+The components of other measured materials, for the prior of the estimator, are in
+residual_components.py.
 """
 
 from __future__ import annotations

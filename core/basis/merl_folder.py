@@ -19,10 +19,11 @@ from ..errors import InputError
 from ..files import regular_size
 from . import storage
 from .basis import Basis, Progress
+from .default_basis import default_basis
 from .training import BLOCK, train
 
 CHECKSUMS_FILE = Path(__file__).parents[2] / "assets" / "basis" / "merl_sha256.json"
-VERSION = 2  # of the cache; increase it when the result of train() changes
+VERSION = 3  # of the cache; increase it when the result of train() changes
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,24 @@ class MerlObservations:
             np.memmap(file, merl_file.VALUES, "r", offset=12, shape=(3, merl_file.CELLS))
             for file in self.files
         ]
+
+
+@dataclass(frozen=True)
+class OthersOf:
+    """The measured materials that another basis knows and that are not in MERL, as it stores
+    them."""
+
+    basis: Basis
+
+    @property
+    def columns(self) -> int:
+        """Three for each material."""
+        return 0 if self.basis.others is None else len(self.basis.others)
+
+    def at(self, angles: Angles) -> NDArray[np.float32]:
+        """ρ (columns, n) in 1/sr."""
+        assert self.basis.others is not None
+        return np.ascontiguousarray(self.basis.evaluate(self.basis.others, angles).T)
 
 
 def checksums() -> dict[str, str]:
@@ -127,11 +146,14 @@ def cached_basis(
             return storage.load(stored)
         except InputError:
             stored.unlink()  # a damaged cache file is computed anew
+    others = OthersOf(default_basis())
     basis = train(
         MerlObservations(files),
         f"Principal components (Nielsen's log mapping) of {len(files)} MERL files "
-        "(Matusik et al. 2003; for research and academic use). Made on this computer.",
+        "(Matusik et al. 2003; for research and academic use), and the other materials of the "
+        "embedded basis. Made on this computer.",
         progress=progress,
+        others=others if others.columns else None,
     )
     cache.mkdir(parents=True, exist_ok=True)
     storage.save(stored, basis)

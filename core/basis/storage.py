@@ -44,9 +44,9 @@ def save(path: Path, basis: Basis) -> None:
         "columns": np.array(basis.columns, np.int32),
         "provenance": np.array(basis.provenance),
     }
-    if basis.training is not None:
-        fixed = np.round(basis.training / TRAINING_STEP).astype(np.int32)
-        arrays["training"] = fixed
+    for name, known in (("training", basis.training), ("others", basis.others)):
+        if known is not None:
+            arrays[name] = np.round(known / TRAINING_STEP).astype(np.int32)
     with atomic_path(path) as partial, open(partial, "wb") as file:
         np.savez_compressed(file, **arrays)
 
@@ -73,6 +73,7 @@ def load(path: Path) -> Basis:
                 columns=int(data["columns"]),
                 provenance=str(data["provenance"]),
                 training=data["training"] * TRAINING_STEP if "training" in data else None,
+                others=data["others"] * TRAINING_STEP if "others" in data else None,
             )
     except UNREADABLE_NPZ as error:
         raise InputError(f"not a Patina basis ({error})", file=path) from error
@@ -81,6 +82,7 @@ def load(path: Path) -> Basis:
         or basis.log_reference.shape != grid.shape
         or basis.components.shape[1:] != grid.shape
         or (basis.training is not None and basis.training.shape != (basis.columns, basis.count))
+        or (basis.others is not None and basis.others.shape[1:] != (basis.count,))
     ):
         raise InputError("not a Patina basis (the arrays do not fit its grid)", file=path)
     return basis

@@ -13,6 +13,7 @@ from ..angles import Angles
 from . import components, mapping
 from .basis import Basis, Progress
 from .grid import AngleGrid
+from .residual_components import ComponentWeights, component_weights
 
 BLOCK = 1 << 16  # directions evaluated at a time
 # measured on the NBRDF set (run.py bench basis): finer grids gain less than a thousandth
@@ -38,32 +39,49 @@ class Observations(Protocol):
         ...
 
 
+class MoreMaterials(Protocol):
+    """Measured materials that are not in the database of the basis, three columns each."""
+
+    @property
+    def columns(self) -> int:
+        """Number of columns."""
+        ...
+
+    def at(self, angles: Angles) -> NDArray[np.float32]:
+        """ρ (columns, n) in 1/sr."""
+        ...
+
+
 def train(
     observations: Observations,
     provenance: str,
     count: int = DEFAULT_COUNT,
     grid: AngleGrid = DEFAULT_GRID,
     progress: Progress = lambda stage, fraction: None,
+    others: MoreMaterials | None = None,
 ) -> Basis:
-    """Basis of the first ``count`` components, stored on ``grid``. Works in blocks, so memory does
-    not grow with the number of cells."""
-    directions, explained = principal(observations, count, progress)
+    """Basis of ``count`` components, stored on ``grid``. others: measured materials that are not in
+    the database, for the prior (residual_components.py). Works in blocks, so memory does not grow
+    with the number of cells."""
+    found = principal(observations, count, progress, others)
     nodes = Angles(*(a.ravel() for a in grid.nodes()))
-    stacked = np.empty((2 + directions.shape[1], grid.size), np.float32)
+    stacked = np.empty((2 + found.weights.shape[1], grid.size), np.float32)
     for start in range(0, grid.size, BLOCK):
         progress("nodes", start / grid.size)
         part = Angles(*(a[start : start + BLOCK] for a in nodes))
-        stacked[:, start : start + BLOCK] = exact_rows(observations, directions, part)
+        stacked[:, start : start + BLOCK] = exact_rows(observations, found.weights, part, others)
     stacked = fill_unmeasured(stacked.reshape(-1, *grid.shape))
+    n = observations.columns
     return Basis(
         grid=grid,
         mean=stacked[0],
         log_reference=stacked[1],
         components=stacked[2:],
-        explained=explained,
-        columns=observations.columns,
+        explained=found.explained,
+        columns=n,
         provenance=provenance,
-        training=directions,
+        training=found.coefficients[:n],
+        others=None if others is None else found.coefficients[n:],
     )
 
 
@@ -71,40 +89,52 @@ def principal(
     observations: Observations,
     count: int,
     progress: Progress = lambda stage, fraction: None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(W (columns, count), explained variance fractions) of equations (1) and (2). Row i of W is
-    also the coefficients of training column i."""
+    others: MoreMaterials | None = None,
+) -> ComponentWeights:
+    """The components of equations (1) and (2), as weighted sums of the columns."""
+    n = observations.columns
 
     def centred_blocks() -> Iterator[NDArray[np.float32]]:
         for angles, rho, fraction in observations.cell_blocks():
             progress("principal components", fraction)
-            logs, mean, _ = _mapped(rho, angles)
+            logs, mean, _ = _mapped(_with(others, rho, angles), angles, n)
             yield logs - mean
 
-    gram = components.gram_matrix(centred_blocks(), observations.columns)
-    return components.principal_directions(gram, count)
+    gram = components.gram_matrix(centred_blocks(), n + (others.columns if others else 0))
+    return component_weights(gram, n, count)
 
 
 def exact_rows(
-    observations: Observations, directions: NDArray[np.float64], angles: Angles
+    observations: Observations,
+    weights: NDArray[np.float64],
+    angles: Angles,
+    others: MoreMaterials | None = None,
 ) -> NDArray[np.float32]:
     """(2 + k, n): µ, ln(ref + ε) and the scaled components at directions (n,), directly from the
-    observations; µ is NaN where there is no measurement."""
+    observations; µ is NaN where there is no measurement. weights: (columns, k)."""
     rho = observations.at(angles)
-    logs, mean, log_reference = _mapped(rho, angles)
-    scaled = directions.T.astype(np.float32) @ (logs - mean)
+    logs, mean, log_reference = _mapped(_with(others, rho, angles), angles, observations.columns)
+    scaled = weights.T.astype(np.float32) @ (logs - mean)
     mean[rho[0] < 0] = np.nan
     return np.concatenate([mean[None], log_reference[None], scaled])
 
 
+def _with(
+    others: MoreMaterials | None, rho: NDArray[np.float32], angles: Angles
+) -> NDArray[np.float32]:
+    """ρ of the observations, then that of the other materials."""
+    return rho if others is None else np.concatenate([rho, others.at(angles)])
+
+
 def _mapped(
-    rho: NDArray[np.float32], angles: Angles
+    rho: NDArray[np.float32], angles: Angles, own: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """(mapped observations (columns, n), their mean (n,), ln(ref + ε) (n,))."""
+    """(mapped observations (columns, n), their mean (n,), ln(ref + ε) (n,)); mean and reference
+    are those of the first ``own`` columns."""
     weighted = np.maximum(rho, 0) * mapping.cos_map(angles).astype(np.float32)
-    log_reference = np.log(np.median(weighted, axis=0) + mapping.EPSILON)
+    log_reference = np.log(np.median(weighted[:own], axis=0) + mapping.EPSILON)
     logs = np.log(weighted + mapping.EPSILON) - log_reference
-    return logs, logs.mean(axis=0), log_reference
+    return logs, logs[:own].mean(axis=0), log_reference
 
 
 def fill_unmeasured(stacked: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -18,9 +18,10 @@ from ..angles import Angles
 from ..errors import UNREADABLE_NPZ, InputError, PatinaError
 from ..files import atomic_path
 from ..npz_file import open_npz
-from . import components, mapping
+from . import mapping
 from .basis import Basis, Progress
 from .grid import AngleGrid
+from .residual_components import centred, component_weights
 from .training import BLOCK, DEFAULT_COUNT, DEFAULT_GRID, Observations, fill_unmeasured
 
 FORMAT = 1
@@ -87,32 +88,39 @@ class TrainingSet:
         filled = fill_unmeasured(at_nodes.reshape(-1, *grid.shape)).reshape(at_nodes.shape)
         return TrainingSet(tuple(materials), grid, filled, products, provenance)
 
-    def basis(self, without: Sequence[str] = (), count: int = DEFAULT_COUNT) -> TrainedBasis:
+    def basis(
+        self,
+        without: Sequence[str] = (),
+        count: int = DEFAULT_COUNT,
+        others: Sequence[str] = (),
+    ) -> TrainedBasis:
         """The basis of all materials except those in ``without`` (all three channels of each),
-        equations (1) and (2) of Ono et al. 2019.
+        equations (1) and (2) of Ono et al. 2019. others: materials that are not in the database,
+        for the prior only (residual_components.py).
 
         Raises PatinaError for an unknown name, or too few columns for ``count`` components.
         """
-        unknown = sorted(set(without) - set(self.materials))
+        unknown = sorted({*without, *others} - set(self.materials))
         if unknown:
             raise PatinaError(f"unknown training material {unknown[0]!r}")
-        kept = [m for m, name in enumerate(self.materials) if name not in set(without)]
-        columns = np.array([3 * m + c for m in kept for c in range(3)], np.intp)
+        kept = [name for name in self.materials if name not in {*without, *others}]
+        columns = self._columns(kept)
         n = len(columns)
         if n <= count:
             raise PatinaError(f"{n} training columns; expected more than the {count} components")
-        gram = self.products[np.ix_(columns, columns)]
-        gram = gram - gram.mean(axis=0) - gram.mean(axis=1)[:, None] + gram.mean()
-        directions, explained = components.principal_directions(gram, count)
-        logs = self.logs if len(kept) == len(self.materials) else self.logs[columns]
-        centre = logs.mean(axis=0, dtype=np.float64).astype(np.float32)
+        columns = np.concatenate([columns, self._columns(others)])
+        gram = centred(self.products[np.ix_(columns, columns)], n)
+        found = component_weights(gram, n, count)
+        everything = len(columns) == len(self.logs) and not others
+        logs = self.logs if everything else self.logs[columns]
+        centre = logs[:n].mean(axis=0, dtype=np.float64).astype(np.float32)
         log_reference = np.empty(self.grid.size, np.float32)
         scaled = np.empty((count, self.grid.size), np.float32)
-        w = directions.T.astype(np.float32)
+        w = found.weights.T.astype(np.float32)
         for start in range(0, self.grid.size, BLOCK):
             part = slice(start, start + BLOCK)
             # the mapping's reference: ln(median(ρ·cosMap) + ε)
-            log_reference[part] = np.log(np.median(np.exp(logs[:, part]), axis=0))
+            log_reference[part] = np.log(np.median(np.exp(logs[:n, part]), axis=0))
             scaled[:, part] = w @ (logs[:, part] - centre[part])
         note = f" Without {', '.join(sorted(without))}." if without else ""
         return TrainedBasis(
@@ -120,12 +128,18 @@ class TrainingSet:
             mean=(centre - log_reference).reshape(self.grid.shape),
             log_reference=log_reference.reshape(self.grid.shape),
             components=scaled.reshape(count, *self.grid.shape),
-            explained=explained,
+            explained=found.explained,
             columns=n,
             provenance=self.provenance + note,
-            training=directions,
-            materials=tuple(self.materials[m] for m in kept),
+            training=found.coefficients[:n],
+            others=found.coefficients[n:] if others else None,
+            materials=tuple(kept),
         )
+
+    def _columns(self, names: Sequence[str]) -> NDArray[np.intp]:
+        """The columns of these materials, three each."""
+        place = {name: m for m, name in enumerate(self.materials)}
+        return np.array([3 * place[name] + c for name in names for c in range(3)], np.intp)
 
     def save(self, path: Path) -> None:
         """Write the set (about 140 MB for MERL's 300 columns), atomically. Raises OSError."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from patina.core.angles import Angles, cosines, merl_grid
-from patina.core.basis import AngleGrid
+from patina.core.basis import AngleGrid, residual_components
 from patina.core.basis.training import train
 from patina.core.basis.training_set import TrainedBasis, TrainingSet
 from patina.core.errors import InputError, PatinaError
@@ -66,6 +66,39 @@ def test_basis_equals_one_trained_without_the_materials(
     np.testing.assert_allclose(found.explained, expected.explained, atol=1e-6)
     scale = np.abs(expected.components).max()
     np.testing.assert_allclose(found.components, expected.components, atol=2e-3 * scale)
+
+
+def test_other_materials_change_only_the_last_components(
+    full_set: TrainingSet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With two materials outside the database, mean and first components are those of the database
+    alone, and all components together reproduce every material. Training in one go gives the same
+    basis."""
+    monkeypatch.setattr(residual_components, "PRINCIPAL_COUNT", 3)
+    others = ("satin", "chalk")
+    inside = [i for i, name in enumerate(NAMES) if name not in others]
+    outside = [NAMES.index(name) for name in others]
+    alone, found = full_set.basis(others, 3), full_set.basis((), 8, others)
+    assert found.columns == alone.columns and found.materials == alone.materials
+    np.testing.assert_allclose(found.mean, alone.mean, atol=1e-6)
+    np.testing.assert_allclose(found.components[:3], alone.components, atol=1e-5)
+    at_once = train(AnalyticLobes(inside), "analytic lobes", 8, GRID, others=AnalyticLobes(outside))
+    nodes = Angles(*(a.ravel() for a in GRID.nodes()))
+    cos_i, cos_o = cosines(*nodes)
+    rho = AnalyticLobes([*inside, *outside]).at(nodes)
+    truth = np.log(rho * np.clip(cos_i * cos_o, 0.01, 1) + 1e-3).T
+    for basis in (found, at_once):
+        assert basis.training is not None and basis.others is not None
+        known = np.concatenate([basis.training, basis.others])
+        assert basis.others.shape == (6, 8)
+        assert np.sqrt(np.mean(known[:, 3:] ** 2, axis=0)) == pytest.approx(basis.columns**-0.5)
+        centre, rows = basis.rows(nodes)
+        spread = np.std(truth)
+        assert np.std(centre[:, None] + rows @ known.T - truth) < 0.02 * spread
+        first = rows[:, :3] @ known[:, :3].T
+        assert np.std(centre[:, None] + first - truth) > 0.05 * spread, "they are outside"
+    scale = np.abs(at_once.components).max()
+    np.testing.assert_allclose(found.components, at_once.components, atol=5e-3 * scale)
 
 
 def test_training_coefficients_reproduce_the_columns(full_set: TrainingSet) -> None:

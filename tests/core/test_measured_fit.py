@@ -19,13 +19,9 @@ from patina.core.fit.measured.lobes import Lobes, fit_lobes
 from patina.core.fit.measured.normal_quadrature import quadrature_angles, rings
 from patina.core.fit.measured.normals import refine_normals, with_normals
 from patina.core.fit.measured.patches import Patches
-from patina.core.fit.measured.power_likelihood import (
-    MAX_MEAN_SQUARE,
-    MIN_TEMPERATURE,
-    normalised_mean_square,
-    solve_power_likelihood,
-)
-from patina.core.fit.measured.prior import ChannelPrior
+from patina.core.fit.measured.posterior import solve
+from patina.core.fit.measured.prior import CoefficientPrior
+from patina.core.fit.measured.prior_scale import MIN_SCALE, solve_with_scale
 from patina.core.fit.measured.shrinkage import SHRINKAGE, shrinkage_step
 from patina.core.samples import SampleTable
 from tests import make_capture as made
@@ -88,15 +84,33 @@ def test_model_subset_predicts_like_full_model(table: SampleTable) -> None:
     assert np.allclose(part.jacobian[1], whole.jacobian[1][some], rtol=1e-4, atol=1e-5)
 
 
-def test_prior_precision_is_inverse_of_its_covariance() -> None:
-    rng = np.random.default_rng(3)
-    shared, own = rng.random(4), 0.1 + rng.random(4)
-    prior = ChannelPrior(shared, own)
-    covariance = np.zeros((12, 12))
-    for i in range(4):
-        at = [i, 4 + i, 8 + i]
-        covariance[np.ix_(at, at)] = shared[i] + own[i] * np.eye(3)
-    assert np.allclose(prior.precision() @ covariance, np.eye(12))
+def test_prior_has_mean_and_covariance_of_all_measured_materials() -> None:
+    """Materials drawn from the prior are spread as the measured ones are; those of the basis are as
+    likely as it says."""
+    basis = default_basis()
+    assert basis.training is not None and basis.others is not None
+    known = np.concatenate([basis.training, basis.others])
+    prior = CoefficientPrior.of(basis, basis.count)
+    covariance = np.linalg.inv(prior.precision)
+    direction = np.random.default_rng(3).normal(size=basis.count)
+    along = known @ direction
+    assert prior.mean @ direction == pytest.approx(along.mean(), abs=1e-9)
+    assert direction @ covariance @ direction == pytest.approx(along.var(), rel=0.1)
+    whole = prior.full_precision()
+    k = basis.count
+    assert np.allclose(whole[k : 2 * k, k : 2 * k], prior.precision)
+    assert not whole[:k, k:].any()
+    assert np.allclose(np.linalg.solve(whole, prior.rhs()), np.tile(prior.mean, 3), atol=1e-9)
+    each = [prior.mean_square(known[i : i + 3]) for i in range(0, len(known), 3)]
+    assert np.mean(each) == pytest.approx(1.0, abs=0.1)
+
+
+def test_prior_of_a_database_alone_is_that_of_its_components() -> None:
+    """Without other materials, coefficients are independent with variance 1/columns."""
+    basis = replace(default_basis(), others=None)
+    prior = CoefficientPrior.of(basis, 12)
+    assert np.allclose(prior.precision, basis.columns * np.eye(12))
+    assert not prior.mean.any()
 
 
 def test_grazing_prior_continues_change_of_lobes() -> None:
@@ -110,8 +124,8 @@ def test_grazing_prior_continues_change_of_lobes() -> None:
     as_lobes = basis.project(lobes.evaluate(grid), grid, k, 0.3)
     edge = np.radians(60.0)
     grazing = GrazingPrior.of(lobes, basis, as_lobes, edge)
-    prior = ChannelPrior.of(basis, k, coupled=False).with_grazing_prior(grazing, 0.05)
-    c = np.linalg.solve(prior.precision(), prior.rhs()).reshape(3, k)
+    prior = CoefficientPrior.of(basis, k).with_grazing_prior(grazing, 0.05)
+    c = np.linalg.solve(prior.full_precision(), prior.rhs()).reshape(3, k)
     angles = directions(edge)
     at_edge = Angles(angles.theta_h, np.full_like(angles.theta_d, edge), angles.phi_d)
 
@@ -227,23 +241,29 @@ def test_log_table_matches_basis(table: SampleTable) -> None:
     )
 
 
-def test_cells_of_unlikely_material_get_less_weight(table: SampleTable) -> None:
-    """A lobe that no measured material has: the coefficients stay within the range of the measured
-    ones.
-    """
+def test_scale_of_prior_tells_unlikely_material(table: SampleTable) -> None:
+    """A lobe that no measured material has: the prior is widened, and the fit follows the samples;
+    with the prior as it is, it does not reach them. A likely material leaves it as it is."""
     basis = default_basis()
-    prior = ChannelPrior.of(basis, basis.count, coupled=False)
+    prior = CoefficientPrior.of(basis, basis.count)
     likely = made_brdf(basis).evaluate(table.angles)
     odd = likely * (1 + 20 * np.exp(-np.square((table.theta_h - 0.35) / 0.05))[:, None])
-    sizes, counts = [], []
+    scales, off = [], []
     for rho in (likely, odd):
         light = rho * table.irradiance * table.cos_i[:, None]
         cells = gather(replace(table, radiance=light.astype(np.float32)), 0.0)
-        found, temperature = solve_power_likelihood(CellModel.of(cells, basis), prior, 0.15)
-        sizes.append(normalised_mean_square(found.coefficients, prior))
-        counts.append(temperature)
-    assert counts[0] == MIN_TEMPERATURE < counts[1]
-    assert sizes[1] < 2 * MAX_MEAN_SQUARE
+        model = CellModel.of(cells, basis)
+        found, scale = solve_with_scale(model, prior, 0.15)
+        plain = solve(model, prior, 0.15, leave_out=False)
+        scales.append(scale)
+        off.append(
+            [
+                float(np.std(np.log(model.predict(c, False).level / model.observed)))
+                for c in (found.coefficients, plain.coefficients)
+            ]
+        )
+    assert scales[0] == MIN_SCALE and scales[1] > 1.5
+    assert off[0][0] < 0.05 and off[1][0] < 0.9 * off[1][1]
 
 
 def test_shrinkage_darkens_only_uncertain_directions() -> None:

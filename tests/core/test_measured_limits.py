@@ -25,7 +25,7 @@ from patina.core.fit.measured.grazing_prior import extrapolated
 from patina.core.fit.measured.normals import refine_normals
 from patina.core.fit.measured.patches import Patches
 from patina.core.fit.measured.posterior import GAIN_DEVIATION, MAX_STEP, _residuals, solve
-from patina.core.fit.measured.prior import ChannelPrior
+from patina.core.fit.measured.prior import CoefficientPrior
 from patina.core.fit.measured_result import MeasuredResult
 from patina.core.geometry import RayScene, view_surface
 from patina.core.inputs import capture_data
@@ -120,7 +120,7 @@ def is_finite(fit: MeasuredFit) -> None:
     assert np.isfinite(kept.band.values).all() and (kept.band.values > 0).all()
     reported = [
         kept.normal_deviation,
-        fit.temperature,
+        fit.prior_scale,
         *kept.gains.values(),
         *vars(kept.band.spread()).values(),
     ]
@@ -231,16 +231,16 @@ def model_of(photos: int, cells: int, basis: Basis) -> CellModel:
 
 
 def dense_step(
-    model: CellModel, prior: ChannelPrior, start: np.ndarray
+    model: CellModel, prior: CoefficientPrior, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, dict[int, np.ndarray]]:
     """One Gauss-Newton step with dense (3k + p)² matrices of every photo: (precision, covariance,
     held_out).
     """
-    k, (photos, place) = len(prior.own), np.unique(model.cells.photo, return_inverse=True)
+    k, (photos, place) = len(prior.mean), np.unique(model.cells.photo, return_inverse=True)
     p, n = len(photos), 3 * k
     prediction = model.predict(start)
     residual, weight = _residuals(model, prediction, np.zeros(len(place)), 0.15)
-    weight = weight / (10.0 * cells_per_observation(model.cells)[:, None])
+    weight = weight / cells_per_observation(model.cells)[:, None]
     each, pulls = np.zeros((p, n + p, n + p)), np.zeros((p, n + p))
     for i in range(p):
         own = place == i
@@ -254,16 +254,14 @@ def dense_step(
             pulls[i, part] = weighted.T @ residual[own, c].astype(np.float32)
             pulls[i, n + i] += w @ residual[own, c]
     own_precision = np.zeros((n + p, n + p))
-    own_precision[:n, :n] = prior.precision()
+    own_precision[:n, :n] = prior.full_precision()
     own_precision[range(n, n + p), range(n, n + p)] = GAIN_DEVIATION**-2
     total = each.sum(axis=0) + own_precision
     state = np.concatenate([start.ravel(), np.zeros(p)])
     rhs = pulls.sum(axis=0) - own_precision @ state
     rhs[:n] += prior.rhs()
     step = np.linalg.solve(total, rhs)
-    size = np.concatenate(
-        [np.tile(np.sqrt(prior.own + prior.shared), 3), np.full(p, GAIN_DEVIATION)]
-    )
+    size = np.concatenate([np.tile(np.sqrt(prior.variance), 3), np.full(p, GAIN_DEVIATION)])
     state = state + step * min(1.0, MAX_STEP / np.abs(step / size).max())
     full = np.linalg.inv(total)[:n, :n].reshape(3, k, 3, k)
     out = {}
@@ -273,14 +271,13 @@ def dense_step(
     return total, np.stack([full[c, :, c] for c in range(3)]), out
 
 
-@pytest.mark.parametrize("coupled", [False, True])
-def test_leave_one_photo_out_agrees_with_dense_matrices(coupled: bool) -> None:
+def test_leave_one_photo_out_agrees_with_dense_matrices() -> None:
     basis = default_basis()
     model = model_of(5, 600, basis)
-    prior = ChannelPrior.of(basis, 12, coupled)
+    prior = CoefficientPrior.of(basis, 12)
     prior = prior.with_grazing_prior(extrapolated(model, np.zeros((3, 12))), 1.0)
-    start = solve(model, prior, 0.15, None, False, 30, 10.0).coefficients
-    found = solve(model, prior, 0.15, start, True, 1, 10.0)
+    start = solve(model, prior, 0.15, None, False, 30).coefficients
+    found = solve(model, prior, 0.15, start, True, 1)
     precision, covariance, without = dense_step(model, prior, start)
     assert np.allclose(found.precision.dense(), precision, rtol=1e-8, atol=1e-8)
     assert np.allclose(found.covariance(), covariance, rtol=1e-8, atol=1e-8 * covariance.max())
@@ -296,7 +293,7 @@ def test_leave_one_photo_out_approximates_refit_without_photo(photos: int) -> No
     """Photos that disagree by a tenth: one step moves most of the way to the fit to the other
     photos alone. The rest is due to the weights of cells, which the refit computes anew."""
     basis = default_basis()
-    prior = ChannelPrior.of(basis, 20, coupled=False)
+    prior = CoefficientPrior.of(basis, 20)
     remaining = []
     for seed in range(4):
         table = samples(4000, photos)
@@ -326,13 +323,13 @@ def test_arrow_solve_and_marginal_match_dense_matrix() -> None:
 def test_memory_does_not_grow_with_photo_count() -> None:
     """Dense matrices of 400 photos would take 400 × 490² numbers, 770 MB; the blocks take 10 MB."""
     basis = default_basis()
-    prior = ChannelPrior.of(basis, 30, coupled=False)
+    prior = CoefficientPrior.of(basis, 30)
     peaks = []
     for photos in (2, 400):
         model = model_of(photos, 1200, basis)
         assert len(basis.nodes)  # allocated before, and not part of the measured memory
         tracemalloc.start()
-        found = solve(model, prior, 0.15, iterations=1, temperature=10.0)
+        found = solve(model, prior, 0.15, iterations=1)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
         assert len(found.without) == len(np.unique(model.cells.photo))

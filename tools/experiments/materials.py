@@ -72,32 +72,56 @@ def materials(names: Sequence[str] | None = None) -> list[Material]:
     ]
 
 
+FOLDS = 5
+"""The validation materials are divided by name into so many parts: the prior for a material of one
+part is learnt from MERL and the other parts."""
+
+
 def training_set() -> TrainingSet:
-    """Return the columns of the 100 MERL encodings, computed once (20 s) and then cached."""
+    """Return the columns of all 125 encodings, computed once (30 s) and then cached."""
     return _training_set()
 
 
-def basis_for(material: Material, count: int = 40, in_basis: bool = False) -> TrainedBasis:
-    """Return the basis without the material (of all 100 materials for a validation material).
+def fold_of(name: str) -> int:
+    """Return the part of the validation materials that a material is in. Materials of one kind,
+    such as three finishes of one flaked paint, are in the same part."""
+    kinds = sorted({_kind(each) for each in _encodings("nbrdf_validation.npz")})
+    return kinds.index(_kind(name)) % FOLDS
 
-    in_basis: return the basis of all 100 materials, which includes the paper's six.
+
+def basis_for(material: Material, count: int = 40, in_basis: bool = False) -> TrainedBasis:
+    """Return the basis without the material. Its prior is learnt from MERL and the validation
+    materials, without the material and all that are in the same part (``fold_of``).
+
+    in_basis: return the basis of all 100 materials of MERL, which includes the paper's six.
     """
-    without = (material.name,) if material.trained and not in_basis else ()
-    return _basis(without, count)
+    validation = tuple(_encodings("nbrdf_validation.npz"))
+    if not material.trained:
+        part = fold_of(material.name)
+        return _basis(tuple(n for n in validation if fold_of(n) == part), count)
+    return _basis(() if in_basis else (material.name,), count)
+
+
+def _kind(name: str) -> str:
+    """The first word of a name: the series of a manufacturer, or the kind of material."""
+    return name.split("_")[0]
 
 
 @lru_cache(maxsize=1)
 def _training_set() -> TrainingSet:
-    file = data_folder() / "brdf" / "nbrdf_merl.npz"
-    key = hashlib.sha256(file.read_bytes() + bytes([FORMAT])).hexdigest()[:16]
+    files = [data_folder() / "brdf" / f"nbrdf_{part}.npz" for part in ("merl", "validation")]
+    content = b"".join(file.read_bytes() for file in files)
+    key = hashlib.sha256(content + bytes([FORMAT])).hexdigest()[:16]
     stored = user_cache() / f"training_set_{key}.npz"
     if stored.is_file():
         try:
             return TrainingSet.load(stored)
         except InputError:
             stored.unlink()  # a damaged cache file is computed again
-    say("computing the training columns (20 s, once)")
-    names, weights = nbrdf.load(file)
+    say("computing the training columns (30 s, once)")
+    each = [nbrdf.load(file) for file in files]
+    names = [name for part, _ in each for name in part]
+    weights = np.concatenate([values for _, values in each])
     found = TrainingSet.compute(NeuralObservations(weights), names, PROVENANCE)
     stored.parent.mkdir(parents=True, exist_ok=True)
     found.save(stored)
@@ -106,7 +130,8 @@ def _training_set() -> TrainingSet:
 
 @lru_cache(maxsize=3)
 def _basis(without: tuple[str, ...], count: int) -> TrainedBasis:
-    return training_set().basis(without, count)
+    others = [name for name in _encodings("nbrdf_validation.npz") if name not in without]
+    return training_set().basis(without, count, others)
 
 
 @lru_cache(maxsize=2)

@@ -22,16 +22,17 @@ from .grazing_prior import extrapolated
 from .normals import TOLERANCE, refine_normals
 from .patches import Patches
 from .posterior import solve
-from .power_likelihood import MIN_TEMPERATURE, solve_power_likelihood
-from .prior import ChannelPrior
+from .prior import CoefficientPrior
+from .prior_scale import solve_again, solve_with_scale
 from .shrinkage import shrinkage_step
 
 MIN_SAMPLES = 50
 CONVERGED = 0.02  # RMS change of ln(ρ·cosMap + ε) over the grid below which refinement ends
 FIRST_SOLVE, USUAL_ROUNDS = 0.25, 4  # for progress: time before the rounds, number of rounds
 CHUNK = 1 << 15  # directions
+MAX_TOLERANCE_SCALE = 4.0  # scale of the prior up to which it makes normals more cautious
 # factor on the posterior's standard deviation: no material is a draw from the training distribution
-BAND_FACTOR = 1.5
+BAND_FACTOR = 2.0
 MIN_BAND = 0.03  # standard deviation of ln ρ that is always added
 
 
@@ -40,15 +41,13 @@ class MeasuredSettings:
     """components: how many of the basis, None for all. floor: relative standard deviation of the
     basis' error far from black (core/noise/basis_error.py). normal_deviation: degrees along each
     tangent, initial standard deviation of the scan's normals. rounds: largest number of normal
-    refinements, 0 for none. coupled: share between the channels what the channels of measured
-    materials share. trust: log-relative standard deviation of the grazing prior (grazing_prior.py)
-    in directions without samples; infinite switches it off."""
+    refinements, 0 for none. trust: log-relative standard deviation of the grazing prior
+    (grazing_prior.py) in directions without samples; infinite switches it off."""
 
     components: int | None = None
     floor: float = BASIS_ERROR
     normal_deviation: float = 1.0
     rounds: int = 8
-    coupled: bool = False
     trust: float = 1.5
 
 
@@ -58,8 +57,8 @@ class MeasuredFit:
     were used. normal_deviation: degrees along each tangent, estimated standard deviation of the
     scan's normals. gains: photo → its gain. extrapolation: a sentence that says what the BRDF rests
     on in directions without samples. without: photo → the BRDF without that photo. covariance: (3,
-    k, k) posterior covariance of each channel's coefficients. temperature: the likelihood was
-    raised to the power 1/temperature (power_likelihood.py)."""
+    k, k) posterior covariance of each channel's coefficients. prior_scale: how far the
+    material is from the measured ones (prior_scale.py)."""
 
     brdf: PrincipalBRDF
     samples: int
@@ -68,7 +67,7 @@ class MeasuredFit:
     extrapolation: str
     without: dict[int, PrincipalBRDF]
     covariance: NDArray[np.float64]
-    temperature: float
+    prior_scale: float
     warnings: tuple[str, ...] = ()
 
     def band(self, angles: Angles) -> NDArray[np.float64]:
@@ -107,35 +106,33 @@ def measured_steps(
             "add photos or light, or enlarge the masks"
         )
     k = min(s.components or basis.count, basis.count)
-    prior = ChannelPrior.of(basis, k, s.coupled)
+    prior = CoefficientPrior.of(basis, k)
     deviation = float(np.radians(s.normal_deviation))
     yield 0.0
     model = CellModel.of(gather(table, deviation), basis)
-    found, temperature = solve_power_likelihood(model, prior, s.floor)
+    found, scale = solve_with_scale(model, prior, s.floor)
     patches = Patches.of_points(table.point) if s.rounds else None
     for done in range(s.rounds if patches is not None else 0):
         yield _fraction(done)
         brdf = LogTable.of(basis, found.coefficients)
         assert patches is not None
         # a BRDF unlike the measured materials is uncertain: normals must not absorb its errors
-        tolerance = TOLERANCE * float(np.sqrt(temperature / MIN_TEMPERATURE))
+        tolerance = TOLERANCE * float(np.sqrt(min(scale, MAX_TOLERANCE_SCALE)))
         normals = refine_normals(table, patches, brdf, deviation, tolerance)
         deviation = normals.deviation
         yield _fraction(done + 0.5)
         model = CellModel.of(gather(normals.table, normals.error), basis)
         before = brdf.values
-        temperature = max(MIN_TEMPERATURE, temperature / 2)
-        found, temperature = solve_power_likelihood(
-            model, prior, s.floor, found.coefficients, temperature
-        )
+        found, scale = solve_again(model, prior, s.floor, found, scale)
         change = LogTable.of(basis, found.coefficients).values - before
         if np.sqrt(np.mean(change**2)) < CONVERGED:
             break
     yield 0.95
+    prior = prior.scaled(scale)
     if np.isfinite(s.trust):
         prior = prior.with_grazing_prior(extrapolated(model, found.coefficients), s.trust)
     yield 0.97
-    found = solve(model, prior, s.floor, found.coefficients, temperature=temperature)
+    found = solve(model, prior, s.floor, found.coefficients)
     covariance = found.covariance()
     shrinkage = shrinkage_step(basis, covariance)
     return MeasuredFit(
@@ -146,7 +143,7 @@ def measured_steps(
         extrapolation=_anchoring_text(s.trust),
         without={p: PrincipalBRDF(basis, c + shrinkage) for p, c in found.without.items()},
         covariance=covariance,
-        temperature=temperature,
+        prior_scale=scale,
     )
 
 

@@ -21,7 +21,7 @@ from ...statistics.student_t import weights_of_squares
 from .cell_weights import cells_per_observation
 from .equations import Arrow, PhotoEquations, add_blocks
 from .forward import CellModel, Prediction
-from .prior import ChannelPrior
+from .prior import CoefficientPrior
 
 ITERATIONS = 12
 SAMPLES_PER_NORMAL = 30  # so many neighbouring samples share one error of the normal
@@ -50,36 +50,32 @@ class Posterior:
 
 def solve(
     model: CellModel,
-    prior: ChannelPrior,
+    prior: CoefficientPrior,
     floor: float,
     start: NDArray[np.float64] | None = None,
     leave_out: bool = True,
     iterations: int = ITERATIONS,
-    temperature: float = 1.0,
 ) -> Posterior:
     """The posterior of a model's coefficients, by Gauss–Newton from ``start`` (3, k), or from 0.
 
     floor: relative standard deviation of the basis' error far from black. leave_out: compute the
-    coefficients without each photo too. temperature: the likelihood is raised to the power
-    1/temperature (power_likelihood.py), after the cells' weights by region (cell_weights.py).
+    coefficients without each photo too. Cells are weighted by region (cell_weights.py).
     """
-    k = len(prior.own)
+    k = len(prior.mean)
     crowd = cells_per_observation(model.cells)[:, None]
     photos, place = np.unique(model.cells.photo, return_inverse=True)
     p = len(photos)
-    prior_precision, prior_pull = prior.precision(), prior.rhs()
+    prior_precision, prior_pull = prior.full_precision(), prior.rhs()
     state = np.zeros(3 * k + p)
     if start is not None:
         state[: 3 * k] = start.ravel()
-    size = np.concatenate(
-        [np.tile(np.sqrt(prior.own + prior.shared), 3), np.full(p, GAIN_DEVIATION)]
-    )
+    size = np.concatenate([np.tile(np.sqrt(prior.variance), 3), np.full(p, GAIN_DEVIATION)])
     order = np.argsort(place, kind="stable")
     cells = np.split(order, np.cumsum(np.bincount(place, minlength=p))[:-1])
     for _ in range(iterations):
         prediction = model.predict(state[: 3 * k].reshape(3, k))
         residual, weight = _residuals(model, prediction, state[3 * k :][place], floor)
-        weight = weight / (temperature * crowd)
+        weight = weight / crowd
         each = (_equations(prediction, residual, weight, own) for own in cells)
         total, rhs = _summed(each, prior_precision, p)
         rhs[: 3 * k] += prior_pull - prior_precision @ state[: 3 * k]

@@ -1,9 +1,10 @@
-"""Gaussian prior of the coefficients, from the measured materials of the training set.
+"""Gaussian prior of the coefficients, from all measured materials that the basis knows.
 
 Coefficients of training columns have variance 1/columns and are uncorrelated between components: a
-Gaussian process over angle space whose covariance is that of the measured materials. The channels
-of one material agree in most of their shape: each component's variance is split into a part that
-the three channels share and a part of each channel's own.
+Gaussian process over angle space whose covariance is that of the database. Where the basis knows
+other measured materials too (Basis.others), mean and covariance are those of all of them together:
+the components stay those of the database, but what is plausible is learnt from everything that was
+measured. The channels are independent.
 """
 
 from __future__ import annotations
@@ -16,53 +17,60 @@ from numpy.typing import NDArray
 from ...basis import Basis
 from .grazing_prior import GrazingPrior
 
-MIN_OWN_SHARE = 0.02  # of the variance is each channel's own: no component is exactly grey
+# of each variance is added to it: a covariance of a few hundred columns underestimates the variance
+# of sums of components that these columns happen not to have
+ADDED_VARIANCE = 0.03
 
 
 @dataclass(frozen=True)
-class ChannelPrior:
-    """shared, own: (k,) variance that the channels share, and that of each channel alone. grazing:
-    pseudo-observations at grazing angles (grazing_prior.py), with log-relative standard deviation
-    ``trust``."""
+class CoefficientPrior:
+    """mean: (k,) of each channel's coefficients. precision: (k, k) inverse of their covariance.
+    variance: (k,) of each coefficient. grazing: pseudo-observations at grazing angles
+    (grazing_prior.py), with log-relative standard deviation ``trust``."""
 
-    shared: NDArray[np.float64]
-    own: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    precision: NDArray[np.float64]
+    variance: NDArray[np.float64]
     grazing: GrazingPrior | None = None
     trust: float = np.inf
 
-    def with_grazing_prior(self, grazing: GrazingPrior | None, trust: float) -> ChannelPrior:
+    def with_grazing_prior(self, grazing: GrazingPrior | None, trust: float) -> CoefficientPrior:
         """The same prior with pseudo-observations; none where trust is infinite."""
         return replace(self, grazing=grazing if np.isfinite(trust) else None, trust=trust)
 
     @classmethod
-    def of(cls, basis: Basis, k: int, coupled: bool = True) -> ChannelPrior:
-        """Prior of the first k coefficients. The split between the channels is learned from the
-        training coefficients where the basis has them; otherwise, and with ``coupled`` False, the
-        channels are independent."""
-        total = np.full(k, basis.coefficient_variance)
-        if not coupled or basis.training is None:
-            return cls(np.zeros(k), total)
-        material = basis.training[:, :k].reshape(-1, 3, k)
-        own = material.var(axis=1, ddof=1).mean(axis=0) / basis.training[:, :k].var(axis=0)
-        own = np.clip(own, MIN_OWN_SHARE, 1.0)
-        return cls((1 - own) * total, own * total)
+    def of(cls, basis: Basis, k: int) -> CoefficientPrior:
+        """Prior of the first k coefficients."""
+        if basis.training is None or basis.others is None:
+            total = np.full(k, basis.coefficient_variance)
+            return cls(np.zeros(k), np.diag(1 / total), total)
+        known = np.concatenate([basis.training[:, :k], basis.others[:, :k]])
+        covariance = np.cov(known.T, bias=True)
+        covariance += ADDED_VARIANCE * np.diag(np.diag(covariance))
+        return cls(known.mean(axis=0), np.linalg.inv(covariance), np.diag(covariance).copy())
 
-    def precision(self) -> NDArray[np.float64]:
+    def scaled(self, scale: float) -> CoefficientPrior:
+        """The same prior with its covariance multiplied by ``scale``."""
+        return replace(self, precision=self.precision / scale, variance=self.variance * scale)
+
+    def full_precision(self) -> NDArray[np.float64]:
         """(3k, 3k) precision, channel after channel."""
-        k = len(self.own)
-        # inverse of own·1 + shared·11ᵀ, component by component (Sherman–Morrison)
-        off = -self.shared / (self.own * (self.own + 3 * self.shared))
+        k = len(self.mean)
+        own = self.precision
+        if self.grazing is not None:
+            own = own + self.grazing.gram / self.trust**2
         out = np.zeros((3, k, 3, k))
-        diagonal = np.arange(k)
-        for a in range(3):
-            for b in range(3):
-                out[a, diagonal, b, diagonal] = off + (1 / self.own if a == b else 0.0)
-            if self.grazing is not None:
-                out[a, :, a] += self.grazing.gram / self.trust**2
+        for channel in range(3):
+            out[channel, :, channel] = own
         return out.reshape(3 * k, 3 * k)
 
     def rhs(self) -> NDArray[np.float64]:
-        """(3k,) precision · mean."""
-        if self.grazing is None:
-            return np.zeros(3 * len(self.own))
-        return self.grazing.rhs.ravel() / self.trust**2
+        """(3k,) full precision · mean."""
+        pull = np.tile(self.precision @ self.mean, 3)
+        return pull if self.grazing is None else pull + self.grazing.rhs.ravel() / self.trust**2
+
+    def mean_square(self, coefficients: NDArray[np.floating]) -> float:
+        """Mean square of coefficients (3, k) in units of the covariance: 1 on average for a
+        material like the measured ones of which all coefficients were known."""
+        off = np.asarray(coefficients) - self.mean
+        return float(np.mean(np.sum((off @ self.precision) * off, axis=1)) / len(self.mean))
