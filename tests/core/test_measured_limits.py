@@ -24,7 +24,13 @@ from patina.core.fit.measured.forward import CellModel
 from patina.core.fit.measured.grazing_prior import extrapolated
 from patina.core.fit.measured.normals import refine_normals
 from patina.core.fit.measured.patches import Patches
-from patina.core.fit.measured.posterior import GAIN_DEVIATION, MAX_STEP, _residuals, solve
+from patina.core.fit.measured.posterior import (
+    GAIN_DEVIATION,
+    MAX_STEP,
+    MEAN_GAIN_DEVIATION,
+    _residuals,
+    solve,
+)
 from patina.core.fit.measured.prior import CoefficientPrior
 from patina.core.fit.measured_result import MeasuredResult
 from patina.core.geometry import RayScene, view_surface
@@ -256,6 +262,8 @@ def dense_step(
     own_precision = np.zeros((n + p, n + p))
     own_precision[:n, :n] = prior.full_precision()
     own_precision[range(n, n + p), range(n, n + p)] = GAIN_DEVIATION**-2
+    mean = np.bincount(place, model.cells.count) / model.cells.count.sum()
+    own_precision[n:, n:] += np.outer(mean, mean) / MEAN_GAIN_DEVIATION**2
     total = each.sum(axis=0) + own_precision
     state = np.concatenate([start.ravel(), np.zeros(p)])
     rhs = pulls.sum(axis=0) - own_precision @ state
@@ -313,7 +321,12 @@ def test_arrow_solve_and_marginal_match_dense_matrix() -> None:
     rng = np.random.default_rng(6)
     n, p = 7, 5
     root = rng.normal(size=(n, n))
-    arrow = Arrow(root @ root.T + 9 * np.eye(n), 0.5 * rng.normal(size=(n, p)), 4 + rng.random(p))
+    arrow = Arrow(
+        root @ root.T + 9 * np.eye(n),
+        0.5 * rng.normal(size=(n, p)),
+        4 + rng.random(p),
+        rng.normal(size=p),
+    )
     rhs = rng.normal(size=n + p)
     assert np.allclose(arrow.dense() @ arrow.solve(rhs), rhs)
     inverse = np.linalg.inv(arrow.dense())[:n, :n]

@@ -3,13 +3,15 @@ number of photos.
 
 The cells of a photo depend on the coefficients and on that photo's gain, never on another's. The
 matrix of all equations is therefore an arrow matrix: a block for the coefficients, a diagonal for
-the gains and the coupling between them. The gains are eliminated first (Schur complement).
+the gains and the coupling between them. The prior of the gains' mean adds one product of a vector
+with itself. The gains are eliminated first (Schur complement).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,24 +54,42 @@ class PhotoEquations:
 
 @dataclass(frozen=True)
 class Arrow:
-    """A symmetric positive definite arrow matrix. coefficients: (n, n) block; coupling: (n, p);
-    gains: (p,) diagonal."""
+    """A symmetric positive definite matrix: an arrow matrix, and one product of a vector of the
+    gains with itself.
+
+    coefficients: (n, n) block; coupling: (n, p); the block of the gains is diag(gains) + common ·
+    commonᵀ, both (p,).
+    """
 
     coefficients: Array
     coupling: Array
     gains: Array
+    common: Array
 
     def marginal(self) -> Array:
         """(n, n) precision of the coefficients with the gains integrated out (Schur complement)."""
-        found: Array = self.coefficients - (self.coupling / self.gains) @ self.coupling.T
-        return found
+        along, size = self._common_part
+        return self._without_common + np.outer(along, along) / size
 
     def solve(self, rhs: Array) -> Array:
         """Solution x (n + p,) of matrix · x = rhs."""
         n = len(self.coefficients)
-        own = rhs[n:] / self.gains
-        x = np.linalg.solve(self.marginal(), rhs[:n] - self.coupling @ own)
-        return np.concatenate([x, own - (self.coupling.T @ x) / self.gains])
+        x = np.linalg.solve(self.marginal(), rhs[:n] - self.coupling @ self._of_gains(rhs[n:]))
+        return np.concatenate([x, self._of_gains(rhs[n:] - self.coupling.T @ x)])
+
+    def without(self, place: int, one: PhotoEquations, prior: float) -> tuple[Array, Array]:
+        """(precision (n, n), right-hand side (n,)) of the coefficients' step from the optimum to
+        that without the photo at ``place``, with the equations ``one``: they are subtracted, and
+        the precision of its log gain is ``prior``."""
+        row, gain, own = self.coupling[:, place], self.gains[place], self.common[place]
+        along, size = self._common_part
+        rest = self._without_common + np.outer(row, row) / gain
+        add_blocks(rest, one.blocks, -1.0)
+        along = along - row * own / gain
+        size = size - own**2 / gain + own**2 / prior
+        rest += np.outer(along, along) / size
+        pull = -one.rhs.ravel().astype(np.float64)
+        return rest, pull - one.gain_rhs * own / (prior * size) * along
 
     def dense(self) -> Array:
         """(n + p, n + p) the full matrix."""
@@ -78,8 +98,27 @@ class Arrow:
         out[:n, :n] = self.coefficients
         out[:n, n:] = self.coupling
         out[n:, :n] = self.coupling.T
-        out[range(n, n + p), range(n, n + p)] = self.gains
+        out[n:, n:] = np.diag(self.gains) + np.outer(self.common, self.common)
         return out
+
+    def _of_gains(self, values: Array) -> Array:
+        """(p,) inverse of the gains' block · values (Sherman–Morrison)."""
+        own = self.common / self.gains
+        size = 1.0 + float(self.common @ own)
+        found: Array = values / self.gains - own * (float(own @ values) / size)
+        return found
+
+    @cached_property
+    def _without_common(self) -> Array:
+        """(n, n) the Schur complement for gains that are independent."""
+        found: Array = self.coefficients - (self.coupling / self.gains) @ self.coupling.T
+        return found
+
+    @cached_property
+    def _common_part(self) -> tuple[Array, float]:
+        """((n,) v, s): integrating the gains out adds v · vᵀ / s, because of ``common``."""
+        own = self.common / self.gains
+        return self.coupling @ own, 1.0 + float(self.common @ own)
 
 
 def add_blocks(matrix: Array, blocks: NDArray[np.floating], times: float = 1.0) -> None:

@@ -28,6 +28,9 @@ SAMPLES_PER_NORMAL = 30  # so many neighbouring samples share one error of the n
 MAX_STEP = 2.0  # largest change of a parameter in one iteration, in prior standard deviations
 CONVERGED = 0.01  # the same: the iteration ends where no parameter changes more
 GAIN_DEVIATION = 0.03  # prior standard deviation of the logarithm of a photo's gain
+# the same of the mean over all samples: the irradiance says how bright all photos together are.
+# Otherwise a photo that no BRDF of the basis explains moves the level of all the others.
+MEAN_GAIN_DEVIATION = 0.005
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,8 @@ def solve(
     if start is not None:
         state[: 3 * k] = start.ravel()
     size = np.concatenate([np.tile(np.sqrt(prior.variance), 3), np.full(p, GAIN_DEVIATION)])
+    mean = np.bincount(place, model.cells.count) / model.cells.count.sum()
+    common = mean / MEAN_GAIN_DEVIATION
     order = np.argsort(place, kind="stable")
     cells = np.split(order, np.cumsum(np.bincount(place, minlength=p))[:-1])
     for _ in range(iterations):
@@ -77,9 +82,9 @@ def solve(
         residual, weight = _residuals(model, prediction, state[3 * k :][place], floor)
         weight = weight / crowd
         each = (_equations(prediction, residual, weight, own) for own in cells)
-        total, rhs = _summed(each, prior_precision, p)
+        total, rhs = _summed(each, prior_precision, common)
         rhs[: 3 * k] += prior_pull - prior_precision @ state[: 3 * k]
-        rhs[3 * k :] -= state[3 * k :] / GAIN_DEVIATION**2
+        rhs[3 * k :] -= state[3 * k :] / GAIN_DEVIATION**2 + common * (common @ state[3 * k :])
         step = total.solve(rhs)
         largest_change = np.abs(step / size).max()
         state = state + step * min(1.0, MAX_STEP / max(largest_change, 1e-12))
@@ -87,10 +92,10 @@ def solve(
             break
     without = {}
     if leave_out and p > 1:
-        full_precision = total.marginal()
         for i, (photo, own) in enumerate(zip(photos.tolist(), cells, strict=True)):
             one = _equations(prediction, residual, weight, own)
-            shift = _step_without_photo(full_precision, one, total.coupling[:, i], total.gains[i])
+            precision, pull = total.without(i, one, GAIN_DEVIATION**-2)
+            shift = np.linalg.solve(precision, pull).reshape(3, k)
             without[photo] = state[: 3 * k].reshape(3, k) + shift
     return Posterior(
         coefficients=state[: 3 * k].reshape(3, k),
@@ -137,12 +142,17 @@ def _equations(
 
 
 def _summed(
-    each: Iterable[PhotoEquations], prior_precision: NDArray[np.float64], photos: int
+    each: Iterable[PhotoEquations],
+    prior_precision: NDArray[np.float64],
+    common: NDArray[np.float64],
 ) -> tuple[Arrow, NDArray[np.float64]]:
     """(precision of all cells and the prior, right-hand side (3k + p,) of the cells alone)."""
-    n = len(prior_precision)
+    n, photos = len(prior_precision), len(common)
     total = Arrow(
-        prior_precision.copy(), np.zeros((n, photos)), np.full(photos, GAIN_DEVIATION**-2)
+        prior_precision.copy(),
+        np.zeros((n, photos)),
+        np.full(photos, GAIN_DEVIATION**-2),
+        common,
     )
     rhs = np.zeros(n + photos)
     for i, one in enumerate(each):
@@ -152,20 +162,3 @@ def _summed(
         rhs[:n] += one.rhs.ravel()
         rhs[n + i] = one.gain_rhs
     return total, rhs
-
-
-def _step_without_photo(
-    full_precision: NDArray[np.float64],
-    one: PhotoEquations,
-    coupling: NDArray[np.float64],
-    gain: float,
-) -> NDArray[np.float64]:
-    """(3, k) step of the coefficients from the optimum of all photos to that without one photo: its
-    cells are subtracted, and its gain no longer depends on the coefficients.
-
-    everything: (3k, 3k) precision with the gain integrated out. coupling (3k,), gain: the row of
-    that gain in the whole precision.
-    """
-    rest = full_precision + np.outer(coupling, coupling) / gain
-    add_blocks(rest, one.blocks, -1.0)
-    return np.linalg.solve(rest, -one.rhs.ravel().astype(np.float64)).reshape(one.rhs.shape)
