@@ -27,15 +27,14 @@ def run(data: Path) -> None:
     from patina.core.angles import Angles, cosines, merl_grid
     from patina.core.basis import PrincipalBRDF, default_basis
     from patina.core.basis.build_default import NeuralObservations
-    from patina.core.basis.residual_components import PRINCIPAL_COUNT
-    from patina.core.basis.training import exact_rows, principal
+    from patina.core.basis.training import DEFAULT_COUNT, exact_rows, principal
     from patina.core.brdf import TabulatedBRDF, metrics, nbrdf
 
     print("## basis\n")
     basis = default_basis()
     observations = NeuralObservations(nbrdf.load(data / "brdf" / "nbrdf_merl.npz")[1])
     start = time.perf_counter()
-    found = principal(observations, PRINCIPAL_COUNT)
+    found = principal(observations, DEFAULT_COUNT)
     directions, explained = found.weights, found.explained
     print(f"principal components of 300 columns: {time.perf_counter() - start:.1f} s")
     total = explained.cumsum()
@@ -50,7 +49,7 @@ def run(data: Path) -> None:
         pick = rng.choice(visible, 60_000, replace=False)
         angles = Angles(*(a.ravel()[pick] for a in centres))
         exact = exact_rows(observations, directions, angles)
-        centre, rows = basis.rows(angles, PRINCIPAL_COUNT)
+        centre, rows = basis.rows(angles, DEFAULT_COUNT)
         difference = (centre[:, None] + rows @ directions.T.astype(np.float32)) - (
             (exact[0] + exact[1])[:, None] + exact[2:].T @ directions.T.astype(np.float32)
         )

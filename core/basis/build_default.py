@@ -28,8 +28,8 @@ PROVENANCE = (
     "Contains no MERL data."
 )
 OTHERS = (
-    " The last components and the further coefficients are those of %d other encodings of the same "
-    "authors: measurements of the RGL database (Dupuy, Jakob 2018) and of Nielsen et al. 2015."
+    " The last 30 components and the further coefficients are those of %d other encodings of the "
+    "same authors: measurements of the RGL database (Dupuy, Jakob 2018) and of Nielsen et al. 2015."
 )
 
 

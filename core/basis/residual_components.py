@@ -1,8 +1,8 @@
 """Components for materials that are not in the database of the basis.
 
 The principal components of MERL (components.py) span what its hundred materials do. Other measured
-materials, such as car paints, differ from all of them. The last components of a basis are therefore
-the principal components of what the first ones leave of ALL measured materials, those of MERL and
+materials, such as car paints, differ from all of them. Further components of a basis are therefore
+the principal components of what those of MERL leave of ALL measured materials, those of MERL and
 the others. The coefficients of all of them are what the prior is learnt from
 (fit/measured/prior.py).
 
@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from .components import principal_directions
 
-PRINCIPAL_COUNT = 70
-"""Components of MERL alone, where there are other materials; `run.py experiments` compares."""
+OTHERS_COUNT = 30
+"""Components in addition to those of the database, where there are other materials."""
 
 MIN_SHARE = 1e-6  # of the variance that a component explains: below it is rounding
 
@@ -40,11 +40,10 @@ class ComponentWeights:
 
 
 def component_weights(gram: NDArray[np.float64], columns: int, count: int) -> ComponentWeights:
-    """The first PRINCIPAL_COUNT of k components are those of the first ``columns`` of n columns,
-    the rest are those of what these leave of all n. Without other columns, all are of the first
-    kind.
+    """``count`` principal components of the first ``columns`` of n columns, and OTHERS_COUNT of
+    what these leave of all n, where there are others.
 
-    gram: (n, n) products of the columns, centred by the mean of the first ``columns``. count: k.
+    gram: (n, n) products of the columns, centred by the mean of the first ``columns``.
     The root mean square of the coefficients of each component is 1/√columns over the columns that
     it was computed from, as in equation (2).
     """
@@ -53,19 +52,18 @@ def component_weights(gram: NDArray[np.float64], columns: int, count: int) -> Co
     if n == columns:
         directions, explained = principal_directions(own, count)
         return ComponentWeights(directions, directions, explained)
-    directions, explained = principal_directions(own, min(count, PRINCIPAL_COUNT))
+    directions, explained = principal_directions(own, count)
     first = int(np.sum(explained[: directions.shape[1]] > MIN_SHARE))
     directions = directions[:, :first]
     weights = np.concatenate([directions, np.zeros((n - columns, first))])
     coefficients = _least_squares(gram, weights)
-    if count > first:
-        residual = np.eye(n) - weights @ coefficients.T
-        found, shares = principal_directions(residual.T @ gram @ residual, count - first)
-        rest = residual @ found[:, shares[: count - first] > MIN_SHARE]
-        each = _least_squares(gram, rest)
-        scale = np.sqrt(np.mean(each**2, axis=0) * columns)
-        weights = np.concatenate([weights, rest * scale], axis=1)
-        coefficients = np.concatenate([coefficients, each / scale], axis=1)
+    residual = np.eye(n) - weights @ coefficients.T
+    found, shares = principal_directions(residual.T @ gram @ residual, OTHERS_COUNT)
+    rest = residual @ found[:, shares[:OTHERS_COUNT] > MIN_SHARE]
+    each = _least_squares(gram, rest)
+    scale = np.sqrt(np.mean(each**2, axis=0) * columns)
+    weights = np.concatenate([weights, rest * scale], axis=1)
+    coefficients = np.concatenate([coefficients, each / scale], axis=1)
     return ComponentWeights(weights, coefficients, explained)
 
 

@@ -61,8 +61,8 @@ def train(
     others: MoreMaterials | None = None,
 ) -> Basis:
     """Basis of ``count`` components, stored on ``grid``. others: measured materials that are not in
-    the database, for the prior (residual_components.py). Works in blocks, so memory does not grow
-    with the number of cells."""
+    the database; with them there are further components (residual_components.py). Works in blocks,
+    so memory does not grow with the number of cells."""
     found = principal(observations, count, progress, others)
     nodes = Angles(*(a.ravel() for a in grid.nodes()))
     stacked = np.empty((2 + found.weights.shape[1], grid.size), np.float32)

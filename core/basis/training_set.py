@@ -95,8 +95,8 @@ class TrainingSet:
         others: Sequence[str] = (),
     ) -> TrainedBasis:
         """The basis of all materials except those in ``without`` (all three channels of each),
-        equations (1) and (2) of Ono et al. 2019. others: materials that are not in the database,
-        for the prior only (residual_components.py).
+        equations (1) and (2) of Ono et al. 2019. others: materials that are not in the database;
+        with them there are further components (residual_components.py).
 
         Raises PatinaError for an unknown name, or too few columns for ``count`` components.
         """
@@ -115,7 +115,7 @@ class TrainingSet:
         logs = self.logs if everything else self.logs[columns]
         centre = logs[:n].mean(axis=0, dtype=np.float64).astype(np.float32)
         log_reference = np.empty(self.grid.size, np.float32)
-        scaled = np.empty((count, self.grid.size), np.float32)
+        scaled = np.empty((found.weights.shape[1], self.grid.size), np.float32)
         w = found.weights.T.astype(np.float32)
         for start in range(0, self.grid.size, BLOCK):
             part = slice(start, start + BLOCK)
@@ -127,7 +127,7 @@ class TrainingSet:
             grid=self.grid,
             mean=(centre - log_reference).reshape(self.grid.shape),
             log_reference=log_reference.reshape(self.grid.shape),
-            components=scaled.reshape(count, *self.grid.shape),
+            components=scaled.reshape(-1, *self.grid.shape),
             explained=found.explained,
             columns=n,
             provenance=self.provenance + note,

@@ -16,7 +16,7 @@ from patina.core.angles import Angles, half_difference, merl_grid
 from patina.core.basis import Basis, PrincipalBRDF, default_basis, mapping, storage
 from patina.core.basis.components import gram_matrix, principal_directions
 from patina.core.basis.merl_folder import cached_basis, checksums
-from patina.core.basis.residual_components import PRINCIPAL_COUNT
+from patina.core.basis.training import DEFAULT_COUNT
 from patina.core.brdf import TabulatedBRDF, merl_file, nbrdf
 from patina.core.errors import InputError
 from patina.core.fit import ridge
@@ -49,8 +49,8 @@ def basis() -> Basis:
 
 
 def test_default_basis_is_small_and_explains_the_variance(basis: Basis, root: Path) -> None:
-    assert basis.count == 100 and basis.columns == 300
-    assert (root / "assets" / "basis" / "nbrdf_basis.npz").stat().st_size < 5e6
+    assert basis.count == 130 and basis.columns == 300
+    assert (root / "assets" / "basis" / "nbrdf_basis.npz").stat().st_size < 6e6
     explained = basis.explained.cumsum()
     for k, share in ((1, 0.590), (2, 0.863), (3, 0.943), (5, 0.981), (10, 0.993), (20, 0.998)):
         assert abs(explained[k - 1] - share) < 0.003
@@ -148,8 +148,8 @@ def test_gram_matrix_and_svd_give_equal_components() -> None:
 def test_training_coefficients_match_the_projected_materials(basis: Basis, shared: Path) -> None:
     """Row 3m + c holds channel c of material m: it equals an independent projection."""
     names, weights = nbrdf.load(shared / "data" / "brdf" / "nbrdf_merl.npz")
-    assert basis.training is not None and basis.training.shape == (300, 100)
-    assert np.allclose(basis.training[:, :PRINCIPAL_COUNT].var(axis=0), 1 / 300, rtol=0.01)
+    assert basis.training is not None and basis.training.shape == (300, 130)
+    assert np.allclose(basis.training[:, :DEFAULT_COUNT].var(axis=0), 1 / 300, rtol=0.01)
     edges = merl_grid.node_angles(0.0)
     visible = np.flatnonzero(merl_grid.visible(merl_grid.node_angles(0.5)))
     subset = np.random.default_rng(0).choice(visible, 12_000, replace=False)
@@ -166,7 +166,7 @@ def test_materials_outside_of_merl_are_within_the_components(basis: Basis, share
     names, weights = nbrdf.load(shared / "data" / "brdf" / "nbrdf_validation.npz")
     assert basis.others is not None and basis.others.shape == (3 * len(names), basis.count)
     whole = np.concatenate([basis.training, basis.others])
-    assert np.sqrt(np.mean(whole[:, PRINCIPAL_COUNT:] ** 2, axis=0)) == pytest.approx(
+    assert np.sqrt(np.mean(whole[:, DEFAULT_COUNT:] ** 2, axis=0)) == pytest.approx(
         300**-0.5, rel=0.01
     )
     visible = merl_grid.visible(merl_grid.node_angles(0.5))
@@ -178,7 +178,7 @@ def test_materials_outside_of_merl_are_within_the_components(basis: Basis, share
         coefficients = basis.others[3 * m : 3 * m + 3]
         rows = basis.rows(angles)[1]
         off = np.std(rows @ coefficients.T - truth)
-        first = slice(0, PRINCIPAL_COUNT)
+        first = slice(0, DEFAULT_COUNT)
         without = np.std(rows[:, first] @ coefficients[:, first].T - truth)
         assert off < 0.12 and off < 0.7 * without, (name, off, without)
 

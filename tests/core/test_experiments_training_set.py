@@ -74,15 +74,15 @@ def test_other_materials_change_only_the_last_components(
     """With two materials outside the database, mean and first components are those of the database
     alone, and all components together reproduce every material. Training in one go gives the same
     basis."""
-    monkeypatch.setattr(residual_components, "PRINCIPAL_COUNT", 3)
+    monkeypatch.setattr(residual_components, "OTHERS_COUNT", 5)
     others = ("satin", "chalk")
     inside = [i for i, name in enumerate(NAMES) if name not in others]
     outside = [NAMES.index(name) for name in others]
-    alone, found = full_set.basis(others, 3), full_set.basis((), 8, others)
+    alone, found = full_set.basis(others, 3), full_set.basis((), 3, others)
     assert found.columns == alone.columns and found.materials == alone.materials
     np.testing.assert_allclose(found.mean, alone.mean, atol=1e-6)
     np.testing.assert_allclose(found.components[:3], alone.components, atol=1e-5)
-    at_once = train(AnalyticLobes(inside), "analytic lobes", 8, GRID, others=AnalyticLobes(outside))
+    at_once = train(AnalyticLobes(inside), "analytic lobes", 3, GRID, others=AnalyticLobes(outside))
     nodes = Angles(*(a.ravel() for a in GRID.nodes()))
     cos_i, cos_o = cosines(*nodes)
     rho = AnalyticLobes([*inside, *outside]).at(nodes)

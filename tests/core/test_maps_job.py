@@ -68,7 +68,7 @@ def run_maps_job(capture, result, size=128, refits=1, unwrap=sphere_uv):
 @pytest.fixture(scope="module")
 def banded(tmp_path_factory):
     capture, result = fitted(tmp_path_factory.mktemp("banded"), painted)
-    return capture, result, run_maps_job(capture, result, refits=2)
+    return capture, result, run_maps_job(capture, result, refits=3)
 
 
 def true_albedo(found):

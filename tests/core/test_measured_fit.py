@@ -102,7 +102,8 @@ def test_prior_has_mean_and_covariance_of_all_measured_materials() -> None:
     assert not whole[:k, k:].any()
     assert np.allclose(np.linalg.solve(whole, prior.rhs()), np.tile(prior.mean, 3), atol=1e-9)
     each = [prior.mean_square(known[i : i + 3]) for i in range(0, len(known), 3)]
-    assert np.mean(each) == pytest.approx(1.0, abs=0.1)
+    # the added variance makes them a little more likely than their own covariance
+    assert np.mean(each) == pytest.approx(0.9, abs=0.1)
 
 
 def test_prior_of_a_database_alone_is_that_of_its_components() -> None:

@@ -41,9 +41,10 @@ def check(capture):
 
 @pytest.fixture(scope="module")
 def uncorrected(check):
-    """Fit Again with the cause switched off."""
+    """Fit Again with the cause switched off, which hides the variation from the automatic
+    choice."""
     refit = RefitJob(check.checked, without=["black_level"], exactly=True)
-    job = VaryingSecondFit(refit, nodes=NODES)
+    job = VaryingSecondFit(refit, mode="always", nodes=NODES)
     job.drain()
     return finished(job.result)
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...basis import Basis
+from ...fit.measured.prior import CoefficientPrior
 
 THETA_H = np.radians([0.0, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0, 13.0, 17.0, 22.0, 30.0, 50.0, 90.0])
 THETA_D = np.radians([0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0])
@@ -37,7 +38,9 @@ def with_slack(basis: Basis) -> Basis:
 def variances(basis: Basis, slack: float) -> NDArray[np.float64]:
     """(k + 1 + COUNT,) prior variances of the coefficients of with_slack(basis). slack: standard
     deviation at each node."""
-    own = np.full(basis.count, basis.coefficient_variance)
+    # components for materials that are not in the database vary together: each alone varies less
+    alone = 1 / np.diag(CoefficientPrior.of(basis, basis.count).precision)
+    own = np.minimum(basis.coefficient_variance, alone)
     return np.concatenate([own, [LEVEL_SCALE**2], np.full(COUNT, slack**2)])
 
 
