@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from .common import ROOT
 
 if TYPE_CHECKING:
-    from patina.core.basis import Basis, default_basis
+    from patina.core.basis import Basis
 
 DOCUMENT = ROOT / "docs" / "guide" / "traits.md"
 
@@ -21,7 +21,7 @@ def run(data: Path) -> None:
 
     from patina.core.appearance.osl_atlas import TRAITS
     from patina.core.appearance.traits import ComponentLookup, ShiftableAlbedo, ShiftableBRDF
-    from patina.core.basis import PrincipalBRDF
+    from patina.core.basis import PrincipalBRDF, default_basis
     from patina.core.views import display
     from patina.core.views.sphere import LitSphere
 
