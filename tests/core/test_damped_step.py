@@ -6,7 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from patina.core.basis import PrincipalBRDF, default_basis
+from patina.core.basis.training import DEFAULT_COUNT
 from patina.core.diagnose.effects.light_intensity import LightIntensity
+from patina.core.diagnose.forward.material_brdfs import MaterialBRDFs
 from patina.core.diagnose.selection.baseline import fit_baseline
 from patina.core.diagnose.solver import gauss_newton
 from patina.core.diagnose.solver.gauss_newton import equations_of, step_within_bounds
@@ -18,8 +21,14 @@ SATIN = 3  # training material
 
 
 def drifting_ball():
-    """A ball whose photos have gains of up to 60 %, which the baseline does not know."""
-    context = lit_ball(2, SATIN)
+    """A ball whose photos have gains of up to 60 %, which the baseline does not know. Its basis has
+    the components of MERL alone: with the others, Gauss–Newton steps do not fail here."""
+    whole, k = default_basis(), DEFAULT_COUNT
+    merl = replace(
+        whole, components=whole.components[:k], training=whole.training[:, :k], others=None
+    )
+    brdf = PrincipalBRDF(merl, merl.training[3 * SATIN : 3 * SATIN + 3])
+    context = replace(lit_ball(2, SATIN), brdfs=MaterialBRDFs.of([brdf]))
     pixels = context.pixels
     gains = np.exp(np.random.default_rng(2).uniform(-0.6, 0.6, 6)).astype(np.float32)
     return changed(context, pixels.observed * gains[pixels.photo, None])
