@@ -21,17 +21,12 @@ DEFAULT_GRID = AngleGrid(n_h=84, n_d=46, n_p=30, knee=float(np.radians(0.7)))
 DEFAULT_COUNT = 100  # more do not improve held-out materials; the paper's method uses the first 6
 
 
-class Observations(Protocol):
-    """Training columns: one per colour channel of each material."""
+class MeasuredMaterials(Protocol):
+    """Measured materials, three columns each."""
 
     @property
     def columns(self) -> int:
-        """Number of training columns."""
-        ...
-
-    def cell_blocks(self) -> Iterator[tuple[Angles, NDArray[np.float32], float]]:
-        """Blocks of the cells of the Gram matrix, each cell once: their angles (n,), ρ (columns, n)
-        in 1/sr, and the fraction of cells before the block."""
+        """Number of columns: one per colour channel of each material."""
         ...
 
     def at(self, angles: Angles) -> NDArray[np.float32]:
@@ -39,16 +34,12 @@ class Observations(Protocol):
         ...
 
 
-class MoreMaterials(Protocol):
-    """Measured materials that are not in the database of the basis, three columns each."""
+class Observations(MeasuredMaterials, Protocol):
+    """Training columns: the materials of a database, with the cells of their Gram matrix."""
 
-    @property
-    def columns(self) -> int:
-        """Number of columns."""
-        ...
-
-    def at(self, angles: Angles) -> NDArray[np.float32]:
-        """ρ (columns, n) in 1/sr."""
+    def cell_blocks(self) -> Iterator[tuple[Angles, NDArray[np.float32], float]]:
+        """Blocks of the cells of the Gram matrix, each cell once: their angles (n,), ρ (columns, n)
+        in 1/sr, and the fraction of cells before the block."""
         ...
 
 
@@ -58,7 +49,7 @@ def train(
     count: int = DEFAULT_COUNT,
     grid: AngleGrid = DEFAULT_GRID,
     progress: Progress = lambda stage, fraction: None,
-    others: MoreMaterials | None = None,
+    others: MeasuredMaterials | None = None,
 ) -> Basis:
     """Basis of ``count`` components, stored on ``grid``. others: measured materials that are not in
     the database; with them there are further components (residual_components.py). Works in blocks,
@@ -89,7 +80,7 @@ def principal(
     observations: Observations,
     count: int,
     progress: Progress = lambda stage, fraction: None,
-    others: MoreMaterials | None = None,
+    others: MeasuredMaterials | None = None,
 ) -> ComponentWeights:
     """The components of equations (1) and (2), as weighted sums of the columns."""
     n = observations.columns
@@ -108,7 +99,7 @@ def exact_rows(
     observations: Observations,
     weights: NDArray[np.float64],
     angles: Angles,
-    others: MoreMaterials | None = None,
+    others: MeasuredMaterials | None = None,
 ) -> NDArray[np.float32]:
     """(2 + k, n): µ, ln(ref + ε) and the scaled components at directions (n,), directly from the
     observations; µ is NaN where there is no measurement. weights: (columns, k)."""
@@ -120,7 +111,7 @@ def exact_rows(
 
 
 def _with(
-    others: MoreMaterials | None, rho: NDArray[np.float32], angles: Angles
+    others: MeasuredMaterials | None, rho: NDArray[np.float32], angles: Angles
 ) -> NDArray[np.float32]:
     """ρ of the observations, then that of the other materials."""
     return rho if others is None else np.concatenate([rho, others.at(angles)])

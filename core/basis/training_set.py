@@ -111,8 +111,7 @@ class TrainingSet:
         columns = np.concatenate([columns, self._columns(others)])
         gram = centred(self.products[np.ix_(columns, columns)], n)
         found = component_weights(gram, n, count)
-        everything = len(columns) == len(self.logs) and not others
-        logs = self.logs if everything else self.logs[columns]
+        logs = self.logs if len(kept) == len(self.materials) else self.logs[columns]
         centre = logs[:n].mean(axis=0, dtype=np.float64).astype(np.float32)
         log_reference = np.empty(self.grid.size, np.float32)
         scaled = np.empty((found.weights.shape[1], self.grid.size), np.float32)

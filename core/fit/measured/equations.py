@@ -104,7 +104,7 @@ class Arrow:
     def _of_gains(self, values: Array) -> Array:
         """(p,) inverse of the gains' block · values (Sherman–Morrison)."""
         own = self.common / self.gains
-        size = 1.0 + float(self.common @ own)
+        _, size = self._common_part
         found: Array = values / self.gains - own * (float(own @ values) / size)
         return found
 

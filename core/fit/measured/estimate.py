@@ -57,8 +57,8 @@ class MeasuredFit:
     were used. normal_deviation: degrees along each tangent, estimated standard deviation of the
     scan's normals. gains: photo → its gain. extrapolation: a sentence that says what the BRDF rests
     on in directions without samples. without: photo → the BRDF without that photo. covariance: (3,
-    k, k) posterior covariance of each channel's coefficients. prior_scale: how far the
-    material is from the measured ones (prior_scale.py)."""
+    k, k) posterior covariance of each channel's coefficients. prior_scale: how far the material is
+    from the measured ones (prior_scale.py)."""
 
     brdf: PrincipalBRDF
     samples: int
