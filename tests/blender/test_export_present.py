@@ -32,7 +32,7 @@ def moved_and_exported(formats: set[str]) -> tuple[Path, np.ndarray]:
 def test_all_formats_hold_changed_material_and_its_name() -> None:
     out, coefficients = moved_and_exported({"gltf", "blend", "mtlx", "npz", "record"})
     assert (out / "Glossy_red.mtlx").is_file() or (out / "Glossy red.mtlx").is_file()
-    table = next(out.glob("*.npz"))
+    table = next(path for path in out.glob("*.npz") if not path.name.startswith("basis_"))
     np.testing.assert_allclose(np.load(table)["coefficients"], coefficients, rtol=1e-6)
     losses = json.loads((out / "losses.json").read_text("utf-8"))["losses"]
     assert {loss["material"] for loss in losses} == {NAME}
