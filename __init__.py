@@ -95,6 +95,7 @@ MODULES: tuple[str, ...] = (
     "operators.fit",
     "operators.check",
     "operators.look_through",
+    "operators.show_proposed_photo",
     "operators.save_lights",
     "operators.find_lights",
     "operators.find_ball",

@@ -127,6 +127,8 @@ def print_summary(out: Path, result: CaptureResult) -> None:
             print(f"  90 % interval: {reach(material.spread)}")
         for warning in material.warnings:
             print_note(warning)
+    if result.proposed_photo is not None:
+        print(f"proposed photo: {result.proposed_photo.sentence}")
     for note in result.notes:
         print(f"note: {note}")
     for name, parameters in result.lights.moved.items():

@@ -48,6 +48,12 @@ def draw_measured(
             if LIGHT_MAY_BE_WRONG in warning:
                 box.operator("patina.find_lights")
         _coefficients(layout, material)
+    photo = (result or {}).get("proposed_photo")
+    if photo is not None:
+        box = layout.box()
+        box.label(text="Proposed Photo", icon="CAMERA_DATA")
+        wrapped(box, photo["sentence"], "BLANK1", IN_BOX)
+        box.operator("patina.show_proposed_photo", icon="HIDE_OFF")
 
 
 def _coefficients(layout: bpy.types.UILayout, material: dict[str, Any]) -> None:

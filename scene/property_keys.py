@@ -34,6 +34,7 @@ CANVAS_PHOTO = "patina_canvas"  # on the image: index of its photo in the captur
 FIT_SLOTS = "patina_slots"  # face attribute of the scan while a fit runs
 PROPOSED_SLOTS = "patina_materials"  # face attribute of the mesh: last proposed materials
 PROPOSAL_CONFIDENCE = "patina_confidence"  # face attribute of the mesh: confidence of these
+PROPOSED_LAMP = "patina_proposed_lamp"  # on the arrow of a proposed photo: its capture
 PLACEHOLDER = "patina_proposed"  # on coloured placeholders for materials not fitted yet
 COMPONENTS_FILE = "patina_components"  # on the material: name of its components' EXR
 MEASURED_SAMPLING_FILE = "patina_measured_sampling"  # on an edited material: EXR as measured

@@ -72,7 +72,8 @@ class MeasuredResult:
     standard deviation of the scan's normals. gains: photo → factor by which it is brighter than the
     BRDF of all photos predicts: its exposure, and what no BRDF of the basis explains.
     extrapolation: what the BRDF rests on in directions without samples. samples: how many were
-    used."""
+    used. covariance: (k, k) posterior covariance of the coefficients, mean of the channels.
+    cells_per_region: (REGIONS,) cells of samples in each region of angle space."""
 
     brdf: PrincipalBRDF
     samples: int
@@ -81,10 +82,12 @@ class MeasuredResult:
     extrapolation: str
     band: Band
     warnings: tuple[str, ...]
+    covariance: NDArray[np.float64]
+    cells_per_region: NDArray[np.intp]
 
     @staticmethod
     def of(fit: MeasuredFit) -> MeasuredResult:
-        """The fit without its samples, model and posterior."""
+        """The fit without its samples and model."""
         return MeasuredResult(
             brdf=fit.brdf,
             samples=fit.samples,
@@ -93,6 +96,8 @@ class MeasuredResult:
             extrapolation=fit.extrapolation,
             band=Band.of(fit),
             warnings=fit.warnings,
+            covariance=fit.covariance.mean(axis=0),
+            cells_per_region=fit.cells_per_region,
         )
 
     def interval(self, angles: Angles) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -27,6 +27,7 @@ from ..geometry import RayScene
 from ..inputs import capture_data
 from ..inputs.lights import Lights, find_lights, refined
 from ..inputs.photos import LitPhotos
+from ..proposed_photo import ProposedPhoto
 from ..samples import MeasuredPoints, SampleSink, SampleTable
 from ..samples.level import multiplied, typical_factor
 from ..scan import Scan
@@ -38,6 +39,7 @@ from .face_assignment import face_materials
 from .fit_times import ASSIGNING, FitTimes
 from .fit_warnings import black_photo_warnings, material_warnings, quality_warnings
 from .portable_materials import Portable, fit_portable
+from .proposed_photo import proposed_photo
 from .sample_checks import check_light, check_samples, material_entry
 from .sampling import PhotoSamples, take_samples
 
@@ -91,7 +93,7 @@ class CaptureResult:
     face_material: (f,) int, index into ``materials`` for each face. notes: what was read, assumed
     and left out, one sentence each. effects: causes found by a diagnosis that the materials take
     into account. varying: how the materials vary over the surface, None where they are even or
-    where this was not estimated.
+    where this was not estimated. proposed_photo: the photo that would say most about the materials.
     """
 
     STORED_APART: ClassVar[bool] = True
@@ -107,6 +109,7 @@ class CaptureResult:
     face_material: NDArray[np.int32]
     effects: tuple[AppliedEffect, ...] = ()
     varying: VaryingSurface | None = None
+    proposed_photo: ProposedPhoto | None = None
 
 
 def with_portable(
@@ -230,7 +233,14 @@ class FitJob(Job):
                 else material
                 for material, large in zip(results, odd, strict=True)
             ]
-        yield Step("assigning materials to the mesh", 1 - ASSIGNING / self._times.total)
+        assigning = Step("assigning materials to the mesh", 1 - ASSIGNING / self._times.total)
+        yield assigning
+        assigned = face_materials(capture, scan, taken.votes)
+        fits = [material.fit for material in results]
+        following = yield from in_background(
+            lambda: proposed_photo(scan, rays, lights, fits, assigned),
+            replace(assigning, stage="choosing the next photo"),
+        )
         self.result = CaptureResult(
             capture=capture,
             scan=scan,
@@ -247,7 +257,8 @@ class FitJob(Job):
             rays=rays,
             basis=basis,
             materials=tuple(results),
-            face_material=face_materials(capture, scan, taken.votes),
+            face_material=assigned,
+            proposed_photo=following,
         )
 
     def _take_samples(

@@ -38,6 +38,8 @@ def write_report(
     if not result.effects:
         sections += [partial(_looked_at, result, place) for place in range(len(photos))]
     body = [f"<p>Included in the fit: {escape(e.sentence)}</p>" for e in result.effects]
+    if result.proposed_photo is not None:
+        body.append(f"<p>Proposed photo: {escape(result.proposed_photo.sentence)}</p>")
     rows, found_criteria, factors = [], set[Criterion](), set[int]()
     with thread_pool(min(thread_count(threads), PHOTOS_AT_ONCE)) as pool:
         made = ordered_map(pool, lambda section: section(), sections, PHOTOS_AT_ONCE - 1)

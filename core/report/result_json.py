@@ -19,6 +19,7 @@ from ..inputs import capture_data
 from ..jobs import CaptureResult, MaterialResult, Stage
 from ..jobs.applied_effects import AppliedEffect
 from ..light import Light
+from ..proposed_photo import ProposedPhoto
 from ..varying import storage
 from .figures import half_width, notable_gains
 
@@ -69,6 +70,7 @@ def describe(
         "lights": [_light(result, light) for light in result.lights.by_name.values()],
         "effects": [_effect(effect) for effect in result.effects],
         "varying": _varying(result),
+        "proposed_photo": _proposed_photo(result.proposed_photo),
         "materials": [_material(result, m) for m in result.materials],
         "warnings": list(notes),
         "stages": [
@@ -97,6 +99,21 @@ def _varying(result: CaptureResult) -> dict[str, Any] | None:
             }
             for material, kind in zip(result.materials, surface.materials, strict=True)
         ],
+    }
+
+
+def _proposed_photo(photo: ProposedPhoto | None) -> dict[str, Any] | None:
+    """The photo that would say most about the materials."""
+    if photo is None:
+        return None
+    return {
+        "camera": photo.camera,
+        "towards_light": None if photo.towards is None else photo.towards.tolist(),
+        "angle": photo.angle,
+        "side": photo.side,
+        "uncertainty": photo.before,
+        "expected_uncertainty": photo.after,
+        "sentence": photo.sentence,
     }
 
 

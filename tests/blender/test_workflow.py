@@ -178,9 +178,32 @@ def test_fit_operator_matches_api() -> None:
     else:
         assert not measured and "patina_without_osl" in mesh.data.materials[0]
 
+    check_proposed_photo(stored_result["proposed_photo"])
     before = counts()
     bpy.ops.patina.fit()  # again: replaces, does not accumulate
     assert counts()["materials"] == before["materials"]
+    assert "Proposed Lamp" not in bpy.data.objects, "the arrow of the fit before is removed"
+
+
+def check_proposed_photo(photo: dict) -> None:
+    """The operator selects the camera and points an arrow from the lamp at the turned mesh."""
+    mesh = bpy.context.scene.patina.mesh
+    mesh.rotation_euler = (0.4, 0.0, 0.9)
+    bpy.context.view_layer.update()
+    for _ in range(2):  # the arrow moves, it does not accumulate
+        assert bpy.ops.patina.show_proposed_photo() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    camera = bpy.context.view_layer.objects.active
+    assert camera.type == "CAMERA" and camera["patina_label"] == photo["camera"]
+    (arrow,) = [o for o in bpy.data.objects if o.name.startswith("Proposed Lamp")]
+    assert camera.select_get() and arrow.select_get() and arrow.hide_render
+    turned = np.array(mesh.matrix_world)[:3, :3] @ photo["towards_light"]
+    pointing = np.array(arrow.matrix_world)[:3, 2]  # an arrow points along +Z
+    assert np.allclose(pointing, -turned, atol=1e-5)
+    corners = np.array([mesh.matrix_world @ Vector(corner) for corner in mesh.bound_box])
+    away = np.array(arrow.location) - corners.mean(axis=0)
+    assert np.allclose(away / np.linalg.norm(away), turned, atol=1e-5)
+    mesh.rotation_euler = (0.0, 0.0, 0.0)
 
 
 def test_demo_by_operator_equals_demo_by_api() -> None:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from patina.core.angles import Angles, cosines
 from patina.core.basis import AngleGrid, PrincipalBRDF, default_basis
+from patina.core.fit.measured.cell_weights import REGIONS
 from patina.core.fit.measured_result import COARSE, Band, MeasuredResult
 from patina.core.fit.spread import candidate_spread
 
@@ -27,6 +28,8 @@ def made_result(deviation: float, gains: dict[int, float] | None = None) -> Meas
         extrapolation="",
         band=Band(grid, np.full((grid.size, 3), deviation, np.float32)),
         warnings=(),
+        covariance=np.eye(5) * deviation**2,
+        cells_per_region=np.zeros(REGIONS, np.intp),
     )
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...angles import Angles
 from .cells import AngleCells
 
 # degrees, edges of the regions in θh
@@ -19,10 +20,19 @@ REGION_THETA_D = 8.0  # degrees, width of a region in θd
 CELLS_PER_REGION = 20.0  # a region weighs no more than so many independent cells
 
 
+COLUMNS = int(np.ceil(90.0 / REGION_THETA_D))
+REGIONS = (len(REGION_THETA_H) + 1) * COLUMNS
+
+
 def cells_per_observation(cells: AngleCells) -> NDArray[np.float64]:
     """(m,) for each cell, how many cells of its region together weigh as much as one independent
     cell (at least 1)."""
-    row = np.searchsorted(np.radians(REGION_THETA_H), cells.angles.theta_h)
-    column = (np.degrees(cells.angles.theta_d) / REGION_THETA_D).astype(np.int64)
-    region = row * 32 + column
+    region = region_of(cells.angles)
     return np.maximum(np.bincount(region)[region] / CELLS_PER_REGION, 1.0)
+
+
+def region_of(angles: Angles) -> NDArray[np.intp]:
+    """(n,) the region, of REGIONS, of directions (n,)."""
+    row = np.searchsorted(np.radians(REGION_THETA_H), angles.theta_h)
+    column = (np.degrees(angles.theta_d) / REGION_THETA_D).astype(np.intp)
+    return np.asarray(row * COLUMNS + np.minimum(column, COLUMNS - 1), np.intp)

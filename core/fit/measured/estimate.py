@@ -16,6 +16,7 @@ from ...concurrency.steps import drained
 from ...errors import FitError
 from ...noise.basis_error import BASIS_ERROR
 from ...samples import SampleTable
+from .cell_weights import REGIONS, region_of
 from .cells import gather
 from .forward import CellModel
 from .grazing_prior import extrapolated
@@ -58,7 +59,8 @@ class MeasuredFit:
     scan's normals. gains: photo → its gain. extrapolation: a sentence that says what the BRDF rests
     on in directions without samples. without: photo → the BRDF without that photo. covariance: (3,
     k, k) posterior covariance of each channel's coefficients. prior_scale: how far the material is
-    from the measured ones (prior_scale.py)."""
+    from the measured ones (prior_scale.py). cells_per_region: (REGIONS,) number of cells in each
+    region of angle space (cell_weights.py)."""
 
     brdf: PrincipalBRDF
     samples: int
@@ -68,6 +70,7 @@ class MeasuredFit:
     without: dict[int, PrincipalBRDF]
     covariance: NDArray[np.float64]
     prior_scale: float
+    cells_per_region: NDArray[np.intp]
     warnings: tuple[str, ...] = ()
 
     def band(self, angles: Angles) -> NDArray[np.float64]:
@@ -144,6 +147,7 @@ def measured_steps(
         without={p: PrincipalBRDF(basis, c + shrinkage) for p, c in found.without.items()},
         covariance=covariance,
         prior_scale=scale,
+        cells_per_region=np.bincount(region_of(model.cells.angles), minlength=REGIONS),
     )
 
 
