@@ -12,14 +12,15 @@ from matplotlib.figure import Figure
 from ..common import ROOT, say
 from . import appearance, figures, goal_table, store, tables
 from .ablation import SCENES
+from .estimators import MERL_PRIOR
 from .records import Record, distinct, where
 
 DOCUMENT = ROOT / "docs" / "method" / "experiments.md"
 APPEARANCE = ROOT / "docs" / "method" / "appearance.md"
 IMAGES = "../images/experiments"
 ESTIMATORS = (
-    "paper", "all samples k=20", "ours", "ours, true mesh", "all samples k=40, true mesh",
-    "floor k=20", "floor k=40", "floor k=100",
+    "paper", "all samples k=20", "ours", MERL_PRIOR, "ours, true mesh",
+    "all samples k=40, true mesh", "floor k=20", "floor k=40", "floor k=100",
 )  # fmt: skip
 X_LABELS = {
     "samples": "number of samples in the fit",
@@ -29,6 +30,9 @@ X_LABELS = {
     "mesh error, blurred": "median normal error, degrees",
     "stereo tool": "mesh made by",
 }
+SUMMARISED = (
+    "check", "goals", "by scene", "priors", "proposed photo", "models", "models by material",
+)  # fmt: skip
 Section = Callable[[list[Record]], str]
 
 
@@ -40,6 +44,8 @@ def sections() -> dict[str, tuple[str, Section]]:
         "by scene": ("goals", lambda r: goal_table.by_scene(r, _present(r))),
         "by material": ("goals", lambda r: goal_table.by_material(r, _present(r))),
         "in-basis": ("goals", goal_table.in_basis),
+        "priors": ("goals", goal_table.priors),
+        "proposed photo": ("proposed_photo", tables.proposed_photo),
         "polar": ("ablation", _polar),
         "ablation": ("ablation", _ablation),
         "similarity": ("ablation", _similarity),
@@ -82,7 +88,15 @@ def _fill(document: Path, found: dict[str, tuple[str, Section]]) -> None:
 def summary() -> str:
     """Return the tables of the quick runs, for the terminal."""
     parts = []
-    for marker in ("check", "goals", "by scene", "models", "models by material"):
+    for marker in (
+        "check",
+        "goals",
+        "by scene",
+        "priors",
+        "proposed photo",
+        "models",
+        "models by material",
+    ):
         experiment, make = (sections() | appearance_sections())[marker]
         if records := store.load(experiment, quick=True):
             parts.append(f"## {marker}\n\n{make(records)}")

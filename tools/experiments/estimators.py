@@ -19,6 +19,7 @@ from patina.core.samples import SampleTable
 
 CHUNK = 1 << 16
 OUR_COMPONENTS = 100
+MERL_PRIOR = "ours, prior of MERL"
 _only: frozenset[str] | None = None
 
 
@@ -36,13 +37,15 @@ Estimator = Callable[[SampleTable, Basis, int], Fitted]
 @dataclass(frozen=True)
 class Row:
     """One row of a table. true_mesh: the estimator gets the exact surface (an oracle); components:
-    size of its basis; random: whether it is random itself, apart from the noise of the photos."""
+    size of its basis; random: whether it is random itself, apart from the noise of the photos;
+    merl_prior: the prior is learnt from MERL alone."""
 
     name: str
     estimator: Estimator
     true_mesh: bool = False
     components: int = 40
     random: bool = True
+    merl_prior: bool = False
 
 
 def paper(table: SampleTable, basis: Basis, seed: int) -> PrincipalBRDF:
@@ -125,5 +128,6 @@ def rows() -> dict[str, Row]:
         Row("all samples k=40, true mesh", all_samples(40), true_mesh=True, random=False),
         Row("ours", ours, components=OUR_COMPONENTS, random=False),
         Row("ours, true mesh", ours, True, components=OUR_COMPONENTS, random=False),
+        Row(MERL_PRIOR, ours, components=OUR_COMPONENTS, random=False, merl_prior=True),
     ]
     return {row.name: row for row in known if is_selected(row.name)}

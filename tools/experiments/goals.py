@@ -20,7 +20,7 @@ from .runs import Records
 
 SEEDS = 3
 IN_BASIS = ("paper", "ours")
-PICTURES = ("paper", "ours", "ours, true mesh")
+PICTURES = ("paper", "ours", "ours, true mesh", estimators.MERL_PRIOR)
 ORACLES = ("jar-bumpy", "pebble-wavy")
 """Scenes in which Patina's estimator, the slowest one, is also run with the true mesh."""
 SOME = (
@@ -28,6 +28,7 @@ SOME = (
     "leaf_maple_rgb", "paper_blue_rgb", "satin_purple_rgb",
 )  # fmt: skip
 """Materials of the scenes with scripted shapes; the reconstructed bunnies use all materials."""
+GRAZING = np.radians(65.0)  # of θd: beyond the largest angle of the eight photos
 FLOORS = (5, 20, 40, 100)
 
 
@@ -65,7 +66,7 @@ def work(task: tuple[str, list[str], int]) -> Records:
             for in_basis in (False, True):
                 if in_basis and not (material.trained and row.name in IN_BASIS):
                     continue
-                basis = materials.basis_for(material, row.components, in_basis)
+                basis = materials.basis_for(material, row.components, in_basis, row.merl_prior)
                 if row.true_mesh and row.components > 40 and scene not in ORACLES:
                     continue
                 for seed in range(seeds if row.random and not in_basis else 1):
@@ -89,11 +90,17 @@ def work(task: tuple[str, list[str], int]) -> Records:
                         and not material.trained
                         and (row.name in PICTURES)
                     ):
-                        record["psnr"] = spheres.psnr(
-                            spheres.pictures(fit.evaluate), true_pictures(material.name)
-                        ).tolist()
+                        record |= picture_errors(fit, material.name)
                     found.append(record)
     return found
+
+
+def picture_errors(fit: estimators.Fitted, name: str) -> dict[str, list[float]]:
+    """Return PSNR and, where it is installed, FLIP of a sphere under every world."""
+    pictures, truth = spheres.pictures(fit.evaluate), true_pictures(name)
+    flip = spheres.flip(pictures, truth)
+    psnr = spheres.psnr(pictures, truth).tolist()
+    return {"psnr": psnr} if flip is None else {"psnr": psnr, "flip": flip.tolist()}
 
 
 def image_errors(
@@ -122,7 +129,8 @@ def band_coverage(
     fit: estimators.Fitted, reference: metrics.Reference, seen: NDArray[np.bool_]
 ) -> dict[str, float]:
     """Return the fraction of cells whose true value is inside the 90 % interval (all channels,
-    light and view within 80°), for cells with and without samples. Empty without an interval."""
+    light and view within 80°), for cells with and without samples and for those with θd beyond
+    GRAZING. Empty without an interval."""
     interval = estimators.interval(fit)
     if interval is None:
         return {}
@@ -132,6 +140,7 @@ def band_coverage(
     return {
         "band_seen": float(inside[cells.near & seen].mean()),
         "band_unseen": float(inside[cells.near & ~seen].mean()),
+        "band_grazing": float(inside[cells.near & (cells.angles.theta_d > GRAZING)].mean()),
     }
 
 

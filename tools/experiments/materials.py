@@ -89,13 +89,19 @@ def fold_of(name: str) -> int:
     return kinds.index(_kind(name)) % FOLDS
 
 
-def basis_for(material: Material, count: int = 40, in_basis: bool = False) -> TrainedBasis:
+def basis_for(
+    material: Material, count: int = 40, in_basis: bool = False, merl_prior: bool = False
+) -> TrainedBasis:
     """Return the basis without the material. Its prior is learnt from MERL and the validation
     materials, without the material and all that are in the same part (``fold_of``).
 
     in_basis: return the basis of all 100 materials of MERL, which includes the paper's six.
+    merl_prior: learn the prior from MERL alone.
     """
     validation = tuple(_encodings("nbrdf_validation.npz"))
+    if merl_prior:
+        own = (material.name,) if material.trained and not in_basis else ()
+        return _basis((*validation, *own), count)
     if not material.trained:
         part = fold_of(material.name)
         return _basis(tuple(n for n in validation if fold_of(n) == part), count)
@@ -128,7 +134,7 @@ def _training_set() -> TrainingSet:
     return found
 
 
-@lru_cache(maxsize=3)
+@lru_cache(maxsize=5)
 def _basis(without: tuple[str, ...], count: int) -> TrainedBasis:
     others = [name for name in _encodings("nbrdf_validation.npz") if name not in without]
     return training_set().basis(without, count, others)

@@ -3,13 +3,14 @@
 Orthographic view, no shadows or interreflection (a sphere has none). Each pixel sums ρ·L·cos over
 the cells of the world (a latitude-longitude map averaged to 48 × 96 cells), with one jittered
 direction per cell, equal for truth and fit. The 95th percentile of the true picture is white. PSNR
-of the 8-bit sRGB values of the disc's pixels (the background would increase it without reason).
+and FLIP of the 8-bit sRGB values of the disc's pixels (the background would improve them without
+reason).
 """
 
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -19,6 +20,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from patina.core.angles import Angles, half_difference
+from patina.core.predict.flip import flip_error
 from patina.core.views.display import srgb
 
 Evaluate = Callable[[Angles], NDArray[np.floating]]
@@ -73,7 +75,7 @@ def quadrature() -> Quadrature:
     """Return all pairs of pixel and cell."""
     axis = (np.arange(DISC) + 0.5) / DISC * 2 - 1
     x, z = np.meshgrid(axis, -axis)
-    inside = x**2 + z**2 < 0.98
+    inside = _disc()
     x, z = x[inside], z[inside]
     normal = np.stack([x, -np.sqrt(1 - x**2 - z**2), z], axis=1)  # the camera looks along +y
     rng = np.random.default_rng(0)
@@ -117,9 +119,37 @@ def pictures(evaluate: Evaluate) -> NDArray[np.float32]:
 def psnr(fit: NDArray[np.float32], truth: NDArray[np.float32]) -> NDArray[np.float64]:
     """Return the PSNR (worlds,) in dB of pictures of :func:`pictures`, at most 60 (equal bytes)."""
     found = []
-    for a, b in zip(fit, truth, strict=True):
-        white = max(float(np.percentile(b, WHITE)), 1e-9)
-        difference = srgb(a / white).astype(float) - srgb(b / white)
-        mse = float(np.mean(difference**2))
+    for a, b in _displayed(fit, truth):
+        mse = float(np.mean((a.astype(float) - b) ** 2))
         found.append(10 * np.log10(255.0**2 / max(mse, 255.0**2 * 1e-6)))
     return np.array(found)
+
+
+def flip(fit: NDArray[np.float32], truth: NDArray[np.float32]) -> NDArray[np.float64] | None:
+    """Return the mean FLIP error (worlds,) of the disc's pixels; None without flip-evaluator."""
+    inside = _disc()
+    found = []
+    for a, b in _displayed(fit, truth):
+        pictures = np.zeros((2, DISC, DISC, 3), np.uint8)
+        pictures[0, inside], pictures[1, inside] = a, b
+        error = flip_error(*pictures, inside)
+        if error is None:
+            return None
+        found.append(error)
+    return np.array(found)
+
+
+def _displayed(
+    fit: NDArray[np.float32], truth: NDArray[np.float32]
+) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.uint8]]]:
+    """For each world the 8-bit sRGB values (pixels, 3) of both pictures at the same exposure."""
+    for a, b in zip(fit, truth, strict=True):
+        white = max(float(np.percentile(b, WHITE)), 1e-9)
+        yield srgb(a / white), srgb(b / white)
+
+
+def _disc() -> NDArray[np.bool_]:
+    """(DISC, DISC) the pixels that show the sphere."""
+    axis = (np.arange(DISC) + 0.5) / DISC * 2 - 1
+    x, z = np.meshgrid(axis, -axis)
+    return np.asarray(x**2 + z**2 < 0.98)

@@ -1,4 +1,4 @@
-"""Tables of the check, the ablation, the similarity and the sweeps."""
+"""Tables of the check, the ablation, the similarity, the sweeps and the proposed photo."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from .ablation import VARIANTS
-from .records import Record, distinct, median, number, table, values, where
+from .records import Record, distinct, median, number, ratios, table, values, where
 
 
 def check(records: list[Record]) -> str:
@@ -117,3 +117,29 @@ def sweep(records: list[Record], name: str) -> str:
             rows.append([place, estimator, *cells])
     labels = [label for _, label in sorted({(r["value"], r["label"]) for r in here})]
     return table(["", "log RMS, specular L2", *labels], rows)
+
+
+def proposed_photo(records: list[Record]) -> str:
+    """Compare a ninth photo that Patina proposes with random ones, one row per capture."""
+    rows = []
+    for scene in (*distinct(records, "scene"), None):
+        here = records if scene is None else where(records, scene=scene)
+        kinds = [where(here, estimator=f"{kind} ninth") for kind in ("random", "proposed")]
+        eight, (random, proposed) = where(here, estimator="eight photos"), kinds
+        cells = [number(median(some, "unseen")) for some in (eight, random, proposed)]
+        for below in (random, eight):
+            found = list(ratios(proposed, below, "unseen").values())
+            cells.append(number(float(np.median(found)), 2))
+        grazing = list(ratios(proposed, random, "grazing").values())
+        cells += [
+            number(float(np.median(grazing)), 2),
+            number(median(proposed, "stated"), 2),
+            f"{median(proposed, 'angle'):.0f}°",
+        ]
+        rows.append(["all" if scene is None else scene, *cells])
+    head = [
+        "capture", "eight photos", "random ninth", "proposed ninth", "proposed ÷ random",
+        "proposed ÷ eight", "proposed ÷ random, θd > 65°", "stated uncertainty, nine ÷ eight",
+        "lamp from camera",
+    ]  # fmt: skip
+    return table(head, rows)
