@@ -41,22 +41,35 @@ Steps = Generator[tuple[str, float], None, Estimate]
 
 
 def estimate(
-    table: SampleTable, basis: Basis, capture: Capture, name: str, judge: Judge | None = None
+    table: SampleTable,
+    basis: Basis,
+    capture: Capture,
+    name: str,
+    judge: Judge | None = None,
+    clipped: SampleTable | None = None,
 ) -> Steps:
     """Fit by the capture's method; yields (name of the next stage, fraction done).
 
     judge: predicts a held-out photo and measures the error (None: from the samples in ``table``).
-    Raises FitError.
+    clipped: samples with a clipped channel, which the measured method uses as lower limits. Raises
+    FitError.
     """
     if judge is None:
         judge = partial(prediction_errors, table)
     if capture.fit.method == "paper":
         return _paper(table, basis, capture, name, judge)
-    return _measured(table, basis, capture, name, judge)
+    return _measured(table, basis, capture, name, judge, clipped)
 
 
-def _measured(table: SampleTable, basis: Basis, capture: Capture, name: str, judge: Judge) -> Steps:
-    steps = steps_in_background(measured_steps(table, basis))
+def _measured(
+    table: SampleTable,
+    basis: Basis,
+    capture: Capture,
+    name: str,
+    judge: Judge,
+    clipped: SampleTable | None,
+) -> Steps:
+    steps = steps_in_background(measured_steps(table, basis, clipped=clipped))
     while True:
         try:
             yield f"fitting {name}", FIT_SHARE * next(steps)

@@ -196,6 +196,7 @@ class FitJob(Job):
         taken = yield from self._take_samples(scan, rays, photos, lights)
         counts = [int(taken.counts[material.name].sum()) for material in capture.materials]
         tables = [taken.kept.pop(material.name).table() for material in capture.materials]
+        clipped = [taken.clipped.pop(material.name).table() for material in capture.materials]
         comparing = Step("comparing the axes of the mesh", self._times.sampled)
         try:
             check_light(capture, taken)
@@ -212,14 +213,14 @@ class FitJob(Job):
         results: list[MaterialResult] = []
         unit = known, 1.0 if known else typical_factor(tables, basis)
         for index, material in enumerate(capture.materials):
-            table = multiplied(tables.pop(0), unit[1])
+            table, limits = (multiplied(t.pop(0), unit[1]) for t in (tables, clipped))
             if self.keep:
                 self.samples[material.name] = table
             start, share = self._times.material(index)
             yield Step(f"fitting {material.name}", start)
             each = taken.counts[material.name]
             results.append(
-                (yield from self._material(index, table, basis, unit, each, start, share))
+                (yield from self._material(index, table, basis, unit, each, start, share, limits))
             )
         odd = [m.held_out is not None and m.held_out.typical > AXES_ERROR for m in results]
         if any(odd):
@@ -300,7 +301,8 @@ class FitJob(Job):
         """
         basis, counts = finished(self.result).basis, np.array(before.per_photo)
         unit = before.irradiance_known, before.scale
-        return (yield from self._material(index, table, basis, unit, counts, start, share, judge))
+        steps = self._material(index, table, basis, unit, counts, start, share, None, judge)
+        return (yield from steps)
 
     def _material(
         self,
@@ -311,14 +313,15 @@ class FitJob(Job):
         counts: NDArray[np.int64],
         start: float,
         share: float,
+        clipped: SampleTable | None,
         judge: Judge | None = None,
     ) -> Generator[Step, None, MaterialResult]:
         """Fit one material. unit: (whether the irradiance is known, scale of the samples); counts:
-        (photos,) samples taken from each photo."""
+        (photos,) samples taken from each photo; clipped: its samples with a clipped channel."""
         capture, name = self.capture, self.capture.materials[index].name
         known, scale = unit
         fit_share = share * (self._times.fit_share(index) if self.portable else 1.0)
-        found = yield from self._estimate(index, table, basis, start, fit_share, judge)
+        found = yield from self._estimate(index, table, basis, start, fit_share, clipped, judge)
         # the most severe first: what makes the result wrong, then what makes it uncertain
         warnings = black_photo_warnings(table, capture) + quality_warnings(found, capture)
         warnings += material_warnings(table, found.fit, known) + found.notes
@@ -347,6 +350,7 @@ class FitJob(Job):
         basis: Basis,
         start: float,
         share: float,
+        clipped: SampleTable | None,
         judge: Judge | None = None,
     ) -> Generator[Step, None, Estimate]:
         """Run the estimator; it takes the fraction ``share`` of the job from ``start`` on."""
@@ -354,7 +358,7 @@ class FitJob(Job):
         samples_to_fit = yield from in_background(
             lambda: self.samples_to_fit(index, table), Step(f"fitting {name}", start)
         )
-        steps = estimate(samples_to_fit, basis, self.capture, name, judge)
+        steps = estimate(samples_to_fit, basis, self.capture, name, judge, clipped)
         while True:
             try:
                 stage, done = next(steps)

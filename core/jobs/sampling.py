@@ -25,6 +25,7 @@ from ..inputs.material_pixels import material_pixels
 from ..inputs.photos import LitPhoto, LitPhotos
 from ..light import Light
 from ..samples import SampleReservoir, SampleSink, SampleTable
+from ..samples.clipped import clipped_rows, white_of_clipped
 from ..samples.face_votes import FaceVotes
 from ..samples.reservoir import ALL
 from ..samples.take import (
@@ -39,19 +40,22 @@ from ..samples.take import (
 from ..scan import Scan
 
 MAX_CLIPPED_SHARE = 1e-3  # of a photo's lit pixels; more gives a note
+MAX_CLIPPED_SAMPLES = 100_000  # of one material: each only says how bright it is at least
 
 
 @dataclass
 class PhotoSamples:
     """The samples of all photos.
 
-    kept: a uniform random subset of each material's samples. counts: {material: (photos,) number
+    kept: a uniform random subset of each material's samples. clipped: the same of its clipped
+    samples (take.clipped_rows). counts: {material: (photos,) number
     of samples}. marked: {material: number of surface pixels that its masks mark}. votes: material
     votes of the faces, empty where there is one material. notes: {sentence: number of photos it
     applies to}. seen, lit: (photos,) pixels that see the surface, and those of them in the light.
     """
 
     kept: dict[str, SampleReservoir]
+    clipped: dict[str, SampleReservoir]
     counts: dict[str, NDArray[np.int64]]
     marked: dict[str, int]
     votes: FaceVotes
@@ -62,7 +66,8 @@ class PhotoSamples:
 
 @dataclass(frozen=True)
 class _Shot:
-    """One photo and everything that its bands need."""
+    """One photo and everything that its bands need. white: the radiance from which a channel is
+    clipped."""
 
     capture: Capture
     scan: Scan
@@ -71,16 +76,18 @@ class _Shot:
     place: int
     lines: PixelRays
     photo: LitPhoto
+    white: float
     masks: Mapping[str, NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
 class _Band:
-    """The result of one band. tables, counts, faces: one entry per material; counts: of samples,
-    including those that the table leaves out; faces: those of the pixels that the material's masks
-    mark."""
+    """The result of one band. tables, clipped_tables, counts, faces: one entry per material;
+    counts: of samples, including those that the table leaves out; faces: those of the pixels that
+    the material's masks mark."""
 
     tables: list[SampleTable]
+    clipped_tables: list[SampleTable]
     counts: list[int]
     faces: list[NDArray[np.int32]]
     seen: int
@@ -106,6 +113,7 @@ def take_samples(
     count, names = len(capture.photos), [m.name for m in capture.materials]
     taken = PhotoSamples(
         kept={name: SampleReservoir(count) for name in names},
+        clipped={name: SampleReservoir(count, size=MAX_CLIPPED_SAMPLES) for name in names},
         counts={name: np.zeros(count, np.int64) for name in names},
         marked=dict.fromkeys(names, 0),
         votes=FaceVotes.empty(len(scan.mesh.faces), len(names)),
@@ -120,7 +128,8 @@ def take_samples(
         masks = capture_data.photo_masks(capture, place)
         photo = photos.read_with_noise(place)
         light = lights.of(capture, place)
-        return _Shot(capture, scan, rays, light, place, PixelRays.of(camera), photo, masks)
+        white = white_of_clipped(photo.radiance, photo.usable)
+        return _Shot(capture, scan, rays, light, place, PixelRays.of(camera), photo, white, masks)
 
     with thread_pool(workers) as pool:
         shots = ordered_map(pool, open_shot, range(count), ahead=1)
@@ -152,9 +161,10 @@ def _take_photo(
         taken.lit[place] += band.lit
         trusted += band.trusted
         clipped += band.clipped
-        for name, table, number, shown in zip(
-            taken.kept, band.tables, band.counts, band.faces, strict=True
+        for name, table, clipped_table, number, shown in zip(
+            taken.kept, band.tables, band.clipped_tables, band.counts, band.faces, strict=True
         ):
+            taken.clipped[name].add(place, clipped_table)
             taken.counts[name][place] += number
             taken.marked[name] += len(shown)
             if len(faces) > 1:  # with one material, every face is of that material
@@ -169,8 +179,8 @@ def _take_photo(
             taken.votes.add(index, np.concatenate(shown_by_band))
     if clipped > MAX_CLIPPED_SHARE * trusted:
         taken.notes[
-            "lit pixels are clipped and left out, so highlights are missing. Use a shorter "
-            "exposure or a bracket."
+            "lit pixels are clipped: they only say how bright highlights are at least. Use a "
+            "shorter exposure or a bracket."
         ] += 1
     taken.notes.update(shot.photo.notes)
 
@@ -188,17 +198,23 @@ def _band(shot: _Shot, window: Window, limits: Sequence[SampleReservoir | None])
     usable = shot.photo.usable.ravel().take(view.pixel)
     keep = trusted & usable
     photo = shot.photo
-    tables, counts, faces = [], [], []
+    tables, clipped_tables, counts, faces = [], [], [], []
     for material, reservoir in zip(capture.materials, limits, strict=True):
         pixels = where[material.name]
-        rows = reached_rows(lighting, keep & inner_pixels(view, pixels, margins))
+        inner = inner_pixels(view, pixels, margins)
+        rows = reached_rows(lighting, keep & inner)
         counts.append(len(rows))
+        lost = reached_rows(lighting, trusted & ~usable & inner)
+        clipped_tables.append(
+            clipped_rows(view, lighting, photo.radiance, lost, shot.place, shot.white)
+        )
         limit = ALL if reservoir is None else reservoir.limit(shot.place)
         rows = rows_below(limit, view, lighting, photo.radiance, rows, shot.place)
         tables.append(sample_rows(view, lighting, photo.radiance, rows, shot.place, photo.noise))
         faces.append(view.face[pixels & wanted])
     return _Band(
         tables=tables,
+        clipped_tables=clipped_tables,
         counts=counts,
         faces=faces,
         seen=int(wanted.sum()),

@@ -25,8 +25,8 @@ class SampleTable:
     - curvature: (n,) float32 image-space mean curvature, 1/pixel, NaN where unknown.
     - weight: (n,) float32, how many samples the row represents where not all were kept, else 1.
     - response: (n, 3) float32, derivative of the recorded value by radiance: 1 unless a diagnosis
-      corrected the camera's response; 0 where a channel is clipped and its radiance was predicted
-      by the diagnosis.
+      corrected the camera's response; 0 where a channel is clipped: its radiance is a lower limit
+      (clipped.py), or was predicted by the diagnosis.
     """
 
     photo: NDArray[np.int16]

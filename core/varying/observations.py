@@ -7,12 +7,12 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..samples.clipped import white_of_clipped
 from .node_model import Shading
 from .surface_grid import SurfaceGrid
 from .surface_photo import MIN_COSINE, SurfacePhoto, bilinear_corners
 
 CHUNK = 1 << 17  # nodes projected at once, to limit memory
-WHITE_MARGIN = 0.99  # of the least radiance of a clipped channel: decoded values are rounded
 
 
 @dataclass(frozen=True)
@@ -68,18 +68,12 @@ class Observations:
 def observe(look: SurfacePhoto, photo: int, grid: SurfaceGrid) -> Observations:
     """The observations of all nodes that are visible, lit, and on reliable pixels of one photo,
     clipped ones included."""
-    white = _white(look)
+    white = white_of_clipped(look.radiance, look.labels.clipped == 0)
     parts = []
     for begin in range(0, len(grid), CHUNK):
         rows = np.arange(begin, min(begin + CHUNK, len(grid)))
         parts.append(_chunk(look, photo, white, grid.points(rows), grid.normals(rows), begin))
     return Observations.joined(parts)
-
-
-def _white(look: SurfacePhoto) -> float:
-    """The radiance from which a channel of the photo is clipped."""
-    brightest = look.radiance[look.labels.clipped > 0].max(axis=1, initial=0.0)
-    return WHITE_MARGIN * float(brightest.min(initial=np.inf))
 
 
 def _chunk(

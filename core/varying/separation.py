@@ -28,6 +28,7 @@ from .choice import (
 from .hierarchy import near_black
 from .node_model import DIFFUSE, GLOSS, SPECULAR, NodeModel
 from .observations import Observations
+from .split import MIN_BODY_SHARE
 from .varying_surface import ALL_VARIATIONS
 
 Array = NDArray[np.floating]
@@ -65,12 +66,17 @@ class Division:
 
 
 def features(model: NodeModel, points: NDArray[np.float64], parameters: Array) -> Array:
-    """(n, 3) logarithms of the ratio of specular and diffuse part (0 where the model has almost no
-    diffuse part), of the roughness and of the specular part, averaged over neighbours. points:
-    (n, 3) of the nodes; parameters: (n, 10)."""
-    ratio = parameters[:, SPECULAR] - parameters[:, DIFFUSE].mean(axis=1)
-    if model.mostly_specular:
-        ratio = np.zeros_like(ratio)
+    """(n, 3) logarithms of the ratio of specular and diffuse part, of the roughness and of the
+    specular part, averaged over neighbours. points: (n, 3) of the nodes; parameters: (n, 10).
+
+    The ratio is that of the light they reflect, with MIN_BODY_SHARE of the specular part added to
+    the diffuse part: less than that, as of a metal, is noise. One BRDF of metal and paint can be
+    that of the metal; the diffuse part of the paint's nodes is then many times larger.
+    """
+    share = model.split.share
+    specular = (1 - share) * np.exp(parameters[:, SPECULAR])
+    diffuse = share * np.exp(parameters[:, DIFFUSE].mean(axis=1))
+    ratio = np.log(specular) - np.log(diffuse + MIN_BODY_SHARE * specular)
     each = np.stack([ratio, parameters[:, GLOSS], parameters[:, SPECULAR]], axis=1)
     near = cKDTree(points).query(points, k=min(NEIGHBOURS, len(points)))[1]
     averaged: Array = each[near.reshape(len(points), -1)].mean(axis=1)

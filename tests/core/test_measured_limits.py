@@ -231,6 +231,7 @@ def model_of(photos: int, cells: int, basis: Basis) -> CellModel:
             np.zeros((cells, 3)),
             np.ones(cells),
             np.zeros(cells),
+            np.zeros((cells, 3)),
         ),
         basis,
     )

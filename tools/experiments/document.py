@@ -31,7 +31,8 @@ X_LABELS = {
     "stereo tool": "mesh made by",
 }
 SUMMARISED = (
-    "check", "goals", "by scene", "priors", "proposed photo", "models", "models by material",
+    "check", "goals", "by scene", "priors", "clipped", "proposed photo", "models",
+    "models by material",
 )  # fmt: skip
 Section = Callable[[list[Record]], str]
 
@@ -45,6 +46,7 @@ def sections() -> dict[str, tuple[str, Section]]:
         "by material": ("goals", lambda r: goal_table.by_material(r, _present(r))),
         "in-basis": ("goals", goal_table.in_basis),
         "priors": ("goals", goal_table.priors),
+        "clipped": ("clipped", tables.clipped),
         "proposed photo": ("proposed_photo", tables.proposed_photo),
         "polar": ("ablation", _polar),
         "ablation": ("ablation", _ablation),

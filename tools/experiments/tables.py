@@ -143,3 +143,28 @@ def proposed_photo(records: list[Record]) -> str:
         "lamp from camera",
     ]  # fmt: skip
     return table(head, rows)
+
+
+def clipped(records: list[Record]) -> str:
+    """Compare fits of clipped photos: one row per scene and kind of fit."""
+    rows = []
+    for scene in distinct(records, "scene"):
+        for kind in distinct(records, "estimator"):
+            here = where(records, scene=scene, estimator=kind)
+            peaks = values(here, "peak")
+            within = sum(0.5 <= x <= 2 for x in peaks)
+            rows.append(
+                [
+                    scene, kind,
+                    f"{np.median(peaks):.2f} ({min(peaks):.2f} … {max(peaks):.2f})",
+                    f"{within} of {len(peaks)}",
+                    f"{100 * median(here, 'inside'):.0f} %",
+                    number(median(here, "log_rms")),
+                    number(median(here, "cube_root")),
+                ]
+            )  # fmt: skip
+    head = [
+        "scene", "fit", "peak, fit ÷ truth", "within 0.5 … 2",
+        "truth in the 90 % interval at the peak", "log RMS", "cube root",
+    ]  # fmt: skip
+    return table(head, rows)

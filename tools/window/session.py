@@ -250,6 +250,13 @@ def fit_and_check() -> Iterator[float]:
     yield from until_done()
     yield 10.0  # shaders
     photograph("9_fitted")
+    view = area_of("VIEW_3D").spaces.active.region_3d
+    before = view.view_perspective
+    press("patina.show_proposed_photo")
+    yield REDRAW_DELAY
+    photograph("9_proposed_photo")
+    assert "Proposed Lamp" in bpy.data.objects
+    view.view_perspective = before
     yield from views()
     press("patina.check", "INVOKE_DEFAULT")
     yield from until_done()

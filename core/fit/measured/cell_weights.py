@@ -26,9 +26,10 @@ REGIONS = (len(REGION_THETA_H) + 1) * COLUMNS
 
 def cells_per_observation(cells: AngleCells) -> NDArray[np.float64]:
     """(m,) for each cell, how many cells of its region together weigh as much as one independent
-    cell (at least 1)."""
+    cell (at least 1). Cells with clipped samples are not counted: most of them only set a limit."""
     region = region_of(cells.angles)
-    return np.maximum(np.bincount(region)[region] / CELLS_PER_REGION, 1.0)
+    counted = 1.0 - cells.clipped.max(axis=1)
+    return np.maximum(np.bincount(region, counted)[region] / CELLS_PER_REGION, 1.0)
 
 
 def region_of(angles: Angles) -> NDArray[np.intp]:

@@ -33,7 +33,8 @@ class AngleCells:
     2π). reflected: (m, 3) mean of L/E (= ρ·cos θi, blurred by the normals' errors), scaled to the
     cosine at the mean angles. noise: (m, 3) variance of L/E of one sample by the photo's noise,
     on the same scale. bright: (m,) L/E of the bright parts of the photo. normal_error: (m,)
-    radians, RMS error of the normals along each tangent.
+    radians, RMS error of the normals along each tangent. clipped: (m, 3) fraction of the samples
+    that are clipped: above 0, ``reflected`` is a lower limit of the mean.
     """
 
     photo: NDArray[np.int16]
@@ -43,6 +44,7 @@ class AngleCells:
     noise: NDArray[np.float64]
     bright: NDArray[np.float64]
     normal_error: NDArray[np.float64]
+    clipped: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.photo)
@@ -57,23 +59,28 @@ class AngleCells:
             self.noise[which],
             self.bright[which],
             self.normal_error[which],
+            self.clipped[which],
         )
 
 
 def gather(
-    table: SampleTable, normal_error: NDArray[np.floating] | float, width_factor: float = 1.0
+    table: SampleTable,
+    normal_error: NDArray[np.floating] | float,
+    width_factor: float = 1.0,
+    clipped: NDArray[np.bool_] | None = None,
 ) -> AngleCells:
     """The cells of a table.
 
     normal_error: (n,) radians along each tangent, of each sample, or one number for all.
     width_factor: factor on the width of the cells; it grows until there are at most MAX_CELLS.
+    clipped: (n, 3) whether the radiance is a lower limit; None where no sample is clipped.
     """
     phi = unfolded_phi_d(table)
     key = _keys(table, phi, width_factor)
     _, where, count = np.unique(key, return_inverse=True, return_counts=True)
     m = len(count)
     if m > MAX_CELLS:
-        return gather(table, normal_error, width_factor * 1.3)
+        return gather(table, normal_error, width_factor * 1.3, clipped)
     where = where.ravel()
 
     def mean(values: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -95,7 +102,10 @@ def gather(
         error = np.full(m, float(normal_error))
     photo = table.photo[first]
     bright = bright_parts(light.mean(axis=1), table.photo)[photo]
-    return AngleCells(photo, count, angles, reflected, noise, bright, error)
+    share = np.zeros((m, 3))
+    if clipped is not None:
+        share = np.stack([mean(clipped[:, c].astype(float)) for c in range(3)], axis=1)
+    return AngleCells(photo, count, angles, reflected, noise, bright, error, share)
 
 
 def unfolded_phi_d(table: SampleTable) -> NDArray[np.float64]:

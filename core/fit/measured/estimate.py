@@ -91,14 +91,24 @@ class MeasuredFit:
 
 
 def fit_measured(
-    table: SampleTable, basis: Basis, settings: MeasuredSettings | None = None
+    table: SampleTable,
+    basis: Basis,
+    settings: MeasuredSettings | None = None,
+    clipped: SampleTable | None = None,
 ) -> MeasuredFit:
-    """Fit one material. Raises FitError where there are too few samples."""
-    return drained(measured_steps(table, basis, settings))
+    """Fit one material. Raises FitError where there are too few samples.
+
+    clipped: samples with a clipped channel, in addition: where their response is 0, the radiance
+    is a lower limit.
+    """
+    return drained(measured_steps(table, basis, settings, clipped))
 
 
 def measured_steps(
-    table: SampleTable, basis: Basis, settings: MeasuredSettings | None = None
+    table: SampleTable,
+    basis: Basis,
+    settings: MeasuredSettings | None = None,
+    clipped: SampleTable | None = None,
 ) -> Generator[float, None, MeasuredFit]:
     """fit_measured as a generator: yields the fraction done and returns the fit."""
     s = settings or MeasuredSettings()
@@ -108,11 +118,13 @@ def measured_steps(
             f"{len(table)} lit samples; expected at least {MIN_SAMPLES}; "
             "add photos or light, or enlarge the masks"
         )
+    samples = len(table)
     k = min(s.components or basis.count, basis.count)
     prior = CoefficientPrior.of(basis, k)
     deviation = float(np.radians(s.normal_deviation))
     yield 0.0
-    model = CellModel.of(gather(table, deviation), basis)
+    table, limited = _with_clipped(table, clipped)
+    model = CellModel.of(gather(table, deviation, clipped=limited), basis)
     found, scale = solve_with_scale(model, prior, s.floor)
     patches = Patches.of_points(table.point) if s.rounds else None
     for done in range(s.rounds if patches is not None else 0):
@@ -121,10 +133,11 @@ def measured_steps(
         assert patches is not None
         # a BRDF unlike the measured materials is uncertain: normals must not absorb its errors
         tolerance = TOLERANCE * float(np.sqrt(min(scale, MAX_TOLERANCE_SCALE)))
-        normals = refine_normals(table, patches, brdf, deviation, tolerance)
+        some = None if limited is None else limited.any(axis=1)
+        normals = refine_normals(table, patches, brdf, deviation, tolerance, some)
         deviation = normals.deviation
         yield _fraction(done + 0.5)
-        model = CellModel.of(gather(normals.table, normals.error), basis)
+        model = CellModel.of(gather(normals.table, normals.error, clipped=limited), basis)
         before = brdf.values
         found, scale = solve_again(model, prior, s.floor, found, scale)
         change = LogTable.of(basis, found.coefficients).values - before
@@ -138,17 +151,30 @@ def measured_steps(
     found = solve(model, prior, s.floor, found.coefficients)
     covariance = found.covariance()
     shrinkage = shrinkage_step(basis, covariance)
+    unlimited = found.covariance_of_measured()
     return MeasuredFit(
         brdf=PrincipalBRDF(basis, found.coefficients + shrinkage),
-        samples=len(table),
+        samples=samples,
         normal_deviation=float(np.degrees(deviation)),
         gains=found.gains,
         extrapolation=_anchoring_text(s.trust),
         without={p: PrincipalBRDF(basis, c + shrinkage) for p, c in found.without.items()},
-        covariance=covariance,
+        covariance=covariance if unlimited is None else unlimited,
         prior_scale=scale,
         cells_per_region=np.bincount(region_of(model.cells.angles), minlength=REGIONS),
     )
+
+
+def _with_clipped(
+    table: SampleTable, clipped: SampleTable | None
+) -> tuple[SampleTable, NDArray[np.bool_] | None]:
+    """(the samples and the clipped ones, (n, 3) whether the radiance is a lower limit or None)."""
+    clipped = None if clipped is None else _finite(clipped)
+    if clipped is None or not len(clipped):
+        return table, None
+    none = np.zeros((len(table), 3), bool)
+    limited = np.concatenate([none, clipped.response == 0])
+    return SampleTable.concatenate([table, clipped]), limited
 
 
 def _finite(table: SampleTable) -> SampleTable:

@@ -74,8 +74,9 @@ class GrazingPrior:
 def extrapolated(model: CellModel, coefficients: NDArray[np.float64]) -> GrazingPrior:
     """Pseudo-observations beyond the samples of a model's cells, extrapolated from the BRDF with
     these coefficients (3, k)."""
-    edge = sampled_edge(model.cells)
-    return GrazingPrior.of(fit_lobes(model.cells), model.basis, coefficients, edge)
+    cells = model.cells.select(~model.cells.clipped.any(axis=1))
+    edge = sampled_edge(cells)
+    return GrazingPrior.of(fit_lobes(cells), model.basis, coefficients, edge)
 
 
 def sampled_edge(cells: AngleCells) -> float:

@@ -51,12 +51,14 @@ def refine_normals(
     brdf: LogTable,
     deviation: float,
     tolerance: float = TOLERANCE,
+    clipped: NDArray[np.bool_] | None = None,
 ) -> RefinedNormals:
     """Refine the normals of samples.
 
     scanned: samples with the scan's normals. brdf: log table of the BRDF. deviation: radians along
     each tangent, expected standard deviation of the scan's normals. tolerance: log-relative
-    standard deviation of the BRDF itself.
+    standard deviation of the BRDF itself. clipped: (n,) samples whose radiance is a lower limit:
+    they count only where the BRDF is darker; None where there are none.
     """
     grey = brdf.grey()
     normal = scanned.normal.astype(np.float64)
@@ -69,6 +71,8 @@ def refine_normals(
         weight = weights_of_squares((misfit / tolerance) ** 2) / tolerance**2
         # samples of one patch and photo share the model's error: together they count as one
         weight = weight / _samples_sharing_error(scanned.photo, patches)
+        if clipped is not None:
+            weight[clipped] = 0.0
         turn, left, scan_deviation = _solve(patches, slope, misfit, weight, turn, deviation)
         size = np.linalg.norm(turn, axis=1, keepdims=True)
         turn = turn * np.minimum(1.0, MAX_ROTATION / np.maximum(size, 1e-12))

@@ -4,7 +4,8 @@ without each photo.
 Gauss–Newton on the residuals in the mapped space. The weights are computed anew at every step from
 each cell's uncertainty: the noise model of a pixel (core/noise) divided by the number of samples,
 the error of the basis, and the normals' error times the slope of the BRDF. A Student-t error model
-limits the influence of outliers, such as shadows that the mesh does not explain.
+limits the influence of outliers, such as shadows that the mesh does not explain. A cell with
+clipped samples is a censored observation: it counts only where the prediction is below its limit.
 """
 
 from __future__ import annotations
@@ -37,17 +38,27 @@ MEAN_GAIN_DEVIATION = 0.005
 class Posterior:
     """coefficients: (3, k), the mode. precision: at the mode, of the coefficients, channel after
     channel, and of the photos' log gains. gains: photo → gain. without: photo → (3, k) coefficients
-    without that photo."""
+    without that photo. measured: the precision without cells with clipped samples, None where there
+    are none: these say how large the BRDF is at least, and nothing about how much larger it can
+    be."""
 
     coefficients: NDArray[np.float64]
     precision: Arrow
     gains: dict[int, float]
     without: dict[int, NDArray[np.float64]]
+    measured: Arrow | None
 
     def covariance(self) -> NDArray[np.float64]:
         """(3, k, k) of each channel's coefficients, the gains integrated out."""
+        return self._channels(self.precision)
+
+    def covariance_of_measured(self) -> NDArray[np.float64] | None:
+        """The same without cells with clipped samples; None where there are none."""
+        return None if self.measured is None else self._channels(self.measured)
+
+    def _channels(self, precision: Arrow) -> NDArray[np.float64]:
         k = self.coefficients.shape[1]
-        full = np.linalg.inv(self.precision.marginal()).reshape(3, k, 3, k)
+        full = np.linalg.inv(precision.marginal()).reshape(3, k, 3, k)
         return np.stack([full[c, :, c] for c in range(3)])
 
 
@@ -62,7 +73,8 @@ def solve(
     """The posterior of a model's coefficients, by Gauss–Newton from ``start`` (3, k), or from 0.
 
     floor: relative standard deviation of the basis' error far from black. leave_out: compute the
-    coefficients without each photo too. Cells are weighted by region (cell_weights.py).
+    coefficients without each photo and the precision without clipped samples too. Cells are
+    weighted by region (cell_weights.py).
     """
     k = len(prior.mean)
     crowd = cells_per_observation(model.cells)[:, None]
@@ -90,6 +102,11 @@ def solve(
         state = state + step * min(1.0, MAX_STEP / max(largest_change, 1e-12))
         if largest_change < CONVERGED:
             break
+    measured, limited = None, model.cells.clipped > 0
+    if leave_out and limited.any():
+        known = np.where(limited, 0.0, weight)
+        each = (_equations(prediction, residual, known, own) for own in cells)
+        measured, _ = _summed(each, prior_precision, common)
     without = {}
     if leave_out and p > 1:
         for i, (photo, own) in enumerate(zip(photos.tolist(), cells, strict=True)):
@@ -104,6 +121,7 @@ def solve(
             int(photo): float(np.exp(g)) for photo, g in zip(photos, state[3 * k :], strict=True)
         },
         without=without,
+        measured=measured,
     )
 
 
@@ -121,6 +139,7 @@ def _residuals(
         + _of_pixel(model, level) / count
     )
     weight = weights_of_squares(residual**2 / variance) / variance
+    weight[(model.cells.clipped > 0) & (residual < 0)] = 0.0
     return residual, weight
 
 

@@ -1,0 +1,139 @@
+"""Clipped samples of a fit are lower limits: the peak neither vanishes nor is it made up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from patina.core.angles import Angles
+from patina.core.basis import default_basis
+from patina.core.capture import read_capture
+from patina.core.concurrency.steps import drained
+from patina.core.fit.measured import MeasuredFit, MeasuredSettings, fit_measured
+from patina.core.fit.measured_result import MeasuredResult
+from patina.core.geometry import RayScene
+from patina.core.inputs import capture_data
+from patina.core.inputs.lights import find_lights
+from patina.core.inputs.photos import LitPhotos
+from patina.core.jobs import FitJob
+from patina.core.jobs.sampling import take_samples
+from patina.core.samples import SampleTable
+from patina.core.samples.clipped import WHITE_MARGIN, white_of_clipped
+from tests import make_capture as made
+
+WHITE = 1.2  # radiance at which the photos are clipped; the highlights reach 2.5
+SETTINGS = MeasuredSettings(rounds=0)
+PEAK = Angles(*np.radians([[0.5, 1.0, 2.0], [20.0, 25.0, 30.0], [90.0, 60.0, 120.0]]))
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A glossy ball (Blinn, not of the basis) whose photos are clipped at WHITE."""
+    path = made.make_capture(tmp_path_factory.mktemp("clipped"), photos=6)
+    text = path.read_text()
+    for number in range(1, 7):
+        line = f'file = "lit_{number}.exr"'
+        text = text.replace(line, f"{line}\nsaturation = {WHITE}")
+    path.write_text(text)
+    return path
+
+
+@pytest.fixture(scope="module")
+def tables(path: Path) -> tuple[SampleTable, SampleTable]:
+    """(measured, clipped) samples."""
+    capture = read_capture(path)
+    scan = capture_data.open_scan(capture)
+    photos = LitPhotos.open(capture)
+    lights = find_lights(capture, scan, photos)
+    taken = drained(take_samples(capture, scan, RayScene.build(scan.mesh), photos, lights))
+    (name,) = taken.kept
+    return taken.kept[name].table(), taken.clipped[name].table()
+
+
+@pytest.fixture(scope="module")
+def fits(tables: tuple[SampleTable, SampleTable]) -> dict[str, MeasuredFit]:
+    measured, clipped = tables
+    basis = default_basis()
+    return {
+        "dropped": fit_measured(measured, basis, SETTINGS),
+        "limits": fit_measured(measured, basis, SETTINGS, clipped),
+    }
+
+
+def truth(angles: Angles) -> np.ndarray:
+    """(n, 3) ρ of the ball: Blinn's lobe depends on θh alone."""
+    lobe = np.cos(angles.theta_h) ** 60
+    return np.array([0.16, 0.05, 0.04]) + 0.8 * lobe[:, None]
+
+
+def test_clipped_channels_are_those_at_white(tables: tuple[SampleTable, SampleTable]) -> None:
+    measured, clipped = tables
+    assert measured.read.all() and not clipped.read.any()
+    assert 0.02 < len(clipped) / len(measured) < 0.3
+    limit = clipped.response == 0
+    # pixels within 1 % of the white are clipped, and values are rounded
+    assert clipped.radiance[limit].min() > 0.97 * WHITE
+    assert clipped.radiance[~limit].max() < WHITE
+    assert measured.radiance.max() < WHITE
+    both = set(zip(measured.photo.tolist(), measured.pixel.tolist(), strict=True))
+    assert both.isdisjoint(zip(clipped.photo.tolist(), clipped.pixel.tolist(), strict=True))
+
+
+def test_white_is_that_of_the_least_clipped_pixel() -> None:
+    radiance = np.zeros((2, 2, 3), np.float32)
+    radiance[0] = [[0.2, 1.0, 0.1], [2.0, 0.1, 0.1]]
+    usable = np.array([[False, False], [True, True]])
+    assert white_of_clipped(radiance, usable) == pytest.approx(WHITE_MARGIN)
+    assert white_of_clipped(radiance, np.ones((2, 2), bool)) == np.inf
+    radiance[1, 0] = 0  # clipped in all exposures of a bracket: nothing is known
+    usable[1, 0] = False
+    assert white_of_clipped(radiance, usable) == pytest.approx(WHITE_MARGIN)
+
+
+def test_limits_bring_the_peak_back(fits: dict[str, MeasuredFit]) -> None:
+    true = truth(PEAK)
+    ratio = {name: fit.brdf.evaluate(PEAK) / true for name, fit in fits.items()}
+    error = {name: np.abs(np.log(values)).mean() for name, values in ratio.items()}
+    assert error["limits"] < 0.8 * error["dropped"]
+    assert (ratio["limits"] > 0.5).all() and (ratio["limits"] < 2.0).all()
+
+
+def test_interval_at_the_peak_contains_the_truth(fits: dict[str, MeasuredFit]) -> None:
+    low, high = MeasuredResult.of(fits["limits"]).interval(PEAK)
+    true = truth(PEAK)
+    assert np.mean((low <= true) & (true <= high)) >= 0.85
+
+
+def test_limit_below_the_fit_changes_nothing(
+    tables: tuple[SampleTable, SampleTable], fits: dict[str, MeasuredFit]
+) -> None:
+    """A limit that the BRDF exceeds anyway is no observation."""
+    measured, _ = tables
+    rows = np.arange(0, len(measured), 50)
+    known = measured.select(np.setdiff1d(np.arange(len(measured)), rows))
+    low = measured.select(rows)
+    low = replace(
+        low,
+        radiance=np.full_like(low.radiance, 1e-3),
+        rho=np.full_like(low.rho, 1e-3),
+        response=np.zeros_like(low.response),
+    )
+    without = fit_measured(known, default_basis(), SETTINGS)
+    with_limits = fit_measured(known, default_basis(), SETTINGS, low)
+    change = with_limits.brdf.evaluate(PEAK) / without.brdf.evaluate(PEAK)
+    # cells in which some samples are limits set a lower limit as a whole
+    assert np.abs(np.log(change)).max() < 0.3
+
+
+@pytest.mark.slow
+def test_fit_job_uses_the_limits(path: Path) -> None:
+    job = FitJob(read_capture(path), portable=False)
+    job.drain()
+    assert job.result is not None
+    (material,) = job.result.materials
+    ratio = material.fit.brdf.evaluate(PEAK) / truth(PEAK)
+    assert (ratio > 0.4).all() and (ratio < 2.5).all()
+    assert any("are clipped" in note for note in job.result.notes)
