@@ -44,6 +44,7 @@ from .core.jobs.varying.variation_estimator import MODES
 from .core.jobs.varying.varying_job import VaryingJob
 from .core.output_folder import check_out, staged_folder
 from .core.predict.errors import PhotoErrors
+from .core.proposed_photo import ProposedPhoto
 from .core.report import diagnosis_json, result_json, write_report
 from .core.samples import SampleTable
 from .core.varying import storage
@@ -61,6 +62,7 @@ __all__ = [
     "PatinaError",
     "PhotoErrors",
     "PhotoPrediction",
+    "ProposedPhoto",
     "Step",
     "diagnose",
     "export",
@@ -114,6 +116,12 @@ class FitResult:
     def notes(self) -> tuple[str, ...]:
         """Sentences on what was read, assumed and ignored."""
         return self.details.notes
+
+    @property
+    def proposed_photo(self) -> ProposedPhoto | None:
+        """The photo that would say most about the materials, with ``camera``, ``towards`` (unit
+        direction to the lamp) and ``sentence``; None where no photo would say much."""
+        return self.details.proposed_photo
 
     def material(self, name: str) -> MaterialResult:
         """Return the material with this name. Raises InputError if there is none."""
