@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.photos.proposed_photo import show_proposed_photo
+from ..scene.photos.proposed_photo import camera_of_proposed_photo, show_proposed_lamp
 from ..scene.session.scene_properties import capture_path, stored_result
 
 
@@ -24,15 +24,24 @@ class PATINA_OT_show_proposed_photo(bpy.types.Operator):
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        capture = capture_path(context.scene)
+        capture, objects = capture_path(context.scene), context.view_layer.objects
         photo = (stored_result(capture) or {})["proposed_photo"]
-        shown = show_proposed_photo(context.scene, capture, photo)
-        if not shown:
-            self.report({"ERROR"}, f"The scene has no camera {photo['camera']} of the scan")
+        camera = camera_of_proposed_photo(context.scene, capture, photo)
+        if camera is None or camera.name not in objects:
+            self.report(
+                {"ERROR"},
+                f"The camera {photo['camera']} of the scan is not in this view layer; include its "
+                "collection, or import the capture again",
+            )
             return {"CANCELLED"}
-        for thing in context.view_layer.objects:
-            thing.select_set(thing in shown or thing == context.scene.patina.mesh)
-        context.view_layer.objects.active = shown[0]
+        shown = {
+            camera,
+            show_proposed_lamp(context.scene, capture, photo),
+            context.scene.patina.mesh,
+        }
+        for thing in objects:
+            thing.select_set(thing in shown)
+        objects.active = camera
         if context.area is not None and context.area.type == "VIEW_3D":
             context.space_data.region_3d.view_perspective = "PERSP"
             bpy.ops.view3d.view_selected()

@@ -32,13 +32,15 @@ class LitPhoto:
 
     radiance: (h, w, 3) float32 linear, divided by the exposure. usable: (h, w) not clipped; in a
     bracket, not clipped in at least one exposure. noise: of the radiance, None where it was not
-    estimated. notes: how the pixels were read, sentences.
+    estimated. notes: how the pixels were read, sentences. mixed: whether a matrix of primaries
+    mixed the channels.
     """
 
     radiance: NDArray[np.float32]
     usable: NDArray[np.bool_]
     noise: PixelNoise | None = None
     notes: tuple[str, ...] = ()
+    mixed: bool = False
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,8 @@ class LitPhotos:
                 if exposure != 1.0:
                     radiance /= np.float32(exposure)
                 curve_note = () if one.info.levels is None else (one.info.sentence,)
-                return LitPhoto(radiance, ~one.clipped, found, (*curve_note, *one.info.notes))
+                notes = (*curve_note, *one.info.notes)
+                return LitPhoto(radiance, ~one.clipped, found, notes, one.info.mixed)
             merged = merge_bracket(
                 [partial(read_photo, file, curve, photo.saturation) for file in photo.files],
                 self.exposures[place],

@@ -131,6 +131,19 @@ def with_portable(
     return replace(material, portable=found, warnings=warnings)
 
 
+def with_proposed_photo(
+    result: CaptureResult, start: float
+) -> Generator[Step, None, CaptureResult]:
+    """The result with the photo that would say most about its materials. start: fraction of the job
+    that is done before this step."""
+    fits = [material.fit for material in result.materials]
+    found = yield from in_background(
+        lambda: proposed_photo(result.scan, result.rays, result.lights, fits, result.face_material),
+        Step("choosing the next photo", start),
+    )
+    return replace(result, proposed_photo=found)
+
+
 class FitJob(Job):
     """Fit every material of a capture; ``result`` is set when the job is done.
 
@@ -138,7 +151,8 @@ class FitJob(Job):
     the embedded basis). prepare: called with the scan after it is read, to add face attributes
     that no file has. threads: number of threads that sample the photos (None: one per core); the
     result does not depend on it. keep: whether ``samples`` keeps the samples that each material
-    was fitted to, by material name. portable: whether to fit the portable forms too.
+    was fitted to, by material name. portable: whether to fit the portable forms and to propose
+    the next photo, too.
     """
 
     def __init__(
@@ -234,15 +248,9 @@ class FitJob(Job):
                 else material
                 for material, large in zip(results, odd, strict=True)
             ]
-        assigning = Step("assigning materials to the mesh", 1 - ASSIGNING / self._times.total)
-        yield assigning
-        assigned = face_materials(capture, scan, taken.votes)
-        fits = [material.fit for material in results]
-        following = yield from in_background(
-            lambda: proposed_photo(scan, rays, lights, fits, assigned),
-            replace(assigning, stage="choosing the next photo"),
-        )
-        self.result = CaptureResult(
+        end = 1 - ASSIGNING / self._times.total
+        yield Step("assigning materials to the mesh", end)
+        result = CaptureResult(
             capture=capture,
             scan=scan,
             photos=photos,
@@ -258,9 +266,11 @@ class FitJob(Job):
             rays=rays,
             basis=basis,
             materials=tuple(results),
-            face_material=assigned,
-            proposed_photo=following,
+            face_material=face_materials(capture, scan, taken.votes),
         )
+        if self.portable:
+            result = yield from with_proposed_photo(result, end)
+        self.result = result
 
     def _take_samples(
         self, scan: Scan, rays: RayScene, photos: LitPhotos, lights: Lights
@@ -279,6 +289,11 @@ class FitJob(Job):
         """The samples that a material is fitted to, from all of its samples. Subclasses override
         it."""
         return table
+
+    def limits_to_fit(self, index: int, clipped: SampleTable | None) -> SampleTable | None:
+        """The clipped samples that a material is fitted to, from all of them. Subclasses override
+        it."""
+        return clipped
 
     def sinks(self, material: str) -> Sequence[SampleSink]:
         """The sinks that get all samples of a material, in addition to the reservoir."""
@@ -358,7 +373,8 @@ class FitJob(Job):
         samples_to_fit = yield from in_background(
             lambda: self.samples_to_fit(index, table), Step(f"fitting {name}", start)
         )
-        steps = estimate(samples_to_fit, basis, self.capture, name, judge, clipped)
+        limits = self.limits_to_fit(index, clipped)
+        steps = estimate(samples_to_fit, basis, self.capture, name, judge, limits)
         while True:
             try:
                 stage, done = next(steps)

@@ -31,7 +31,7 @@ def proposed_photo(
     materials = []
     for place, fit in enumerate(fits):
         faces = np.flatnonzero(face_material == place)
-        if isinstance(fit, MeasuredResult) and len(faces):
-            surface = SurfacePoints.of(scan.mesh, faces)
+        surface = SurfacePoints.of(scan.mesh, faces)
+        if isinstance(fit, MeasuredResult) and surface is not None:
             materials.append(MaterialToPhotograph(surface, DirectionUncertainty.of(fit)))
     return propose(rays, scan.cameras, list(lights.by_name.values()), materials)

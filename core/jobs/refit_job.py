@@ -25,7 +25,7 @@ from ..samples import SampleTable
 from .acceptance import Refit, Rejection, evidence_against, joint_log_growth
 from .applied_effects import AppliedEffect
 from .diagnose_job import DiagnoseJob, normal_deviation
-from .fit_job import CaptureResult, MaterialResult, with_portable
+from .fit_job import CaptureResult, MaterialResult, with_portable, with_proposed_photo
 from .fit_times import fit_seconds
 from .highlight_deconvolution_passes import fit_with_deconvolution
 
@@ -132,7 +132,8 @@ class RefitJob(Job):
         for index, material in enumerate(materials if self.portable else ()):
             at = start + index * share
             done[index] = yield from with_portable(material, at, self.checked.fit.threads)
-        self.result = replace(result, materials=tuple(done))
+        found = replace(result, materials=tuple(done))
+        self.result = found if not self.portable else (yield from with_proposed_photo(found, 1.0))
 
     def _with(
         self,

@@ -25,7 +25,7 @@ from ..inputs.material_pixels import material_pixels
 from ..inputs.photos import LitPhoto, LitPhotos
 from ..light import Light
 from ..samples import SampleReservoir, SampleSink, SampleTable
-from ..samples.clipped import clipped_rows, white_of_clipped
+from ..samples.clipped import White, clipped_rows
 from ..samples.face_votes import FaceVotes
 from ..samples.reservoir import ALL
 from ..samples.take import (
@@ -48,7 +48,7 @@ class PhotoSamples:
     """The samples of all photos.
 
     kept: a uniform random subset of each material's samples. clipped: the same of its clipped
-    samples (take.clipped_rows). counts: {material: (photos,) number
+    samples (clipped.clipped_rows). counts: {material: (photos,) number
     of samples}. marked: {material: number of surface pixels that its masks mark}. votes: material
     votes of the faces, empty where there is one material. notes: {sentence: number of photos it
     applies to}. seen, lit: (photos,) pixels that see the surface, and those of them in the light.
@@ -66,8 +66,7 @@ class PhotoSamples:
 
 @dataclass(frozen=True)
 class _Shot:
-    """One photo and everything that its bands need. white: the radiance from which a channel is
-    clipped."""
+    """One photo and everything that its bands need. white: where the photo is clipped."""
 
     capture: Capture
     scan: Scan
@@ -76,7 +75,7 @@ class _Shot:
     place: int
     lines: PixelRays
     photo: LitPhoto
-    white: float
+    white: White
     masks: Mapping[str, NDArray[np.bool_]]
 
 
@@ -128,7 +127,7 @@ def take_samples(
         masks = capture_data.photo_masks(capture, place)
         photo = photos.read_with_noise(place)
         light = lights.of(capture, place)
-        white = white_of_clipped(photo.radiance, photo.usable)
+        white = White.of(photo.radiance, photo.usable, photo.mixed)
         return _Shot(capture, scan, rays, light, place, PixelRays.of(camera), photo, white, masks)
 
     with thread_pool(workers) as pool:
@@ -205,9 +204,10 @@ def _band(shot: _Shot, window: Window, limits: Sequence[SampleReservoir | None])
         rows = reached_rows(lighting, keep & inner)
         counts.append(len(rows))
         lost = reached_rows(lighting, trusted & ~usable & inner)
-        clipped_tables.append(
-            clipped_rows(view, lighting, photo.radiance, lost, shot.place, shot.white)
+        bounds = clipped_rows(
+            view, lighting, photo.radiance, lost, shot.place, shot.white, photo.noise
         )
+        clipped_tables.append(bounds)
         limit = ALL if reservoir is None else reservoir.limit(shot.place)
         rows = rows_below(limit, view, lighting, photo.radiance, rows, shot.place)
         tables.append(sample_rows(view, lighting, photo.radiance, rows, shot.place, photo.noise))

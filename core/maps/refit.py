@@ -99,6 +99,10 @@ class PaintlessFitJob(FitJob):
         """The samples of a material with the colour variation removed."""
         return self.paint.removed(index, table)
 
+    def limits_to_fit(self, index: int, clipped: SampleTable | None) -> None:
+        """None: what the colour variation has to do with a lower limit is not known."""
+        return None
+
 
 def levels_without_paint(
     capture: Capture, basis: Basis, paint: Paint, tables: Sequence[SampleTable]

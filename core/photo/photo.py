@@ -28,7 +28,8 @@ class PhotoInfo:
     kind: 'jpeg', 'tiff', 'png', 'openexr', 'hdr' or 'raw'; transfer: the curve used; reason: why,
     in a sentence; levels: number of codes of an integer format (256, 65536), None for floats;
     saturation: largest linear pixel value of the file, None where unknown; white_balance:
-    multipliers applied to a RAW's R, G, B; notes: sentences for the user.
+    multipliers applied to a RAW's R, G, B; notes: sentences for the user; mixed: whether a matrix
+    of primaries mixed the channels.
     """
 
     kind: str
@@ -38,6 +39,7 @@ class PhotoInfo:
     saturation: float | None = None
     white_balance: tuple[float, float, float] | None = None
     notes: tuple[str, ...] = ()
+    mixed: bool = False
 
     @property
     def sentence(self) -> str:
@@ -130,6 +132,7 @@ def _decode(image: OpenImage, transfer: Transfer, saturation: float | None) -> P
         levels=None if table is None else len(table),
         saturation=saturation if table is None else float(table[-1].min()),
         notes=says.notes + _more_pages(image, part),
+        mixed=says.matrix is not None,
     )
     return Photo(light, bright, dark, info)
 
@@ -188,5 +191,6 @@ def _raw(path: Path, transfer: Transfer) -> Photo:
             *found.notes,
             f"the sensor saturates at {found.saturation:g} above black; this is scaled to 1.0.",
         ),
+        mixed=found.matrix is not None,
     )
     return Photo(light, found.clipped, dark, info)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..angles.vectors import tangents
 from ..geometry import RayScene
 from ..geometry.view import cast_shadow
 from ..light import Light, MountedLight
@@ -19,11 +20,13 @@ MAX_CAMERAS = 40  # of the scan, as different as possible
 LAMPS = 160  # directions on the sphere, 16° apart
 POINTS = 1500  # drawn on the surface of each material
 MIN_COSINE = 0.17  # of light and view to the normal (80°): beyond, samples say little
-MIN_TILT = 0.2  # length of the mean of the cameras' directions from which they tell where up is
+MAX_FACES = 1_000_000  # points are drawn on so many at random where a material has more
+MIN_TILT = 0.2  # length of the mean of the cameras' directions from which it tells where up is
 FAR = 1e6  # scan units, of a lamp that counts as infinitely far
 EDGE = 0.25  # of the picture's size: a lamp so far beside the picture still dazzles the lens
 MIN_LENS_ANGLE = np.radians(20.0)  # between a lamp and the axis of an orthographic camera
-BELOW = 0.1  # sine by which a lamp may be lower than the lowest camera
+MIN_AROUND = np.radians(30.0)  # from that mean: nearer cameras do not stand around it
+BELOW = 0.1  # sine by which a lamp may be lower than the horizon, or than the lowest camera
 
 
 @dataclass(frozen=True)
@@ -34,12 +37,16 @@ class SurfacePoints:
     normal: Array
 
     @classmethod
-    def of(cls, mesh: Mesh, faces: NDArray[np.intp], seed: int = 0) -> SurfacePoints:
-        """POINTS points on some faces of a mesh, uniform over their area."""
+    def of(cls, mesh: Mesh, faces: NDArray[np.intp], seed: int = 0) -> SurfacePoints | None:
+        """POINTS points on some faces of a mesh, uniform over their area; None without area."""
+        rng = np.random.default_rng(seed)
+        if len(faces) > MAX_FACES:
+            faces = rng.choice(faces, MAX_FACES, replace=False)
         corners = mesh.vertices[mesh.faces[faces]]
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         area = np.linalg.norm(across, axis=1)
-        rng = np.random.default_rng(seed)
+        if not area.sum() > 0:
+            return None
         chosen = rng.choice(len(faces), POINTS, p=area / area.sum())
         u, v = rng.random((2, POINTS))
         u, v = np.where(u + v > 1, (1 - u, 1 - v), (u, v))
@@ -49,34 +56,48 @@ class SurfacePoints:
         return cls((corners[chosen] * weight).sum(axis=1), normal / length)
 
 
-def chosen_cameras(cameras: Sequence[Camera]) -> list[Camera]:
-    """Up to MAX_CAMERAS cameras that are far from one another."""
+def chosen_cameras(cameras: Sequence[Camera], centre: Array) -> list[Camera]:
+    """Up to MAX_CAMERAS cameras that see the object from different directions. centre: (3,) of
+    it."""
     usable = [camera for camera in cameras if not camera.panoramic]
     if len(usable) <= MAX_CAMERAS:
         return usable
-    place = np.array([camera.pose.centre for camera in usable])
-    picked = [int(np.argmin(np.linalg.norm(place - place.mean(axis=0), axis=1)))]
-    distance = np.linalg.norm(place - place[picked[0]], axis=1)
+    towards = np.concatenate([directions_to(camera, centre[None]) for camera in usable])
+    picked = [int(np.argmax(towards @ towards.mean(axis=0)))]
+    nearest = towards @ towards[picked[0]]
     while len(picked) < MAX_CAMERAS:
-        picked.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.linalg.norm(place - place[picked[-1]], axis=1))
+        picked.append(int(np.argmin(nearest)))
+        nearest = np.maximum(nearest, towards @ towards[picked[-1]])
     return [usable[i] for i in sorted(picked)]
 
 
 def lamp_directions(cameras: Sequence[Camera], centre: Array) -> Array:
-    """(l, 3) unit directions towards a lamp, evenly on the sphere. Where the cameras show which
-    side is up (no photo from below), lamps are not lower than they are."""
+    """(l, 3) unit directions towards a lamp, evenly on the sphere. Where cameras stand all around
+    an axis and none is below, lamps are not below either."""
     i = np.arange(LAMPS) + 0.5
     z, phi = 1 - 2 * i / LAMPS, np.pi * (1 + 5**0.5) * i
     r = np.sqrt(1 - z**2)
     found = np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=1)
-    towards = np.array([camera.pose.centre for camera in cameras]) - centre
-    towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-12)
+    towards = np.concatenate([directions_to(camera, centre[None]) for camera in cameras])
     mean = towards.mean(axis=0)
     if np.linalg.norm(mean) < MIN_TILT:
         return found
     up = mean / np.linalg.norm(mean)
-    return np.asarray(found[found @ up >= (towards @ up).min() - BELOW])
+    first, second = (t[0] for t in tangents(up[None]))
+    far = towards[towards @ up < np.cos(MIN_AROUND)]
+    around = np.sort(np.arctan2(far @ second, far @ first))
+    if len(far) < 3 or np.diff(around, append=around[0] + 2 * np.pi).max() >= np.pi:
+        return found  # all on one side: they do not tell where up is
+    return np.asarray(found[found @ up >= min(float((towards @ up).min()), 0.0) - BELOW])
+
+
+def directions_to(camera: Camera, points: Array) -> Array:
+    """(n, 3) unit directions from points (n, 3) to a camera."""
+    if camera.orthographic:
+        return np.broadcast_to(-camera.pose.rotation[2], points.shape)
+    offset = camera.pose.centre - points
+    length = np.maximum(np.linalg.norm(offset, axis=1, keepdims=True), 1e-12)
+    return np.asarray(offset / length)
 
 
 def in_picture(camera: Camera, lamps: Array) -> NDArray[np.bool_]:
@@ -93,28 +114,20 @@ def in_picture(camera: Camera, lamps: Array) -> NDArray[np.bool_]:
 
 def seen_from(rays: RayScene, surface: SurfacePoints, camera: Camera) -> NDArray[np.bool_]:
     """(n,) which points a photo of this camera shows, not too obliquely."""
-    view = view_of(surface, camera)
     pixels = camera.project(surface.point)
     inside = np.all((pixels > 0) & (pixels < (camera.width, camera.height)), axis=1)
-    return _reached(rays, surface, view, inside)
+    distance = None
+    if not camera.orthographic:
+        distance = np.linalg.norm(camera.pose.centre - surface.point, axis=1)
+    return _reached(rays, surface, directions_to(camera, surface.point), inside, distance)
 
 
-def view_of(surface: SurfacePoints, camera: Camera) -> Array:
-    """(n, 3) unit directions from the points to a camera."""
-    if camera.orthographic:
-        return np.broadcast_to(-camera.pose.rotation[2], surface.point.shape)
-    offset = camera.pose.centre - surface.point
-    return np.asarray(offset / np.linalg.norm(offset, axis=1, keepdims=True))
-
-
-def lit_from(rays: RayScene, surface: SurfacePoints, towards: Array) -> NDArray[np.bool_]:
-    """(n,) which points a lamp in unit directions (n, 3) lights, not too obliquely."""
-    return _reached(rays, surface, towards, np.ones(len(towards), bool))
-
-
-def mounted_direction(light: MountedLight, camera: Camera, surface: SurfacePoints) -> Array:
-    """(n, 3) unit directions from the points to a flash on a camera."""
-    return light.incidence(surface.point, camera).towards
+def lit_from(
+    rays: RayScene, surface: SurfacePoints, towards: Array, distance: Array | None = None
+) -> NDArray[np.bool_]:
+    """(n,) which points a lamp in unit directions (n, 3) lights, not too obliquely. distance: (n,)
+    to the lamp, None for one far away."""
+    return _reached(rays, surface, towards, np.ones(len(towards), bool), distance)
 
 
 def moves_with_camera(lights: Sequence[Light]) -> MountedLight | None:
@@ -124,11 +137,20 @@ def moves_with_camera(lights: Sequence[Light]) -> MountedLight | None:
 
 
 def _reached(
-    rays: RayScene, surface: SurfacePoints, towards: Array, possible: NDArray[np.bool_]
+    rays: RayScene,
+    surface: SurfacePoints,
+    towards: Array,
+    possible: NDArray[np.bool_],
+    distance: Array | None,
 ) -> NDArray[np.bool_]:
     found = possible & (np.einsum("ij,ij->i", surface.normal, towards) > MIN_COSINE)
     some = np.flatnonzero(found)
-    found[some] = ~cast_shadow(
-        rays, surface.point[some], surface.normal[some], np.ascontiguousarray(towards[some]), None
+    blocked = cast_shadow(
+        rays,
+        surface.point[some],
+        surface.normal[some],
+        np.ascontiguousarray(towards[some]),
+        None if distance is None else distance[some],
     )
+    found[some] = ~blocked
     return found

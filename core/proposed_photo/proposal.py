@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scan import Camera
+from .candidates import directions_to
 
 Array = NDArray[np.float64]
 
@@ -43,10 +44,7 @@ class ProposedPhoto:
         of the object."""
         if towards is None:
             return cls(camera.label, None, 0.0, 0.0, before, after)
-        view = -camera.pose.rotation[2]
-        if not camera.orthographic:
-            view = camera.pose.centre - centre
-            view = view / np.linalg.norm(view)
+        view = directions_to(camera, centre[None])[0]
         right, down = camera.pose.rotation[:2] @ towards
         angle = np.degrees(np.arccos(np.clip(view @ towards, -1.0, 1.0)))
         side = np.degrees(np.arctan2(-down, right)) % 360.0

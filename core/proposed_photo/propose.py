@@ -22,13 +22,12 @@ from . import regions
 from .candidates import (
     SurfacePoints,
     chosen_cameras,
+    directions_to,
     in_picture,
     lamp_directions,
     lit_from,
-    mounted_direction,
     moves_with_camera,
     seen_from,
-    view_of,
 )
 from .proposal import ProposedPhoto
 from .uncertainty import DirectionUncertainty
@@ -57,11 +56,13 @@ def propose(
     cameras: of the scan. lights: of the lit photos: with a flash on the camera, only the camera is
     chosen.
     """
-    chosen = chosen_cameras(cameras)
-    if not chosen or not materials:
+    if not materials:
+        return None
+    centre = np.mean([m.surface.point.mean(axis=0) for m in materials], axis=0)
+    chosen = chosen_cameras(cameras, centre)
+    if not chosen:
         return None
     flash = moves_with_camera(lights)
-    centre = np.mean([m.surface.point.mean(axis=0) for m in materials], axis=0)
     lamps = lamp_directions(chosen, centre)
     before = float(np.mean([m.uncertainty.deviation() for m in materials]))
     lit = [[] if flash is not None else _lit(rays, m.surface, lamps) for m in materials]
@@ -72,17 +73,18 @@ def propose(
             surface = material.surface
             seen = seen_from(rays, surface, camera)
             if flash is not None:
-                towards = mounted_direction(flash, camera, surface)
-                photos = [(towards, seen & lit_from(rays, surface, towards))]
+                light = flash.incidence(surface.point, camera)
+                reached = lit_from(rays, surface, light.towards, light.distance)
+                photos = [(light.towards, seen & reached)]
             else:
                 photos = [(towards, seen & own) for towards, own in lit_by]
-            counts = _counts(surface, view_of(surface, camera), photos)
+            counts = _counts(surface, directions_to(camera, surface.point), photos)
             after.append(np.sqrt(material.uncertainty.variance_after(counts)))
         mean = np.mean(after, axis=0)
         if flash is None:
             mean = np.where(in_picture(camera, lamps), np.inf, mean)
         place = int(np.argmin(mean))
-        if best is None or mean[place] < best.after:
+        if np.isfinite(mean[place]) and (best is None or mean[place] < best.after):
             lamp = None if flash is not None else lamps[place]
             best = ProposedPhoto.of(camera, centre, lamp, before, float(mean[place]))
     return best if best is not None and best.gain >= MIN_GAIN else None

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..samples.clipped import white_of_clipped
+from ..samples.clipped import White
 from .node_model import Shading
 from .surface_grid import SurfaceGrid
 from .surface_photo import MIN_COSINE, SurfacePhoto, bilinear_corners
@@ -68,7 +68,7 @@ class Observations:
 def observe(look: SurfacePhoto, photo: int, grid: SurfaceGrid) -> Observations:
     """The observations of all nodes that are visible, lit, and on reliable pixels of one photo,
     clipped ones included."""
-    white = white_of_clipped(look.radiance, look.labels.clipped == 0)
+    white = White.of(look.radiance, look.labels.clipped == 0).level
     parts = []
     for begin in range(0, len(grid), CHUNK):
         rows = np.arange(begin, min(begin + CHUNK, len(grid)))

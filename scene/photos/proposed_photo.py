@@ -9,31 +9,37 @@ import mathutils
 import numpy as np
 
 from ..property_keys import CAMERA_LABEL, CAPTURE, PROPOSED_LAMP
+from .lamp_placement import world_matrix
 
 NAME = "Proposed Lamp"
 DISTANCE = 1.2  # of the arrow's tail from the centre of the object, in its sizes
 ARROW_LENGTH = 0.6  # in sizes of the object: it ends outside of it
 
 
-def show_proposed_photo(
+def camera_of_proposed_photo(
     scene: bpy.types.Scene, capture: str, photo: dict[str, Any]
-) -> list[bpy.types.Object]:
-    """Create or move an arrow from the lamp's direction towards the mesh; returns it and the camera
-    of the photo, those of them that there are.
+) -> bpy.types.Object | None:
+    """The camera of the scan that has the viewpoint of the photo; None if it was deleted. photo:
+    "proposed_photo" of result.json."""
+    for thing in _collection_of(scene, capture).all_objects:
+        if thing.type == "CAMERA" and thing.get(CAMERA_LABEL) == photo["camera"]:
+            return thing
+    return None
 
-    photo: "proposed_photo" of result.json. With the flash on the camera there is no arrow.
-    """
+
+def show_proposed_lamp(
+    scene: bpy.types.Scene, capture: str, photo: dict[str, Any]
+) -> bpy.types.Object | None:
+    """Create or move an arrow from the direction of the lamp towards the mesh; None with the flash
+    on the camera, or without a mesh."""
+    remove_proposed_lamp(scene, capture)
     mesh = scene.patina.mesh
-    remove_proposed_photo(scene, capture)
-    cameras = (o for o in scene.objects if o.type == "CAMERA")
-    camera = next((o for o in cameras if o.get(CAMERA_LABEL) == photo["camera"]), None)
-    shown = [] if camera is None else [camera]
-    towards = photo["towards_light"]
-    if towards is None or mesh is None:
-        return shown
-    corners = np.array([mesh.matrix_world @ mathutils.Vector(c) for c in mesh.bound_box])
+    if photo["towards_light"] is None or mesh is None:
+        return None
+    frame = world_matrix(mesh)
+    corners = np.array(mesh.bound_box) @ frame[:3, :3].T + frame[:3, 3]
     size = float(np.linalg.norm(corners.max(axis=0) - corners.min(axis=0)))
-    axis = (mesh.matrix_world.to_3x3() @ mathutils.Vector(towards)).normalized()
+    axis = mathutils.Vector(frame[:3, :3] @ np.array(photo["towards_light"])).normalized()
     arrow = bpy.data.objects.new(NAME, None)
     arrow.empty_display_type = "SINGLE_ARROW"
     arrow.empty_display_size = ARROW_LENGTH * size
@@ -43,21 +49,19 @@ def show_proposed_photo(
     arrow.rotation_mode = "QUATERNION"
     arrow.rotation_quaternion = (-axis).to_track_quat("Z", "Y")
     arrow[PROPOSED_LAMP] = capture
-    _collection_of(scene, mesh, capture).objects.link(arrow)
-    return [*shown, arrow]
+    _collection_of(scene, capture).objects.link(arrow)
+    return arrow
 
 
-def remove_proposed_photo(scene: bpy.types.Scene, capture: str) -> None:
+def remove_proposed_lamp(scene: bpy.types.Scene, capture: str) -> None:
     """Remove the arrow of an earlier fit of a capture."""
     for old in [o for o in scene.objects if o.get(PROPOSED_LAMP) == capture]:
         bpy.data.objects.remove(old)
 
 
-def _collection_of(
-    scene: bpy.types.Scene, mesh: bpy.types.Object, capture: str
-) -> bpy.types.Collection:
-    """The collection of the capture, or that of the mesh."""
+def _collection_of(scene: bpy.types.Scene, capture: str) -> bpy.types.Collection:
+    """The collection of the capture, or that of the scene."""
     for collection in scene.collection.children_recursive:
         if collection.get(CAPTURE) == capture:
             return collection
-    return mesh.users_collection[0]
+    return scene.collection

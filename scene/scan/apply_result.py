@@ -20,7 +20,7 @@ from ..material.lobe_group import stack_group
 from ..material.material_evidence import keep_earlier, keep_evidence
 from ..material.measured_materials import measured_materials
 from ..material.preview import set_preview
-from ..photos.proposed_photo import remove_proposed_photo
+from ..photos.proposed_photo import remove_proposed_lamp
 from ..property_keys import CAPTURE, MEASURED_DATE, MEASURED_NAME, NO_OSL_REASON
 from ..session.scene_properties import store_result
 from . import meshes
@@ -105,7 +105,7 @@ def apply_result_steps(
     notes += yield from apply_variation_steps(scene, result)
     yield from paint_variation_steps(mesh, result.varying, colours)
     remove_placeholders(capture)
-    remove_proposed_photo(scene, capture)
+    remove_proposed_lamp(scene, capture)
     for material in made:  # the name is free now; other names were set by the user
         name = material[MEASURED_NAME]
         if NUMBER_SUFFIX.sub("", material.name) == name and name not in bpy.data.materials:

@@ -13,6 +13,7 @@ from patina.core.basis import default_basis
 from patina.core.capture import read_capture
 from patina.core.concurrency.steps import drained
 from patina.core.fit.measured import MeasuredFit, MeasuredSettings, fit_measured
+from patina.core.fit.measured.cells import gather
 from patina.core.fit.measured_result import MeasuredResult
 from patina.core.geometry import RayScene
 from patina.core.inputs import capture_data
@@ -21,7 +22,7 @@ from patina.core.inputs.photos import LitPhotos
 from patina.core.jobs import FitJob
 from patina.core.jobs.sampling import take_samples
 from patina.core.samples import SampleTable
-from patina.core.samples.clipped import WHITE_MARGIN, white_of_clipped
+from patina.core.samples.clipped import WHITE_MARGIN, White
 from tests import make_capture as made
 
 WHITE = 1.2  # radiance at which the photos are clipped; the highlights reach 2.5
@@ -86,11 +87,11 @@ def test_white_is_that_of_the_least_clipped_pixel() -> None:
     radiance = np.zeros((2, 2, 3), np.float32)
     radiance[0] = [[0.2, 1.0, 0.1], [2.0, 0.1, 0.1]]
     usable = np.array([[False, False], [True, True]])
-    assert white_of_clipped(radiance, usable) == pytest.approx(WHITE_MARGIN)
-    assert white_of_clipped(radiance, np.ones((2, 2), bool)) == np.inf
+    assert White.of(radiance, usable).level == pytest.approx(WHITE_MARGIN)
+    assert White.of(radiance, np.ones((2, 2), bool)).level == np.inf
     radiance[1, 0] = 0  # clipped in all exposures of a bracket: nothing is known
     usable[1, 0] = False
-    assert white_of_clipped(radiance, usable) == pytest.approx(WHITE_MARGIN)
+    assert White.of(radiance, usable).level == pytest.approx(WHITE_MARGIN)
 
 
 def test_limits_bring_the_peak_back(fits: dict[str, MeasuredFit]) -> None:
@@ -111,21 +112,42 @@ def test_limit_below_the_fit_changes_nothing(
     tables: tuple[SampleTable, SampleTable], fits: dict[str, MeasuredFit]
 ) -> None:
     """A limit that the BRDF exceeds anyway is no observation."""
-    measured, _ = tables
-    rows = np.arange(0, len(measured), 50)
-    known = measured.select(np.setdiff1d(np.arange(len(measured)), rows))
-    low = measured.select(rows)
+    low = tables[0].select(np.arange(0, len(tables[0]), 50))
     low = replace(
         low,
+        photo=np.full(len(low), 6, np.int16),  # of its own: its cells have no other samples
         radiance=np.full_like(low.radiance, 1e-3),
-        rho=np.full_like(low.rho, 1e-3),
         response=np.zeros_like(low.response),
     )
-    without = fit_measured(known, default_basis(), SETTINGS)
-    with_limits = fit_measured(known, default_basis(), SETTINGS, low)
-    change = with_limits.brdf.evaluate(PEAK) / without.brdf.evaluate(PEAK)
-    # cells in which some samples are limits set a lower limit as a whole
-    assert np.abs(np.log(change)).max() < 0.3
+    found = fit_measured(tables[0], default_basis(), SETTINGS, low)
+    change = found.brdf.evaluate(PEAK) / fits["dropped"].brdf.evaluate(PEAK)
+    assert np.abs(np.log(change)).max() < 1e-3
+
+
+def test_limits_do_not_depend_on_how_many_samples_were_kept(
+    tables: tuple[SampleTable, SampleTable],
+) -> None:
+    """Measured samples that are thinned more than clipped ones keep their weight in a cell."""
+    measured, clipped = tables
+    few = measured.select(np.arange(0, len(measured), 10))
+    few = replace(few, weight=np.full(len(few), 10.0, np.float32))
+    every, thin = (
+        gather(
+            SampleTable.concatenate([table, clipped]),
+            0.0,
+            clipped=np.concatenate([np.zeros((len(table), 3), bool), clipped.response == 0]),
+        )
+        for table in (measured, few)
+    )
+    mixed = [cells.clipped[:, 0][(cells.clipped[:, 0] > 0)] for cells in (every, thin)]
+    assert np.mean(mixed[0]) == pytest.approx(np.mean(mixed[1]), abs=0.05)
+
+
+def test_fit_of_clipped_cells_alone_succeeds(tables: tuple[SampleTable, SampleTable]) -> None:
+    measured, clipped = tables
+    bright = measured.select(np.argsort(-measured.radiance.max(axis=1))[:60])
+    fit = fit_measured(bright, default_basis(), SETTINGS, clipped)
+    assert np.isfinite(fit.brdf.evaluate(PEAK)).all()
 
 
 @pytest.mark.slow

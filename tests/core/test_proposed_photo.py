@@ -23,11 +23,15 @@ from patina.core.proposed_photo import (
     regions,
 )
 from patina.core.proposed_photo.candidates import (
+    LAMPS,
     SurfacePoints,
     chosen_cameras,
+    directions_to,
     in_picture,
+    lamp_directions,
     lit_from,
     moves_with_camera,
+    seen_from,
 )
 from patina.core.samples import Margins, SampleTable, sample_photo
 from patina.core.samples.take import light_surface, trusted_pixels
@@ -84,6 +88,12 @@ def shots() -> list[tuple[Camera, DistantLight]]:
     ]
 
 
+def points_of_ball() -> SurfacePoints:
+    found = SurfacePoints.of(BALL, np.arange(len(BALL.faces)))
+    assert found is not None
+    return found
+
+
 def fitted(rays: RayScene, shots: Sequence[tuple[Camera, Light]]) -> MeasuredResult:
     tables = [photographed(camera, light, rays) for camera, light in shots]
     return MeasuredResult.of(fit_measured(SampleTable.join(tables), default_basis()))
@@ -96,7 +106,7 @@ def fit(rays: RayScene, shots: list[tuple[Camera, DistantLight]]) -> MeasuredRes
 
 @pytest.fixture(scope="module")
 def material(fit: MeasuredResult) -> MaterialToPhotograph:
-    surface = SurfacePoints.of(BALL, np.arange(len(BALL.faces)))
+    surface = points_of_ball()
     return MaterialToPhotograph(surface, DirectionUncertainty.of(fit))
 
 
@@ -150,12 +160,62 @@ def test_more_directions_never_increase_the_uncertainty(
     assert all_of_them <= less * (1 + 1e-9)
 
 
-def test_flash_stays_on_its_camera(rays: RayScene, material: MaterialToPhotograph) -> None:
+@pytest.fixture(scope="module")
+def of_one_photo(rays: RayScene) -> MaterialToPhotograph:
+    """A material that one photo shows, with the lamp at the side: a flash would show more."""
+    aside = np.cross(CAMERAS[0].pose.centre - made.CENTRE, [0.0, 0.0, 1.0])
+    fit = fitted(rays, [(CAMERAS[0], lamp(aside))])
+    return MaterialToPhotograph(points_of_ball(), DirectionUncertainty.of(fit))
+
+
+def test_flash_stays_on_its_camera(rays: RayScene, of_one_photo: MaterialToPhotograph) -> None:
     flash = MountedLight("flash", np.array([0.1, 0.0, 0.0]), np.ones(3))
     assert moves_with_camera([flash]) is flash
-    found = propose(rays, CAMERAS, [flash], [material])
-    if found is not None:
-        assert found.towards is None and "with the flash" in found.sentence
+    found = propose(rays, CAMERAS, [flash], [of_one_photo])
+    assert found is not None
+    assert found.towards is None and "with the flash" in found.sentence
+
+
+def test_surface_behind_the_camera_hides_nothing(of_one_photo: MaterialToPhotograph) -> None:
+    """A scan of a room has walls behind the camera and behind a flash."""
+    vertices, faces = made.sphere_mesh(3)
+    room = made.CENTRE + 8.0 * (vertices - made.CENTRE)
+    both = (
+        np.concatenate([BALL.vertices, room]),
+        np.concatenate([BALL.faces, faces + len(BALL.vertices)]),
+    )
+    inside = RayScene.build(Mesh(*both))
+    seen = seen_from(inside, of_one_photo.surface, CAMERAS[0])
+    assert seen.sum() > 200
+    flash = MountedLight("flash", np.array([0.1, 0.0, 0.0]), np.ones(3))
+    assert propose(inside, CAMERAS, [flash], [of_one_photo]) is not None
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_lamps_stand_all_around_where_cameras_do_not_tell_where_up_is(count: int) -> None:
+    front = [camera(f"front_{i}", [4.0, 0.4 * i, 0.5]) for i in range(count)]
+    lamps = lamp_directions(front, made.CENTRE)
+    assert len(lamps) == LAMPS
+
+
+def test_lamps_are_not_below_cameras_that_stand_around_the_object() -> None:
+    lamps = lamp_directions(CAMERAS, made.CENTRE)
+    assert 0.4 * LAMPS < len(lamps) < 0.7 * LAMPS
+    assert lamps[:, 2].min() > -0.5 and lamps[:, 2].max() > 0.9
+
+
+def test_orthographic_camera_is_judged_by_its_direction() -> None:
+    """The position of an orthographic camera along its axis has no meaning."""
+    turn = np.diag([1.0, -1.0, -1.0])
+    for depth in (4.0, -4.0):
+        pose = Pose(turn, np.array([0.0, 0.0, depth]))
+        one = Camera("ortho", 160, 160, "ORTHOGRAPHIC", (40.0, 40.0, 80.0, 80.0), pose)
+        assert np.allclose(directions_to(one, made.CENTRE[None]), [[0.0, 0.0, 1.0]])
+
+
+def test_faces_without_area_have_no_points() -> None:
+    flat = Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]]))
+    assert SurfacePoints.of(flat, np.arange(1)) is None
 
 
 def test_lamp_in_the_picture_is_not_proposed() -> None:
@@ -166,7 +226,7 @@ def test_lamp_in_the_picture_is_not_proposed() -> None:
 
 
 def test_points_behind_the_ball_are_not_lit(rays: RayScene) -> None:
-    surface = SurfacePoints.of(BALL, np.arange(len(BALL.faces)))
+    surface = points_of_ball()
     towards = np.broadcast_to([0.0, 0.0, 1.0], surface.point.shape)
     lit = lit_from(rays, surface, towards)
     assert lit.sum() > 100
@@ -174,7 +234,7 @@ def test_points_behind_the_ball_are_not_lit(rays: RayScene) -> None:
 
 
 def test_points_are_uniform_over_the_area() -> None:
-    surface = SurfacePoints.of(BALL, np.arange(len(BALL.faces)))
+    surface = points_of_ball()
     point = surface.point - made.CENTRE
     assert np.abs(point.mean(axis=0)).max() < 0.06
     assert np.abs((point**2).mean(axis=0) - 1 / 3).max() < 0.04
@@ -183,7 +243,7 @@ def test_points_are_uniform_over_the_area() -> None:
 
 def test_chosen_cameras_are_far_apart() -> None:
     near = [camera(f"copy_{i}", [4.0, 0.001 * i, 1.2]) for i in range(60)]
-    chosen = chosen_cameras([*near, *CAMERAS])
+    chosen = chosen_cameras([*near, *CAMERAS], made.CENTRE)
     assert {c.label for c in CAMERAS[1:]} <= {c.label for c in chosen}
 
 

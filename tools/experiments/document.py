@@ -90,15 +90,7 @@ def _fill(document: Path, found: dict[str, tuple[str, Section]]) -> None:
 def summary() -> str:
     """Return the tables of the quick runs, for the terminal."""
     parts = []
-    for marker in (
-        "check",
-        "goals",
-        "by scene",
-        "priors",
-        "proposed photo",
-        "models",
-        "models by material",
-    ):
+    for marker in SUMMARISED:
         experiment, make = (sections() | appearance_sections())[marker]
         if records := store.load(experiment, quick=True):
             parts.append(f"## {marker}\n\n{make(records)}")

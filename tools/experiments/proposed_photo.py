@@ -131,10 +131,11 @@ def eight_photos(name: str, rig: str) -> Eight:
             Shot(s.camera, scenes.light_at(s.camera, centre, a, np.radians(rng.uniform(-30, 210))))
             for s, a in zip(shots, RIGS[rig] * 2, strict=True)
         )
-    faces = np.arange(len(scene.scanned.faces))
+    surface = SurfacePoints.of(scene.scanned, np.arange(len(scene.scanned.faces)))
+    assert surface is not None
     return Eight(
         scene, shots, sample_scanned(scene.true, scene.scanned, shots),
-        RayScene.build(scene.scanned), SurfacePoints.of(scene.scanned, faces), cameras,
+        RayScene.build(scene.scanned), surface, cameras,
     )  # fmt: skip
 
 
@@ -142,7 +143,8 @@ def _random_photos(
     eight: Eight, ninth: Callable[[Shot], SampleTable], seed: int
 ) -> Iterator[tuple[Shot, SampleTable]]:
     rng = np.random.default_rng(seed)
-    lamps = lamp_directions(chosen_cameras(eight.cameras), eight.surface.point.mean(axis=0))
+    centre = eight.surface.point.mean(axis=0)
+    lamps = lamp_directions(chosen_cameras(eight.cameras, centre), centre)
     found = 0
     while found < RANDOM_PHOTOS:
         camera = eight.cameras[rng.integers(len(eight.cameras))]

@@ -26,10 +26,13 @@ REGIONS = (len(REGION_THETA_H) + 1) * COLUMNS
 
 def cells_per_observation(cells: AngleCells) -> NDArray[np.float64]:
     """(m,) for each cell, how many cells of its region together weigh as much as one independent
-    cell (at least 1). Cells with clipped samples are not counted: most of them only set a limit."""
+    cell (at least 1). Cells with clipped samples do not reduce the weight of the others, because
+    most of them are lower limits that the BRDF exceeds."""
     region = region_of(cells.angles)
-    counted = 1.0 - cells.clipped.max(axis=1)
-    return np.maximum(np.bincount(region, counted)[region] / CELLS_PER_REGION, 1.0)
+    limited = cells.clipped.any(axis=1)
+    measured = np.bincount(region, ~limited)[region]
+    count = np.where(limited, np.maximum(np.bincount(region, limited)[region], measured), measured)
+    return np.maximum(count / CELLS_PER_REGION, 1.0)
 
 
 def region_of(angles: Angles) -> NDArray[np.intp]:

@@ -82,9 +82,11 @@ def gather(
     if m > MAX_CELLS:
         return gather(table, normal_error, width_factor * 1.3, clipped)
     where = where.ravel()
+    # measured and clipped samples of a cell may represent different numbers of pixels
+    total = np.bincount(where, table.weight, m)
 
     def mean(values: NDArray[np.floating]) -> NDArray[np.float64]:
-        return np.bincount(where, values, m) / count
+        return np.bincount(where, values * table.weight, m) / total
 
     phi_d = np.mod(np.arctan2(mean(np.sin(phi)), mean(np.cos(phi))), 2 * np.pi)
     angles = Angles(mean(table.theta_h), mean(table.theta_d), phi_d)

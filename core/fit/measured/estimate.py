@@ -59,8 +59,8 @@ class MeasuredFit:
     scan's normals. gains: photo → its gain. extrapolation: a sentence that says what the BRDF rests
     on in directions without samples. without: photo → the BRDF without that photo. covariance: (3,
     k, k) posterior covariance of each channel's coefficients. prior_scale: how far the material is
-    from the measured ones (prior_scale.py). cells_per_region: (REGIONS,) number of cells in each
-    region of angle space (cell_weights.py)."""
+    from the measured ones (prior_scale.py). cells_per_region: (REGIONS,) number of cells without
+    clipped samples in each region of angle space (cell_weights.py)."""
 
     brdf: PrincipalBRDF
     samples: int
@@ -161,7 +161,9 @@ def measured_steps(
         without={p: PrincipalBRDF(basis, c + shrinkage) for p, c in found.without.items()},
         covariance=covariance if unlimited is None else unlimited,
         prior_scale=scale,
-        cells_per_region=np.bincount(region_of(model.cells.angles), minlength=REGIONS),
+        cells_per_region=np.bincount(
+            region_of(model.cells.angles), ~model.cells.clipped.any(axis=1), REGIONS
+        ).astype(np.intp),
     )
 
 

@@ -27,6 +27,7 @@ MAX_THETA = 83.0  # degrees of light and view from the normal
 TOTAL_WEIGHT = 50.0  # observations: the errors are correlated, so all together count as so many
 NEAR_HIGHLIGHT = 15.0  # degrees of θh: these cells tell how far highlights were sampled
 EDGE_QUANTILE = 0.97  # of θd of those cells
+MIN_CELLS = 50  # without clipped samples: with fewer, the lobes are fitted to all cells
 EDGE_INSET = 2.0  # degrees: the extrapolation starts so far inside the edge
 LEVEL_OFFSETS = (0.0, 10.0)  # degrees inside that, where the lobes are scaled to the BRDF
 LOBE_SHARE = 0.5  # weight of the lobes: 1 overestimates grazing reflectance, 0 underestimates it
@@ -74,7 +75,8 @@ class GrazingPrior:
 def extrapolated(model: CellModel, coefficients: NDArray[np.float64]) -> GrazingPrior:
     """Pseudo-observations beyond the samples of a model's cells, extrapolated from the BRDF with
     these coefficients (3, k)."""
-    cells = model.cells.select(~model.cells.clipped.any(axis=1))
+    measured = ~model.cells.clipped.any(axis=1)
+    cells = model.cells.select(measured) if measured.sum() >= MIN_CELLS else model.cells
     edge = sampled_edge(cells)
     return GrazingPrior.of(fit_lobes(cells), model.basis, coefficients, edge)
 

@@ -57,22 +57,22 @@ def refine_normals(
 
     scanned: samples with the scan's normals. brdf: log table of the BRDF. deviation: radians along
     each tangent, expected standard deviation of the scan's normals. tolerance: log-relative
-    standard deviation of the BRDF itself. clipped: (n,) samples whose radiance is a lower limit:
-    they count only where the BRDF is darker; None where there are none.
+    standard deviation of the BRDF itself. clipped: (n,) samples whose radiance is a lower limit,
+    which are ignored; None where there are none.
     """
     grey = brdf.grey()
     normal = scanned.normal.astype(np.float64)
     seen = (scanned.radiance / scanned.irradiance).mean(axis=1, dtype=np.float64)
     observed = np.log(np.maximum(seen, 0.0) + MIN_REFLECTED)
     turn = np.zeros((patches.count, 3))
+    used = np.ones(len(scanned), bool) if clipped is None else ~clipped
+    sharing = np.where(used, _samples_sharing_error(scanned.photo, patches, used), np.inf)
     for _ in range(ROUNDS):
         turned = _unit(normal + turn[patches.of])
         slope, misfit = _linearised(grey, turned, scanned, observed)
         weight = weights_of_squares((misfit / tolerance) ** 2) / tolerance**2
         # samples of one patch and photo share the model's error: together they count as one
-        weight = weight / _samples_sharing_error(scanned.photo, patches)
-        if clipped is not None:
-            weight[clipped] = 0.0
+        weight = weight / sharing
         turn, left, scan_deviation = _solve(patches, slope, misfit, weight, turn, deviation)
         size = np.linalg.norm(turn, axis=1, keepdims=True)
         turn = turn * np.minimum(1.0, MAX_ROTATION / np.maximum(size, 1e-12))
@@ -122,11 +122,13 @@ def _log_reflected(grey: LogTable, normal: Array, table: SampleTable) -> Array:
     return np.log((rho * cos_i).astype(np.float64) + MIN_REFLECTED)
 
 
-def _samples_sharing_error(photo: NDArray[np.int16], patches: Patches) -> Array:
-    """(n,) how many samples have the same patch and photo as each."""
+def _samples_sharing_error(
+    photo: NDArray[np.int16], patches: Patches, used: NDArray[np.bool_]
+) -> Array:
+    """(n,) how many samples that are ``used`` (n,) have the same patch and photo as each."""
     key = patches.of * 65536 + photo.astype(np.int64)
-    _, where, count = np.unique(key, return_inverse=True, return_counts=True)
-    return count[where.ravel()].astype(np.float64)
+    where = np.unique(key, return_inverse=True)[1].ravel()
+    return np.asarray(np.bincount(where, used)[where])
 
 
 def _solve(

@@ -23,7 +23,7 @@ from ...varying.varying_surface import (
     MaterialVariation,
     VaryingSurface,
 )
-from ..fit_job import CaptureResult, FitJob, MaterialResult, with_portable
+from ..fit_job import CaptureResult, FitJob, MaterialResult, with_portable, with_proposed_photo
 from .node_steps import CHOICE_NODES, chosen_kind, final_fields, model_of
 from .separate_materials import SeparatedFit
 from .surface_observations import SurfaceObservations, observe_surface, pixel_size
@@ -77,9 +77,10 @@ class VariationEstimator:
             notes.insert(0, parts.note)
         for index, material in enumerate(materials if self.portable else ()):
             materials[index] = yield from with_portable(material, end, self.fit.threads)
-        return replace(
+        found = replace(
             before, materials=tuple(materials), varying=surface, notes=(*before.notes, *notes)
         )
+        return found if not self.portable else (yield from with_proposed_photo(found, end))
 
     def _chosen(
         self, index: int, coarse: SurfaceObservations, start: float, share: float
