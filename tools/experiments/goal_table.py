@@ -110,6 +110,8 @@ def priors(records: list[Record]) -> str:
     head = ["", "PSNR, median (mean)", "log RMS", "cube root", "relative L2"]
     count = sum(x < 1 for x in better.values())
     return (
+        "What the 25 materials beside MERL add to the prior (the validation materials; whole kinds "
+        "of materials are held out of the prior, five parts):\n\n"
         f"{table([*head, 'near specular direction'], rows)}\n"
         f"The log RMS is smaller with the prior of all materials in {count} of {len(better)} cases."
     )
