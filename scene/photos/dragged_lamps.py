@@ -21,6 +21,7 @@ from ..property_keys import (
     STATED_ERROR,
 )
 from . import lamp_placement
+from .capture_collection import collections_of
 from .found_lights import found_strength, found_values, scan_origin
 from .lamp_placement import DISTANT, FROM_CAMERA, MOUNTED, NEAR, Placement
 
@@ -175,16 +176,10 @@ def _entry(entry: LightEntry, lamp: bpy.types.Object, hand: LampEdits, origin: A
 def mesh_frame(scene: bpy.types.Scene, capture: str | None) -> Array:
     """(4, 4) matrix_world of the capture's mesh; the identity if it was deleted or its scale is
     0."""
-    for collection in _collections(scene, capture):
+    for collection in collections_of(scene, capture):
         for thing in collection.objects:
             if thing.type == "MESH":
                 frame = lamp_placement.world_matrix(thing)
                 if abs(np.linalg.det(frame[:3, :3])) > 1e-18:
                     return frame
     return np.eye(4)
-
-
-def _collections(scene: bpy.types.Scene, capture: str | None) -> Iterator[bpy.types.Collection]:
-    for collection in scene.collection.children_recursive:
-        if capture is not None and collection.get(CAPTURE) == capture:
-            yield collection

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ...core.capture import LightEntry
 from ..property_keys import (
-    CAPTURE,
     FOUND_BEAM,
     FOUND_ERROR,
     FOUND_PLACEMENT,
@@ -17,6 +16,7 @@ from ..property_keys import (
     LAMP_KIND,
     ORIGIN,
 )
+from .capture_collection import collection_of
 from .lamp_placement import DISTANT, FROM_CAMERA, MOUNTED, Placement, world_matrix
 
 Array = NDArray[np.float64]
@@ -80,10 +80,10 @@ def found_strength(lamp: bpy.types.Object) -> float | None:
 
 def scan_origin(scene: bpy.types.Scene, capture: str) -> Array:
     """(3,) point of the scan's frame at the origin of its mesh."""
-    for collection in scene.collection.children_recursive:
-        if collection.get(CAPTURE) == capture:
-            return np.array(collection.get(ORIGIN, (0.0, 0.0, 0.0)), np.float64)
-    return np.zeros(3)
+    collection = collection_of(scene, capture)
+    if collection is None:
+        return np.zeros(3)
+    return np.array(collection.get(ORIGIN, (0.0, 0.0, 0.0)), np.float64)
 
 
 def _known(value: float) -> float | None:

@@ -8,7 +8,8 @@ import bpy
 import mathutils
 import numpy as np
 
-from ..property_keys import CAMERA_LABEL, CAPTURE, PROPOSED_LAMP
+from ..property_keys import CAMERA_LABEL, PROPOSED_LAMP
+from .capture_collection import collection_of
 from .lamp_placement import world_matrix
 
 NAME = "Proposed Lamp"
@@ -21,7 +22,7 @@ def camera_of_proposed_photo(
 ) -> bpy.types.Object | None:
     """The camera of the scan that has the viewpoint of the photo; None if it was deleted. photo:
     "proposed_photo" of result.json."""
-    for thing in _collection_of(scene, capture).all_objects:
+    for thing in (collection_of(scene, capture) or scene.collection).all_objects:
         if thing.type == "CAMERA" and thing.get(CAMERA_LABEL) == photo["camera"]:
             return thing
     return None
@@ -49,7 +50,7 @@ def show_proposed_lamp(
     arrow.rotation_mode = "QUATERNION"
     arrow.rotation_quaternion = (-axis).to_track_quat("Z", "Y")
     arrow[PROPOSED_LAMP] = capture
-    _collection_of(scene, capture).objects.link(arrow)
+    (collection_of(scene, capture) or scene.collection).objects.link(arrow)
     return arrow
 
 
@@ -57,11 +58,3 @@ def remove_proposed_lamp(scene: bpy.types.Scene, capture: str) -> None:
     """Remove the arrow of an earlier fit of a capture."""
     for old in [o for o in scene.objects if o.get(PROPOSED_LAMP) == capture]:
         bpy.data.objects.remove(old)
-
-
-def _collection_of(scene: bpy.types.Scene, capture: str) -> bpy.types.Collection:
-    """The collection of the capture, or that of the scene."""
-    for collection in scene.collection.children_recursive:
-        if collection.get(CAPTURE) == capture:
-            return collection
-    return scene.collection

@@ -24,7 +24,6 @@ SHARP = (
 )  # fmt: skip
 CLIPPED_SHARE = 1.5  # per cent of the samples
 PEAK = np.radians(5.0)  # of θh
-SEEN = np.radians(65.0)  # of θd: the photos show no larger ones at the peak
 
 
 def tasks(quick: bool) -> list[tuple[str, str]]:
@@ -43,7 +42,7 @@ def work(task: tuple[str, str]) -> Records:
     measured, clipped = clip(table)
     reference = metrics.Reference.of(material.evaluate)
     c = metrics.cells()
-    peak = c.near & (c.angles.theta_h < PEAK) & (c.angles.theta_d < SEEN)
+    peak = c.near & (c.angles.theta_h < PEAK) & (c.angles.theta_d < metrics.GRAZING)
     angles, truth = Angles(*(a[peak] for a in c.angles)), reference.values[peak]
     cases: tuple[tuple[str, SampleTable, SampleTable | None], ...] = (
         ("not clipped", table, None),

@@ -28,7 +28,6 @@ SOME = (
     "leaf_maple_rgb", "paper_blue_rgb", "satin_purple_rgb",
 )  # fmt: skip
 """Materials of the scenes with scripted shapes; the reconstructed bunnies use all materials."""
-GRAZING = np.radians(65.0)  # of θd: beyond the largest angle of the eight photos
 FLOORS = (5, 20, 40, 100)
 
 
@@ -130,7 +129,7 @@ def band_coverage(
 ) -> dict[str, float]:
     """Return the fraction of cells whose true value is inside the 90 % interval (all channels,
     light and view within 80°), for cells with and without samples and for those with θd beyond
-    GRAZING. Empty without an interval."""
+    metrics.GRAZING. Empty without an interval."""
     interval = estimators.interval(fit)
     if interval is None:
         return {}
@@ -140,7 +139,7 @@ def band_coverage(
     return {
         "band_seen": float(inside[cells.near & seen].mean()),
         "band_unseen": float(inside[cells.near & ~seen].mean()),
-        "band_grazing": float(inside[cells.near & (cells.angles.theta_d > GRAZING)].mean()),
+        "band_grazing": float(inside[cells.near & (cells.angles.theta_d > metrics.GRAZING)].mean()),
     }
 
 

@@ -20,6 +20,7 @@ Evaluate = Callable[[Angles], NDArray[np.floating]]
 LIMIT = 80.0  # degrees: largest angle of light and view, for the log and cube-root errors
 SPECULAR = 10.0  # degrees of θh: the view is within twice that of the mirror direction
 PEAK = 5.0  # degrees of θh: cells of the highlight's peak
+GRAZING = float(np.radians(65.0))  # of θd: beyond the largest angle of the eight photos
 BANDS = tuple(np.radians((0.0, 30.0, 60.0, 80.0)))  # of θd, in which the peak is also evaluated
 EVERY = 3  # step in the 180 φd cells: errors change by less than 1 % of their value
 

@@ -40,7 +40,6 @@ MATERIALS = (
 )  # fmt: skip
 RANDOM_PHOTOS = 2
 MIN_ADDED_SAMPLES = 500  # a photo that shows less would be taken again
-GRAZING = np.radians(65.0)  # of θd: beyond the largest angle of the eight photos
 
 
 @dataclass(frozen=True)
@@ -110,7 +109,11 @@ def errors(
     unseen = c.near & ~seen
     found = np.asarray(fit.brdf.evaluate(c.angles), np.float64)
     square = log_ratio(found.T, reference.values.T, c.cos_product) ** 2
-    parts = {"unseen": unseen, "grazing": unseen & (c.angles.theta_d > GRAZING), "log_rms": c.near}
+    parts = {
+        "unseen": unseen,
+        "grazing": unseen & (c.angles.theta_d > metrics.GRAZING),
+        "log_rms": c.near,
+    }
     return {key: float(np.sqrt(square[:, part].mean())) for key, part in parts.items()}
 
 
