@@ -30,6 +30,9 @@ RIM_WIDTH = 0.045  # or this share of the radius, whichever is larger
 MIN_SUPPORT = 0.35  # of the profiles
 MAX_UNEXPLAINED = 0.2  # of a profile's variance: above it the profile shows no edge
 MIN_UNEXPLAINED = 0.01  # the same: below it all edges count as equally clear
+# of the radius: no search is that wide, but a cone of 180° seen through distortion can be
+# millions of pixels wide, and its profiles take half a minute
+MAX_GROWTH = 3.0
 RIM_BIAS = 0.05  # pixels: error left by the rim model, measured on rendered spheres
 MAX_GAP = np.radians(150.0)  # of azimuth without support
 MIN_EDGE_STRENGTH = 4.0  # times the median gradient of its profile
@@ -61,10 +64,12 @@ def refine_outline(
     """
     picture = np.asarray(pixels, float).sum(axis=2)
     # the votes are coarse for a large sphere, so the first refinement is coarse too
-    unit = max(1.0, pixel_radius(sphere, camera) / COARSE_RADIUS)
+    radius = pixel_radius(sphere, camera)
+    unit = max(1.0, radius / COARSE_RADIUS)
     tried = [
         _fit_rim(picture, camera, start, unit)
         for start in _vote_for_cones(picture, camera, sphere, search)
+        if pixel_radius(start, camera) < MAX_GROWTH * radius
     ]
     found = [outline for outline in tried if outline is not None]
     # repeat at a finer resolution, starting from the result
