@@ -143,13 +143,17 @@ def prepare(blender: Blender) -> Path:
     return blender.home
 
 
+def script_command(blender: Blender, script: Path, arguments: Sequence[str]) -> list[str]:
+    """Return the command that runs a script in Blender, with the extension enabled."""
+    return [
+        str(blender.program), "-b", "--factory-startup", "--addons", PACKAGE,
+        "--python-exit-code", "1", "-P", str(script), "--", *arguments,
+    ]  # fmt: skip
+
+
 def run_script(blender: Blender, home: Path, script: Path, arguments: Sequence[str]) -> int:
     """Run a script in Blender, with the extension of that user folder enabled."""
-    command = [
-        blender.program, "-b", "--factory-startup", "--addons", PACKAGE,
-        "--python-exit-code", "1", "-P", script, "--", *arguments,
-    ]  # fmt: skip
-    return call(command, env=private(home))
+    return call(script_command(blender, script, arguments), env=private(home))
 
 
 @contextlib.contextmanager

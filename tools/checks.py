@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from .blender import find_blender, install, run_script, scratch_home
+from .blender import find_blender, install, private, run_script, scratch_home, script_command
 from .build import DIST
 from .common import ROOT, Failure, cache_dir, call, say, this_platform
 from .environment import test_python
@@ -58,19 +59,28 @@ def python_tests(python: Path, arguments: Sequence[str]) -> int:
         named = any(Path(word.split("::")[0]).exists() for word in arguments)
         folders = [] if named else [*PLAIN_TESTS, *BPY_TESTS]
         return call([*_pytest(python), *arguments, *folders])
+    with beside([*_pytest(python), *map(str, BPY_TESTS)]) as with_bpy:
+        code = call([*_pytest(python), *PLAIN_TESTS])
+    return code or with_bpy.returncode
+
+
+@contextlib.contextmanager
+def beside(
+    command: Sequence[str], env: Mapping[str, str] | None = None
+) -> Iterator[subprocess.Popen[str]]:
+    """Run a command beside the body of a `with`, wait for it, and print its output then."""
     with tempfile.TemporaryFile("w+", encoding="utf-8") as output:
-        with_bpy = subprocess.Popen(
-            [*_pytest(python), *map(str, BPY_TESTS)], stdout=output, stderr=subprocess.STDOUT
+        process = subprocess.Popen(
+            command, stdout=output, stderr=subprocess.STDOUT, env=env and dict(env), text=True
         )
         try:
-            code = call([*_pytest(python), *PLAIN_TESTS])
-            other = with_bpy.wait()
+            yield process
+            process.wait()
         finally:
-            with_bpy.kill()  # does nothing where it has ended
-            with_bpy.wait()
+            process.kill()  # does nothing where it has ended
+            process.wait()
         output.seek(0)
         shutil.copyfileobj(output, sys.stdout)
-    return code or other
 
 
 def _pytest(python: Path) -> list[str]:
@@ -79,24 +89,41 @@ def _pytest(python: Path) -> list[str]:
     return [str(word) for word in words]
 
 
-def blender_tests() -> int:
-    """Build the zip of this platform, install it in an empty user folder, run tests/blender."""
+def blender_tests(words: Sequence[str], processes: int) -> int:
+    """Build the zip of this platform, install it in empty user folders, and run tests/blender.
+
+    words: only tests whose name holds one of them. processes: number of Blenders that share them.
+    """
     blender = find_blender()
     if blender is None:
         raise Failure(
             "found no Blender; --blender requires Blender >= 4.2 on PATH or in PATINA_BLENDER"
         )
     archive = pack(blender.extension_tool, [this_platform()], PYTHONS, DIST)[0]
-    with scratch_home() as home:
-        install(blender, archive, home)
+    script = ROOT / "tests/blender/run_all.py"
+    with scratch_home() as home, contextlib.ExitStack() as others:
+        claims = home / "claims"
+        claims.mkdir(parents=True)
+        homes = [home / str(number) for number in range(processes)]
+        for each in homes:
+            install(blender, archive, each)
         say(f"installed {archive.name} in Blender {blender.label}")
-        return run_script(blender, home, ROOT / "tests/blender/run_all.py", [])
+        shared = ["--claims", str(claims)] if processes > 1 else []
+        arguments = [*shared, *words]
+        command = script_command(blender, script, arguments)
+        running = [others.enter_context(beside(command, private(each))) for each in homes[1:]]
+        code = run_script(blender, homes[0], script, arguments)
+        others.close()
+        return next(filter(None, [code, *(process.returncode for process in running)]), 0)
 
 
 def main(arguments: Sequence[str]) -> int:
     """Run all stages, even after a failure; return 1 if any of them failed."""
     parser = argparse.ArgumentParser(
-        prog="run.py test", description=__doc__, epilog="All other arguments are passed to pytest."
+        prog="run.py test",
+        description=__doc__,
+        epilog="All other arguments are passed to pytest; with --only-blender they are words, and "
+        "only tests whose name holds one of them are run.",
     )
     parser.add_argument(
         "--blender",
@@ -104,6 +131,13 @@ def main(arguments: Sequence[str]) -> int:
         help="also test the zip of this platform in a real Blender",
     )
     parser.add_argument("--only-blender", action="store_true", help="run only the tests in Blender")
+    parser.add_argument(
+        "--processes",
+        type=int,
+        default=1,
+        metavar="N",
+        help="number of Blenders that share the tests in Blender",
+    )
     options, rest = parser.parse_known_args(arguments)
     stages: list[tuple[str, Callable[[], int]]] = []
     if not options.only_blender:
@@ -115,7 +149,8 @@ def main(arguments: Sequence[str]) -> int:
             ("pytest", lambda: python_tests(python, rest)),
         ]
     if options.blender or options.only_blender:
-        stages.append(("blender", blender_tests))
+        words = rest if options.only_blender else []
+        stages.append(("blender", lambda: blender_tests(words, options.processes)))
     failed = []
     for name, stage in stages:
         start = time.monotonic()

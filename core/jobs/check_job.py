@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator
 from ..concurrency.background import in_background
 from ..concurrency.job import Job, Step, finished
 from ..diagnose.assessment.assessment import Assessment
+from ..diagnose.pixels.pixel_selection import COUNT
 from ..diagnose.selection.effect_subset import with_contradicted
 from ..diagnose.solver.model_fit import ModelFit
 from .diagnose_job import EXAMINING, DiagnoseJob
@@ -22,12 +23,13 @@ class CheckJob(Job):
     The diagnosis then has an assessment too.
     ``fitted``: the joint fit that the second one is based on, None if it corrects nothing.
     Causes that the second fit does not confirm are no longer named (Diagnosis.contradicted). The
-    materials of ``result`` have portable forms if those of ``fit`` would have had them."""
+    materials of ``result`` have portable forms if those of ``fit`` would have had them. pixels: as
+    in DiagnoseJob."""
 
-    def __init__(self, fit: FitJob, without: Collection[str] = ()) -> None:
+    def __init__(self, fit: FitJob, without: Collection[str] = (), pixels: int = COUNT) -> None:
         super().__init__()
         self.portable, fit.portable = fit.portable, False  # of the second fit's materials only
-        self.checked = DiagnoseJob(fit)
+        self.checked = DiagnoseJob(fit, pixels=pixels)
         self.without = frozenset(without)
         self.result: CaptureResult | None = None
         self.fitted: ModelFit | None = None

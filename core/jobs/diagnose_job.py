@@ -19,7 +19,7 @@ from ..diagnose.forward.diagnosis_context import DiagnosisContext
 from ..diagnose.forward.known_variation import KnownVariation
 from ..diagnose.forward.material_brdfs import MaterialBRDFs
 from ..diagnose.forward.rig import Rig
-from ..diagnose.pixels.pixel_selection import select_pixels
+from ..diagnose.pixels.pixel_selection import COUNT, select_pixels
 from ..diagnose.selection.diagnosis import Diagnosis
 from ..diagnose.selection.search import search
 from ..fit.measured_result import MeasuredResult
@@ -49,13 +49,15 @@ class DiagnoseJob(Job):
     CheckJob, after the second fit. separate: whether a single material may be separated into
     several first (VaryingJob); ``parts`` is then the separation, and ``fit`` the fit of its
     materials. ``surface``: observations of a grid of CHOICE_NODES; None where there are more than
-    MAX_MATERIALS."""
+    MAX_MATERIALS. pixels: number of pixels that are examined, of all photos together; fewer take
+    less time and show fewer causes."""
 
     STORED_APART: ClassVar[bool] = True
 
-    def __init__(self, fit: FitJob, separate: bool = False) -> None:
+    def __init__(self, fit: FitJob, separate: bool = False, pixels: int = COUNT) -> None:
         super().__init__()
         self.fit = fit
+        self.pixels = pixels
         self.separate = separate
         self.parts: SeparatedFit | None = None
         self.surface: SurfaceObservations | None = None
@@ -76,7 +78,7 @@ class DiagnoseJob(Job):
         variation = yield from self._variation(finished(self.fit.result))
         result = finished(self.fit.result)
         with thread_pool(thread_count(self.fit.threads)) as pool:
-            steps = context_of(result, pool, variation)
+            steps = context_of(result, pool, variation, self.pixels)
             self.context = yield from _stepped(steps, EXAMINING, VARIED, EXAMINED)
             yield Step(EXAMINING, EXAMINED)
             self.found = yield from _stepped(self._search(pool), TESTING, EXAMINED, 1.0)
@@ -110,15 +112,16 @@ def context_of(
     result: CaptureResult,
     pool: ThreadPoolExecutor | None = None,
     variation: KnownVariation | None = None,
+    count: int = COUNT,
 ) -> Generator[float, None, DiagnosisContext]:
     """The input of a diagnosis; yields the fraction done. variation: of the materials over the
-    surface. Raises what select_pixels raises."""
+    surface. count: pixels of all photos together. Raises what select_pixels raises."""
     capture = result.capture
     brdfs = MaterialBRDFs.of([m.fit.brdf for m in result.materials])
     rays = result.rays.close()
     scale = np.array([material.scale for material in result.materials], np.float32)
     pixels = yield from select_pixels(
-        capture, result.scan, rays, result.photos, result.lights, brdfs, scale, pool
+        capture, result.scan, rays, result.photos, result.lights, brdfs, scale, pool, count
     )
     level = float(np.median(pixels.irradiance))
     pixels = replace(pixels, irradiance=pixels.irradiance / scale[pixels.material, None])

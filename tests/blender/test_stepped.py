@@ -10,10 +10,18 @@ from types import SimpleNamespace
 
 import bpy
 from support import extension, without_window
-from test_workflow import counts
+from test_workflow import counts, folder, make_capture_module
 
 TIMER, ESC = SimpleNamespace(type="TIMER"), SimpleNamespace(type="ESC")
 MOUSE = SimpleNamespace(type="MOUSEMOVE")
+
+
+def import_ball() -> None:
+    """A small capture of one material, which takes a quarter of the demo's time."""
+    path = make_capture_module().make_capture(
+        folder() / "ball", photos=3, extra="[fit]\nheld_out = false"
+    )
+    assert bpy.ops.patina.import_capture(filepath=str(path)) == {"FINISHED"}
 
 
 def begun(module: str, name: str):
@@ -36,7 +44,7 @@ def tick_durations(operator) -> list[float]:
 
 
 def test_fit_by_timer_equals_fit_by_script() -> None:
-    assert bpy.ops.patina.import_demo() == {"FINISHED"}
+    import_ball()
     running = extension("scene.session.running_job").running
     ticks = tick_durations(begun("fit", "PATINA_OT_fit"))
     measured = extension("scene.scan.apply_result").measured_materials
@@ -61,6 +69,7 @@ def test_no_job_starts_a_thread_in_the_process_of_blender() -> None:
     try:
         assert bpy.ops.patina.propose_materials() == {"FINISHED"}
         assert bpy.ops.patina.shadow_masks(replace=True) == {"FINISHED"}
+        import_ball()
         assert bpy.ops.patina.fit() == {"FINISHED"}
         assert bpy.ops.patina.show_chart(kind="sphere") == {"FINISHED"}
     finally:
@@ -69,7 +78,7 @@ def test_no_job_starts_a_thread_in_the_process_of_blender() -> None:
 
 
 def test_a_killed_process_is_one_sentence_and_changes_nothing() -> None:
-    assert bpy.ops.patina.import_demo() == {"FINISHED"}
+    import_ball()
     before = counts()
     operator = begun("fit", "PATINA_OT_fit")
     while operator._child.now.stage in ("", "Starting"):

@@ -143,7 +143,7 @@ def test_maps_are_undone_with_the_fit() -> None:
 
 
 def test_check_keeps_the_variation() -> None:
-    imported("bands", 8, brdf=bands)
+    imported("bands", brdf=bands)
     check_few_pixels()
     scene = bpy.context.scene
     assert images(bpy.data.materials["surface"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import json
 import sys
@@ -224,13 +225,14 @@ def test_demo_by_operator_equals_demo_by_api() -> None:
 
 
 def check_few_pixels() -> None:
-    """Check with a part of the pixels: numpy of some Blender versions is slow."""
-    select = extension("core.diagnose.pixels.pixel_selection").select_pixels
-    usual, select.__defaults__ = select.__defaults__, (3000,)
+    """Check with an eighth of the pixels: numpy of some Blender versions is slow."""
+    operator = extension("operators.check")
+    usual = operator.CheckJob
+    operator.CheckJob = functools.partial(usual, pixels=3000)
     try:
         assert bpy.ops.patina.check() == {"FINISHED"}
     finally:
-        select.__defaults__ = usual
+        operator.CheckJob = usual
 
 
 def test_check_names_light_drift_and_fit_can_include_or_skip_it() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from patina.core.capture import read_capture
+from patina.core.diagnose import effects
 from patina.core.jobs import FitJob, finished
 from patina.core.jobs.check_job import CheckJob
 from patina.core.jobs.refit_job import RefitJob
@@ -19,6 +20,10 @@ from tests.core.test_varying_job import NODES, held_out_errors, paint, painted
 pytestmark = pytest.mark.slow
 
 PHOTOS, HELD_OUT = 9, 8  # all, and the place of the one that is not fitted
+RIVALS = {
+    "ambient_light", "camera_response", "veiling_glare", "interreflection", "light_intensity",
+}  # fmt: skip
+"""Causes that look similar: they raise dark pixels, or change the level of a photo."""
 BLACK = 0.05  # radiance that is added to the fitted photos; their median is 0.07
 
 
@@ -34,8 +39,12 @@ def capture(tmp_path_factory):
 @pytest.fixture(scope="module")
 def check(capture):
     fit = FitJob(select_photos(capture, range(HELD_OUT)), portable=False)
-    job = VaryingSecondFit(CheckJob(fit), nodes=NODES)
-    job.drain()
+    job = VaryingSecondFit(CheckJob(fit, pixels=8000), nodes=NODES)
+    tested = tuple(kind for kind in effects.EFFECTS if kind.cause in {"black_level", *RIVALS})
+    assert len(tested) == 1 + len(RIVALS)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(effects, "EFFECTS", tested)
+        job.drain()
     return job
 
 

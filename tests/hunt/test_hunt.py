@@ -25,9 +25,12 @@ CASES = {
     "anisotropy": (0.1, 2, "anisotropy"),  # its step is weaker than that of unrelated effects
 }
 """Strength, seed, and the expected cause; moiré is not among the known causes."""
+NIGHTLY = {"anisotropy"}
 
 
-@pytest.mark.parametrize("cause", CASES)
+@pytest.mark.parametrize(
+    "cause", [pytest.param(c, marks=[pytest.mark.nightly] * (c in NIGHTLY)) for c in CASES]
+)
 def test_simulated_cause_is_found(cause, tmp_path):
     strength, seed, expected_cause = CASES[cause]
     truth = make(tmp_path, cause, strength, seed)

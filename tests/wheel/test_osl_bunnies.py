@@ -88,7 +88,6 @@ def behind_ball(point: np.ndarray, towards: np.ndarray) -> np.ndarray:
 
 CASES = {  # test_osl_worlds.py renders spheres in all worlds, in less time
     "glossy-interior": (GLOSSY.evaluate, "interior"),
-    "matte-forest": (lambert, "forest"),
 }
 
 

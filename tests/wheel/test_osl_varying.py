@@ -98,8 +98,11 @@ def test_sun_on_changed_material(made, specular, roughness, tmp_path):
     assert error < 0.005
 
 
-@MATERIALS
-@pytest.mark.parametrize(("specular", "roughness"), [(1.0, 2.0), (2.5, 0.6)])
+@pytest.mark.parametrize(
+    ("made", "specular", "roughness"),
+    [(COATED, 1.0, 2.0), (METAL, 2.5, 0.6)],
+    ids=["rough-coated", "sharp-metal"],
+)
 def test_changed_material_under_environment_image(made, specular, roughness, tmp_path):
     """The sampling of half vectors follows the roughness, and its weights stay unbiased."""
     brdf = projected(made.evaluate, 60)

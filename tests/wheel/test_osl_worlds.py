@@ -42,8 +42,14 @@ def brdf_of(evaluate) -> PrincipalBRDF:
 GLOSSY = Principled(base_color=np.array([0.4, 0.1, 0.05]), roughness=0.3)
 
 
-@pytest.mark.parametrize("name", ["forest", "interior", "sunset"])
-@pytest.mark.parametrize("made", [GLOSSY.evaluate, lambert], ids=["glossy", "matte"])
+SPHERES = {  # each world and each material at least once
+    "glossy-interior": (GLOSSY.evaluate, "interior"),
+    "glossy-sunset": (GLOSSY.evaluate, "sunset"),
+    "matte-forest": (lambert, "forest"),
+}
+
+
+@pytest.mark.parametrize(("made", "name"), SPHERES.values(), ids=SPHERES.keys())
 def test_sphere_under_environment_image(made, name, tmp_path):
     if name not in WORLDS:
         pytest.skip(f"this bpy has no world {name!r}")
