@@ -69,7 +69,6 @@ def test_no_job_starts_a_thread_in_the_process_of_blender() -> None:
     try:
         assert bpy.ops.patina.propose_materials() == {"FINISHED"}
         assert bpy.ops.patina.shadow_masks(replace=True) == {"FINISHED"}
-        import_ball()
         assert bpy.ops.patina.fit() == {"FINISHED"}
         assert bpy.ops.patina.show_chart(kind="sphere") == {"FINISHED"}
     finally:

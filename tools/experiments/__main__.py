@@ -14,7 +14,16 @@ from ..common import say
 from ..package import load_patina
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-NAMES = ("check", "ablation", "sweeps", "goals", "clipped", "proposed_photo", "appearance")
+NAMES = (
+    "check",
+    "ablation",
+    "sweeps",
+    "goals",
+    "goniometer",
+    "clipped",
+    "proposed_photo",
+    "appearance",
+)
 
 
 def main() -> int:

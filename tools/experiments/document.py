@@ -31,7 +31,7 @@ X_LABELS = {
     "stereo tool": "mesh made by",
 }
 SUMMARISED = (
-    "check", "goals", "by scene", "priors", "clipped", "proposed photo", "models",
+    "check", "goals", "by scene", "priors", "clipped", "proposed photo", "goniometer", "models",
     "models by material",
 )  # fmt: skip
 Section = Callable[[list[Record]], str]
@@ -48,6 +48,7 @@ def sections() -> dict[str, tuple[str, Section]]:
         "priors": ("goals", goal_table.priors),
         "clipped": ("clipped", tables.clipped),
         "proposed photo": ("proposed_photo", tables.proposed_photo),
+        "goniometer": ("goniometer", tables.goniometer),
         "polar": ("ablation", _polar),
         "ablation": ("ablation", _ablation),
         "similarity": ("ablation", _similarity),

@@ -98,7 +98,7 @@ def basis_for(
     in_basis: return the basis of all 100 materials of MERL, which includes the paper's six.
     merl_prior: learn the prior from MERL alone.
     """
-    validation = tuple(_encodings("nbrdf_validation.npz"))
+    validation = validation_names()
     if merl_prior:
         own = (material.name,) if material.trained and not in_basis else ()
         return _basis((*validation, *own), count)
@@ -106,6 +106,17 @@ def basis_for(
         part = fold_of(material.name)
         return _basis(tuple(n for n in validation if fold_of(n) == part), count)
     return _basis(() if in_basis else (material.name,), count)
+
+
+def full_basis(count: int = 40, merl_prior: bool = False) -> TrainedBasis:
+    """Return the basis of all 100 materials of MERL; its prior is learnt from these and the
+    validation materials, or with merl_prior from MERL alone."""
+    return _basis(validation_names() if merl_prior else (), count)
+
+
+def validation_names() -> tuple[str, ...]:
+    """Return the names of the 25 materials that are not in MERL."""
+    return tuple(_encodings("nbrdf_validation.npz"))
 
 
 def _kind(name: str) -> str:

@@ -168,3 +168,23 @@ def clipped(records: list[Record]) -> str:
         "truth in the 90 % interval at the peak", "log RMS", "cube root",
     ]  # fmt: skip
     return table(head, rows)
+
+
+def goniometer(records: list[Record]) -> str:
+    """Compare fits with the values of a gonioreflectometer: one row per paint, scene and fit."""
+    rows = []
+    for r in sorted(records, key=lambda r: r["material"]):
+        paper = where(records, scene=r["scene"], material=r["material"], estimator="paper")
+        ratio = r["log_rms"] / paper[0]["log_rms"] if paper else float("nan")
+        rows.append(
+            [
+                r["material"], r["scene"], r["estimator"], number(r["log_rms"]),
+                number(ratio), number(r["typical"]), number(r["peak_rms"]),
+                f"{100 * r['inside']:.0f} %" if "inside" in r else "–",
+            ]
+        )  # fmt: skip
+    head = [
+        "paint", "scene", "fit", "log RMS", "÷ paper's", "median |ln|", "log RMS, θh < 10°",
+        "measured value in the 90 % interval",
+    ]  # fmt: skip
+    return table(head, rows)
