@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from patina.commands import command_line
+from patina.core.batch import remote
 from patina.core.batch.cluster import Limits
 from patina.core.batch.collection import Item, read_collection
 from patina.core.batch.farm_files import write_openjd
@@ -126,6 +127,18 @@ def test_limits_of_time_and_memory_stop_a_process(tmp_path, capsys):
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_a_process_does_not_inherit_how_dask_frees_memory(tmp_path, monkeypatch):
+    monkeypatch.setenv("MALLOC_TRIM_THRESHOLD_", "65536")  # as Dask sets it for its workers
+    monkeypatch.setenv("PATINA_TEST_INHERITED", "1")
+    names = ["OWN", "PATINA_TEST_INHERITED", "MALLOC_TRIM_THRESHOLD_"]
+    code = f"import os, sys; sys.exit(' '.join(n for n in {names} if n in os.environ))"
+    place = str(tmp_path / "a")
+    ended = remote.run_process(
+        [sys.executable, "-c", code], {"OWN": "1"}, place, f"{place}.json", "", 1, 0.0, 0.0
+    )
+    assert ended["message"] == "OWN PATINA_TEST_INHERITED"
+
+
 def test_lost_workers_and_schedulers_cost_no_result(tmp_path):
     count = 40
     path = collection(tmp_path / "all", **{f"object{k:02d}": "pause" for k in range(count)})
