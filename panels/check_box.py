@@ -6,13 +6,14 @@ from typing import Any
 
 import bpy
 
-from ..core.diagnose.effects.labels import cause_label
+from ..core.diagnose.effects.labels import ORIGINS, cause_label, origin_of
 from ..scene.session.lengths import with_lengths
 from ..scene.session.overlay_shading import overlay_shown
 from ..scene.views.evidence import RESIDUAL
 from .wrapped import IN_BOX, wrapped
 
-MAX_CAUSES = 6  # causes that the panel lists
+HEADINGS = ("Held-out regions, RMS error:", "Held-out photos, median error:")
+MAX_CAUSES = 8  # causes without effect that the panel lists
 
 
 def draw_check(
@@ -26,15 +27,15 @@ def draw_check(
     switch off.
     """
     base, extended = diagnosis["baseline"], diagnosis["extended"]
-    errors = [("Held-out regions, RMS error", base["held_out"], extended["held_out"])]
+    errors = [("All materials", base["held_out"], extended["held_out"])]
     for material in diagnosis["materials"]:  # diagnoses by earlier versions have no typical errors
         errors.append(
             (material["name"], material.get("typical_before"), material.get("typical_after"))
         )
     for index, (label, before, after) in enumerate(errors):
         if before is not None and after is not None:
-            if index == 1:
-                layout.label(text="Held-out photos, median error:")
+            if index < len(HEADINGS):
+                layout.label(text=HEADINGS[index])
             row = layout.row()
             row.label(text=label, icon="MATERIAL" if index else "NONE")
             row.label(text=f"{100 * before:.1f} → {100 * after:.1f} %")
@@ -47,30 +48,19 @@ def draw_check(
     ).cause = RESIDUAL
     ranked = diagnosis["causes"]
     largest = max((_significance(c) for c in ranked), default=1.0)
-    for cause in ranked[:MAX_CAUSES]:
-        box = layout.box()
-        row = box.row()
-        label = cause_label(cause["cause"])
-        switch = causes.get(cause["cause"])
-        if switch is not None and cause["accepted"]:
-            row.prop(switch, "use", text="")
-        bar = row.row()
-        # greyed out otherwise, as in the report
-        bar.active = cause["accepted"] and not cause.get("contradicted")
-        bar.progress(
-            text=label, factor=min(max(_significance(cause) / max(largest, 1e-9), 0), 1), type="BAR"
-        )
-        if cause["accepted"]:
-            row.operator(
-                "patina.show_evidence",
-                text="",
-                icon="HIDE_OFF",
-                depress=shown == cause["cause"],
-            ).cause = cause["cause"]
-        if cause["accepted"] or cause.get("contradicted"):
-            wrapped(box, with_lengths(cause["sentence"]), "BLANK1", IN_BOX)
-        if bar.active and "action" in cause:  # not in results of earlier versions
-            wrapped(box, cause["action"], "FORWARD", IN_BOX)
+    reported = [c for c in ranked if c["accepted"] or c.get("contradicted")]
+    for origin in (*ORIGINS, "Other"):
+        mine = [c for c in reported if origin_of(c["cause"]) == origin]
+        if mine:
+            layout.label(text=origin)
+        for cause in mine:
+            _draw_cause(layout, cause, causes, largest, shown)
+    others = [c for c in ranked if c not in reported]
+    if others:
+        header, body = layout.panel("patina_causes_without_effect", default_closed=True)
+        header.label(text="Also Tested, Without Effect")
+        for cause in others[:MAX_CAUSES] if body is not None else ():
+            _draw_cause(body, cause, causes, largest, shown)
     if len(causes):
         used = {cause.name for cause in causes if cause.use}
         changed = used != set(diagnosis["applied"])
@@ -81,6 +71,37 @@ def draw_check(
         wrapped(layout, diagnosis["scan_quality"]["sentence"], "INFO")
     if diagnosis["unexplained"]:
         wrapped(layout, with_lengths(diagnosis["left"]["sentence"]), "QUESTION")
+
+
+def _draw_cause(
+    layout: bpy.types.UILayout,
+    cause: dict[str, Any],
+    causes: bpy.types.bpy_prop_collection,
+    largest: float,
+    shown: str,
+) -> None:
+    """Draw one cause. largest: significance of the first one; shown: cause of the overlay."""
+    box = layout.box()
+    row = box.row()
+    switch = causes.get(cause["cause"])
+    if switch is not None and cause["accepted"]:
+        row.prop(switch, "use", text="")
+    bar = row.row()
+    # greyed out otherwise, as in the report
+    bar.active = cause["accepted"] and not cause.get("contradicted")
+    factor = min(max(_significance(cause) / max(largest, 1e-9), 0), 1)
+    bar.progress(text=cause_label(cause["cause"]), factor=factor, type="BAR")
+    if cause["accepted"]:
+        row.operator(
+            "patina.show_evidence",
+            text="",
+            icon="HIDE_OFF",
+            depress=shown == cause["cause"],
+        ).cause = cause["cause"]
+    if cause["accepted"] or cause.get("contradicted"):
+        wrapped(box, with_lengths(cause["sentence"]), "BLANK1", IN_BOX)
+    if bar.active and "action" in cause:  # not in results of earlier versions
+        wrapped(box, cause["action"], "FORWARD", IN_BOX)
 
 
 def _significance(cause: dict[str, Any]) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..diagnose.assessment.assessment import Assessment
 from ..diagnose.effects.actions import ACTIONS
+from ..diagnose.effects.labels import ORIGINS, cause_label, origin_of
 from ..diagnose.forward.diagnosis_context import DiagnosisContext
 from ..diagnose.selection.diagnosis import Diagnosis, Trial
 from ..diagnose.selection.residual_trends import Trend, coordinates, trend
@@ -73,18 +74,36 @@ def _pictures(folder: Path, found: Diagnosis, context: DiagnosisContext) -> str:
 def section(found: Diagnosis, context: DiagnosisContext) -> str:
     """HTML: the ranked causes, then charts of the residual along the diagnostic coordinates."""
     left = f"<p>{escape(found.residual.sentence())}</p>" if found.unexplained else ""
-    rows = "".join(_row(t, found) for t in found.ranked)
-    named = ", ".join(found.causes) or "No known cause found."
+    named = ", ".join(map(cause_label, found.causes)) or "No known cause found."
     return (
         f"<h2>Causes</h2><p><b>{escape(named)}</b></p>{left}"
         f"<p>{escape(found.quality.sentence())}</p>"
         "<p class='sub'>Gain: improvement of the prediction of held-out regions of the photos by "
         "the model with this cause, in standard errors.</p>"
-        f"{_errors(found)}<table><tr><th>Cause</th><th>Gain</th><th></th><th>Meaning"
-        f"</th></tr>{rows}</table><div class='charts'>{_charts(found, context)}</div>"
+        f"{_errors(found)}{_causes(found)}<div class='charts'>{_charts(found, context)}</div>"
         "<p class='sub'>Residual (photo minus prediction) relative to the prediction. Red: before "
         "correction, blue: after. Bars: two standard errors.</p>"
     )
+
+
+def _causes(found: Diagnosis) -> str:
+    """HTML: the reported causes by their origin, then, folded, what was tested without success."""
+    html = ""
+    for origin in (*ORIGINS, "Other"):
+        mine = [t for t in found.reported if origin_of(t.effect.cause) == origin]
+        html += f"<h3>{origin}</h3>{_table(mine, found)}" if mine else ""
+    others = [t for t in found.ranked if t not in found.reported]
+    if others:
+        html += (
+            f"<details><summary>{len(others)} other causes were tested: including them does not "
+            f"predict the photos better</summary>{_table(others, found)}</details>"
+        )
+    return html
+
+
+def _table(trials: Sequence[Trial], found: Diagnosis) -> str:
+    rows = "".join(_row(trial, found) for trial in trials)
+    return f"<table><tr><th>Cause</th><th>Gain</th><th></th><th>Meaning</th></tr>{rows}</table>"
 
 
 def _errors(found: Diagnosis) -> str:
@@ -126,8 +145,8 @@ def _evidence(folder: Path, found: Diagnosis, context: DiagnosisContext) -> str:
         cause, file = trial.effect.cause, evidence_file(trial.effect.cause)
         write_png(folder / file, residual_picture(pixels, -changed, photo))
         cells += (
-            f"<figure><img src='{file}' alt='{cause}'><figcaption>{cause} in photo {photo + 1}"
-            "</figcaption></figure>"
+            f"<figure><img src='{file}' alt='{cause_label(cause)}'><figcaption>"
+            f"{cause_label(cause)} in photo {photo + 1}</figcaption></figure>"
         )
     if not cells:
         return ""
@@ -161,7 +180,7 @@ def _materials(folder: Path, before: CaptureResult, after: CaptureResult) -> str
                 f"<figcaption>{escape(one.name)}, {stage}{error}</figcaption></figure>"
             )
         rows += f"<div class='triple'>{cells}</div>"
-    causes = ", ".join(effect.cause for effect in after.effects)
+    causes = ", ".join(cause_label(effect.cause) for effect in after.effects)
     return (
         f"<h2>Materials corrected for {escape(causes)}</h2>{rows}<p class='sub'>The samples are "
         "corrected for the named causes before the second fit. The material after correction is "
@@ -176,7 +195,7 @@ def _row(trial: Trial, found: Diagnosis) -> str:
     meaning += f"<br><b>{escape(ACTIONS[trial.effect.cause])}</b>" if named else ""
     style = "background:#2f6fb0" if named else "background:#bbb"
     return (
-        f"<tr><th>{escape(trial.effect.cause)}</th><td>{trial.ratio:.1f}</td><td>"
+        f"<tr><th>{escape(cause_label(trial.effect.cause))}</th><td>{trial.ratio:.1f}</td><td>"
         f"<div style='height:10px;width:{width}px;{style}'></div></td>"
         f"<td>{meaning}</td></tr>"
     )

@@ -1,4 +1,4 @@
-"""Names of the causes for users."""
+"""Names of the causes for users, and where each cause lies."""
 
 from __future__ import annotations
 
@@ -26,6 +26,22 @@ LABELS = {
     "unknown": "Unknown Cause",
     "residual": "Residual",
 }
+
+ORIGINS = {
+    "Light": (
+        "light_intensity", "light_direction", "near_light", "flash_offset", "area_light",
+        "ambient_light", "environment_reflection", "interreflection", "cast_shadow",
+    ),
+    "Camera": ("camera_response", "black_level", "clipping", "vignetting", "veiling_glare"),
+    "Scan": ("camera_pose", "normal_error"),
+    "Material": ("anisotropy", "second_material", "subsurface", "outside_basis"),
+}  # fmt: skip
+"""What a user would change, repair or repeat → its causes. The order is that of the report."""
+
+
+def origin_of(cause: str) -> str:
+    """One of ORIGINS; Other for identifiers that are not in it."""
+    return next((origin for origin, causes in ORIGINS.items() if cause in causes), "Other")
 
 
 def cause_label(cause: str) -> str:
