@@ -47,6 +47,10 @@ class Paint:
     compared: NDArray[np.bool_]
     table: TabulatedBRDF
 
+    def evaluate(self, angles: Angles) -> NDArray[np.float32]:
+        """ρ (n, 3) in 1/sr of the table; 0 beyond its last cells at the horizon."""
+        return np.maximum(self.table.evaluate(angles), 0)
+
 
 def tasks(quick: bool) -> list[tuple[str, str]]:
     """Return (scene, paint) of each task."""
@@ -60,10 +64,10 @@ def work(task: tuple[str, str]) -> Records:
     scene, name = task
     paint = measured(name)
     sampled = scenes.sampled(scene)
-    light = sampled.true.transport(paint.table.evaluate)
+    light = sampled.true.transport(paint.evaluate)
     common = {"scene": scene, "material": name, "seed": 0}
     found: Records = [
-        {**common, "estimator": "spline", **errors(paint, paint.table.evaluate(paint.angles))}
+        {**common, "estimator": "spline", **errors(paint, paint.evaluate(paint.angles))}
     ]
     for row in estimators.rows().values():
         if row.name not in ROWS:
