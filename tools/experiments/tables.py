@@ -184,7 +184,7 @@ def goniometer(records: list[Record]) -> str:
             ]
         )  # fmt: skip
     head = [
-        "paint", "scene", "fit", "log RMS", "÷ paper's", "median |ln|", "log RMS, θh < 10°",
-        "measured value in the 90 % interval",
+        "paint", "scene", "fit", "log RMS", "÷ paper's", "median of the absolute logarithm",
+        "log RMS, θh < 10°", "measured value in the 90 % interval",
     ]  # fmt: skip
     return table(head, rows)
