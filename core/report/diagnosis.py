@@ -95,8 +95,8 @@ def _causes(found: Diagnosis) -> str:
     others = [t for t in found.ranked if t not in found.reported]
     if others:
         html += (
-            f"<details><summary>{len(others)} other causes were tested: including them does not "
-            f"predict the photos better</summary>{_table(others, found)}</details>"
+            f"<details><summary>Tested without effect ({len(others)}): with these causes, the "
+            f"photos are not predicted better</summary>{_table(others, found)}</details>"
         )
     return html
 

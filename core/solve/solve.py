@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -50,7 +51,8 @@ def solve(photos: Sequence[PhotoFile], lens: str, threads: int | None, work: Wor
     """Cameras of all photos that can be placed. Raises PatinaError where there are too few."""
     _check_count(len(photos), "")
     cores = threads or os.cpu_count() or 1
-    with scratch_folder() as folder:  # a database on a network drive would be slow, or fail
+    # a database on a network drive would be slow, or fail
+    with scratch_folder() as folder, _full_disk_as_error(folder):
         store = FeatureStore(folder / "features.db", lens)
         try:
             colours, first, unreadable = _extract(photos, store, cores, work)
@@ -97,6 +99,20 @@ def solve(photos: Sequence[PhotoFile], lens: str, threads: int | None, work: Wor
         for other in by_size[1:]
     )
     return Solution(model, len(photos), tuple(unplaced), tuple(unreadable), others)
+
+
+@contextmanager
+def _full_disk_as_error(folder: Path) -> Iterator[None]:
+    """Turn the error of a full disk, which COLMAP's database raises, into a PatinaError."""
+    try:
+        yield
+    except RuntimeError as error:
+        if "disk is full" not in str(error):
+            raise
+        raise PatinaError(
+            f"{folder.parent}: the disk is full; free some space, or set TMPDIR to a folder with "
+            "more space for temporary files"
+        ) from error
 
 
 def _check_count(count: int, why: str) -> None:

@@ -20,6 +20,7 @@ from patina.core.scan.formats import read_reconstruction
 from patina.core.scan.mesh import read_mesh
 from patina.core.scan.readers.colmap import read_colmap
 from patina.core.solve import LocaliseJob, SolveJob, find_photos
+from patina.core.solve.solve import _full_disk_as_error
 from tests import make_photos_of_scene as made
 
 VIEWS = 14
@@ -205,3 +206,10 @@ def test_raw_files_with_a_developed_picture_are_skipped(tmp_path: Path) -> None:
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_bytes(b"")
     assert [p.name for p in find_photos(tmp_path)] == ["a.JPG", "b.cr2", "deep/d.tif"]
+
+
+def test_full_disk_is_one_sentence(tmp_path):
+    with pytest.raises(PatinaError, match="disk is full"), _full_disk_as_error(tmp_path / "a"):
+        raise RuntimeError("[database_sqlite.cc:1362] SQLite error: database or disk is full")
+    with pytest.raises(RuntimeError, match="another"), _full_disk_as_error(tmp_path / "a"):
+        raise RuntimeError("another error")
