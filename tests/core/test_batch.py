@@ -125,8 +125,6 @@ def test_limits_of_time_and_memory_stop_a_process(tmp_path, capsys):
     assert len(started) == 1
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_a_process_does_not_inherit_how_dask_frees_memory(tmp_path, monkeypatch):
     monkeypatch.setenv("MALLOC_TRIM_THRESHOLD_", "65536")  # as Dask sets it for its workers
     monkeypatch.setenv("PATINA_TEST_INHERITED", "1")
@@ -139,6 +137,8 @@ def test_a_process_does_not_inherit_how_dask_frees_memory(tmp_path, monkeypatch)
     assert ended["message"] == "OWN PATINA_TEST_INHERITED"
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_lost_workers_and_schedulers_cost_no_result(tmp_path):
     count = 40
     path = collection(tmp_path / "all", **{f"object{k:02d}": "pause" for k in range(count)})

@@ -22,7 +22,7 @@ from patina.core.appearance.principled import Configuration
 from patina.core.appearance.random_light import encoded
 
 from .sphere_light import lit
-from .spheres import WHITE
+from .spheres import whites
 
 Array = NDArray[np.floating]
 
@@ -35,7 +35,7 @@ MAX_EVALUATIONS = 40
 
 def best_pictures(truth: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the sum's pictures (worlds, p, 3) closest to the true ones, as in Lit.model."""
-    white = np.maximum(np.percentile(truth, WHITE, axis=(1, 2)), 1e-9)
+    white = np.array(whites(truth), np.float32)
     found = np.empty_like(truth)
     for c in range(3):
         light = (columns()[..., c] / white[:, None, None]).reshape(-1, columns().shape[2])
@@ -48,12 +48,7 @@ def best_pictures(truth: NDArray[np.float32]) -> NDArray[np.float32]:
 @lru_cache(maxsize=1)
 def columns() -> NDArray[np.float32]:
     """Return the pictures (worlds, p, k, 3) for weights of 1, one after the other."""
-    count = len(terms(Configuration(*np.full((4, 1), 0.5)))[0])
-    found = [
-        lit().model(lambda where, k=k: np.repeat(terms(where)[:, k : k + 1], 3, axis=1))
-        for k in range(count)
-    ]
-    return np.stack(found, axis=2)
+    return lit().columns(terms)
 
 
 def terms(where: Configuration) -> Array:

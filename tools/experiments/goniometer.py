@@ -26,9 +26,7 @@ from .runs import Records
 PAINTS = ("acryl_blue", "garnet_red")
 SCENES = ("pebble-wavy", "bunny-openmvs", "jar-bumpy")
 BANDS = ((600, 690), (500, 590), (400, 490))  # nm: means of them are R, G and B
-NOISE_FLOOR = (
-    1e-3  # 1/sr: directions measured within 1° differ by 3 % above it, by 30 to 60 % below
-)
+NOISE_FLOOR = 1e-3  # 1/sr, a reflectance of 0.3 %: darker readings are too noisy for logarithms
 NEIGHBOURS = 8  # of a measured direction
 KNEE = np.radians(3.0)  # θh is logarithmic above it in the spline: highlights are narrow
 SMOOTHING = 0.02  # of the spline, whose error on directions left out it hardly changes

@@ -49,13 +49,24 @@ class Lit:
     def model(self, at: At) -> Floats:
         """Return the radiance (worlds, p, 3) of a model that is a function of a Configuration."""
 
-        def rho(rows: slice) -> NDArray[np.floating]:
-            cos_h, cos_d = (np.cos(a[rows].ravel()) for a in self.angles[:2])
-            return at(
-                Configuration(self.cos_i[rows].ravel(), self.cos_o[rows].ravel(), cos_h, cos_d)
-            )
+        return self._sum(lambda rows: at(self._where(rows)))
 
-        return self._sum(rho)
+    def columns(self, terms: At) -> Floats:
+        """Return the radiance (worlds, p, k, 3) of k reflectances; ``terms`` returns them as (n, k)
+        for n configurations."""
+        found = []
+        for start in range(0, len(self.cos_i), BLOCK):
+            rows = slice(start, start + BLOCK)
+            shape = self.cos_i[rows].shape
+            values = np.asarray(terms(self._where(rows)), np.float32).reshape(*shape, -1)
+            light = np.moveaxis(self.light[:, rows], 2, -1)  # (worlds, p, 3, n)
+            found.append(np.moveaxis(light @ values, 2, 3))
+        return np.concatenate(found, axis=1)
+
+    def _where(self, rows: slice) -> Configuration:
+        """The pairs of some pixels."""
+        cos_h, cos_d = (np.cos(a[rows].ravel()) for a in self.angles[:2])
+        return Configuration(self.cos_i[rows].ravel(), self.cos_o[rows].ravel(), cos_h, cos_d)
 
     def _sum(self, rho: Callable[[slice], NDArray[np.floating]]) -> Floats:
         found = np.zeros((len(self.light), len(self.cos_i), 3), np.float32)

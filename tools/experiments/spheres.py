@@ -143,9 +143,13 @@ def _displayed(
     fit: NDArray[np.float32], truth: NDArray[np.float32]
 ) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.uint8]]]:
     """For each world the 8-bit sRGB values (pixels, 3) of both pictures at the same exposure."""
-    for a, b in zip(fit, truth, strict=True):
-        white = max(float(np.percentile(b, WHITE)), 1e-9)
+    for a, b, white in zip(fit, truth, whites(truth), strict=True):
         yield srgb(a / white), srgb(b / white)
+
+
+def whites(truth: NDArray[np.float32]) -> list[float]:
+    """Return for each world the radiance that is shown as white."""
+    return [max(float(np.percentile(picture, WHITE)), 1e-9) for picture in truth]
 
 
 def _disc() -> NDArray[np.bool_]:
