@@ -10,6 +10,7 @@
 #   real_blender.sh own DIR NAME OUT    tools/window/own_shoots.py: an own object by mouse, from the
 #                                       folder NAME in the home folder's Scans, or "demo"
 #   real_blender.sh ended DIR OUT       tools/window/ended_process.py: the process of a fit is ended
+#   real_blender.sh chromium DIR ARGS   run Debian's Chromium; it sees the folder /tmp
 # Debian's build has no OSL and no USD; these are tested with the bpy wheel.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -72,6 +73,13 @@ blender | python)
   bind "$dir" "${PATINA_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/patina}"
   bind "$dir" "$PWD"
   exec chroot "$dir" /bin/bash -c 'cd "$0" && exec "$@"' "$PWD" "$program" "$@" ;;
+chromium)
+  dir=$1; shift
+  system "$dir"
+  [ -x "$dir/usr/bin/chromium" ] || inside "$dir" apt-get install -y -qq --no-install-recommends \
+    chromium fonts-dejavu-core >/dev/null
+  bind "$dir" /tmp
+  exec chroot "$dir" /usr/bin/chromium --no-sandbox "$@" ;;
 session | own | ended)
   dir=$1; shift
   script=(tools/window/session.py --)
@@ -95,5 +103,5 @@ session | own | ended)
     sleep 2 # it may still be starting
     if grep -qs '^State:[[:space:]]*[^ZX]' "/proc/$left/status"; then echo "process $left has outlived its Blender"; exit 1; fi
   fi ;;
-*) sed -n '2,12p' "$0"; exit 2 ;;
+*) sed -n '2,13p' "$0"; exit 2 ;;
 esac

@@ -10,7 +10,7 @@ from ..core.capture import read_capture
 from ..core.diagnose.effects import EFFECTS
 from ..core.diagnose.effects.actions import ACTIONS
 from ..core.diagnose.selection.diagnosis import Diagnosis
-from ..core.jobs import FitJob, finished
+from ..core.jobs import CaptureResult, FitJob, finished
 from ..core.jobs.check_job import CheckJob
 from ..core.jobs.varying_second_fit import VaryingSecondFit
 from ..core.output_folder import check_out, staged_folder
@@ -69,6 +69,7 @@ def diagnose_to_folder(
         diagnosis_json.write(folder / "diagnosis.json", found, assessment, before, after)
         write_results(folder, out, after, job.stages, progress, MATERIALS)
     _print_causes(found)
+    _print_gain(before, after)
     print_summary(out, after)
     print(f"      {out / 'diagnosis.json'}")
 
@@ -88,3 +89,19 @@ def _print_causes(found: Diagnosis) -> None:
         f"RMS error of held-out regions of the photos: {100 * before.parts:.1f} % without and "
         f"{100 * after.parts:.1f} % with the causes found."
     )
+
+
+def _print_gain(before: CaptureResult, after: CaptureResult) -> None:
+    """Print the typical errors of held-out photos of the first and of the second fit, if the second
+    one uses any cause."""
+    if not after.effects:
+        return
+    pairs = [
+        f"{one.name} {100 * one.held_out.typical:.1f} → {100 * other.held_out.typical:.1f} %"
+        for one, other in zip(before.materials, after.materials, strict=True)
+        if one.held_out is not None and other.held_out is not None
+    ]
+    if pairs:
+        print(
+            f"Typical error of a held-out photo, without → with these causes: {', '.join(pairs)}."
+        )

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+from . import viewer_program
 from .blender import find_blender, install, private, run_script, scratch_home, script_command
 from .build import DIST
 from .common import ROOT, Failure, cache_dir, call, say, this_platform
@@ -139,6 +140,7 @@ def main(arguments: Sequence[str]) -> int:
         help="number of Blenders that share the tests in Blender",
     )
     options, rest = parser.parse_known_args(arguments)
+    viewer_program.build_if_possible()
     stages: list[tuple[str, Callable[[], int]]] = []
     if not options.only_blender:
         python = test_python()

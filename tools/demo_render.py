@@ -1,4 +1,4 @@
-"""Renders of the demo capture: Cycles with one distant lamp, direct light and cast shadows only."""
+"""Renders of the demo capture: Cycles with one small lamp, direct light and cast shadows only."""
 
 from __future__ import annotations
 
@@ -114,8 +114,8 @@ class Studio:
         scene.render.film_transparent = True
         image = scene.render.image_settings
         image.file_format, image.color_mode, image.color_depth = "OPEN_EXR", "RGBA", "32"
-        lamp = bpy.data.lights.new("lamp", "SUN")
-        lamp.angle = 0.0
+        lamp = bpy.data.lights.new("lamp", "POINT")
+        lamp.shadow_soft_size = 0.0
         lens = bpy.data.cameras.new("lens")
         lens.clip_start = 0.01
         self.lamp = bpy.data.objects.new("lamp", lamp)
@@ -143,11 +143,14 @@ class Studio:
         self.body.data.materials.clear()
         self.body.data.materials.append(material)
 
-    def light(self, direction: Array, irradiance: float) -> None:
-        """Set the direction (surface → light) and irradiance of the sun."""
-        self.lamp.data.energy = irradiance
-        self.lamp.rotation_mode = "QUATERNION"
-        self.lamp.rotation_quaternion = Vector(direction).to_track_quat("Z", "Y")
+    def light(self, position: Array, lit: Array, irradiance: float) -> None:
+        """Place the lamp; it has the irradiance at the point ``lit``, on a surface that faces it.
+
+        Blender's point lamp of power P has radiant intensity P / (4π).
+        """
+        square = float(np.sum((np.asarray(position) - lit) ** 2))
+        self.lamp.data.energy = 4 * np.pi * irradiance * square
+        self.lamp.location = Vector(position)
 
     def photograph(self, camera: Camera) -> Array:
         """Render linear RGBA (height, width, 4), row 0 on top; alpha: coverage by the object."""
@@ -215,10 +218,10 @@ def lambertian() -> bpy.types.Material:
     return _split("white", (white, white))
 
 
-def plane(normal: Array, size: float = 4.0) -> Surface:
-    """Return a square around the origin that faces `normal`."""
+def plane(centre: Array, normal: Array, size: float = 4.0) -> Surface:
+    """Return a square around `centre` that faces `normal`."""
     across = np.linalg.svd(normal[None])[2][1:]
     across[1] *= np.sign(np.linalg.det(np.stack([*across, normal])))
-    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) @ across * size / 2
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) @ across * size / 2 + centre
     triangles: NDArray[np.int64] = np.array([[0, 1, 2], [0, 2, 3]])
     return Surface(corners, triangles, np.tile(normal, (4, 1)))

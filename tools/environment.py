@@ -35,6 +35,7 @@ TEST_TOOLS = [
     "ruff==0.13.3",
     "mypy==1.18.2",
     "import-linter==2.17",
+    "playwright==1.65.2",  # drives a browser that shows exported pages
     "jsonschema==4.25.1",  # validates written files against assets/schemas
 ]
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from . import viewer_program
 from .common import Failure, quietly
 from .staging import manifest, staged
 from .wheels import download, wheel_names
@@ -42,6 +43,7 @@ def pack(
 
     raw: include the library for camera RAW. Raises Failure.
     """
+    viewer_program.build()
     download(wheel_names(platforms, pythons, raw))
     out.mkdir(parents=True, exist_ok=True)
     with staged(platforms, pythons, raw) as source:

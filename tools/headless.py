@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from . import viewer_program
 from .blender import find_blender, prepare, run_script
 from .common import ROOT, call, say
 from .environment import bpy_python
@@ -14,6 +15,7 @@ SCRIPT = ROOT / "headless.py"
 
 def main(arguments: Sequence[str]) -> int:
     """Run one headless command and return its exit code."""
+    viewer_program.build_if_possible()
     if blender := find_blender():
         home = prepare(blender)
         say(f"using Blender {blender.label}")

@@ -45,7 +45,15 @@ from .demo_shape import (
 
 SEED = 2018
 IRRADIANCE = float(np.pi)
-"""Irradiance of every lamp at normal incidence: a white Lambertian surface has radiance 1."""
+"""Irradiance of every lamp at the middle of the jar, at normal incidence: a white Lambertian
+surface has radiance 1 there."""
+
+LAMP_DISTANCE = 4.0
+"""Scan units between the middle of the jar and each lamp: 1.2 m if the jar is 30 cm tall. The
+capture file calls the lamps distant, as an artist would without a tape measure."""
+
+DRIFTED = {"view_15.jpg": 1.12}
+"""Camera → factor on the exposure of its photo, which the capture file does not mention."""
 
 LAMPS = {
     "key": (84.0, 28.0, ("view_03.jpg", "view_20.jpg")),
@@ -276,14 +284,25 @@ def toml(lamps: Mapping[str, Array], shots: Sequence[Shot]) -> str:
 def truth(lamps: Mapping[str, Array], shots: Sequence[Shot], angles: Sequence[float]) -> str:
     """Return the text of truth.json."""
     model = {"model": "Principled BSDF (Cycles, GGX), other inputs at their defaults"}
+    centre = scan_turn() @ MIDDLE
     content = {
         "notice": "For checks only: nothing that fits or diagnoses may read this file.",
         "materials": {"glaze": {**model, **GLAZE}, "clay": {**model, **CLAY}},
         "lights": {name: direction.tolist() for name, direction in lamps.items()},
         "irradiance": IRRADIANCE,
+        "lamp_distance": LAMP_DISTANCE,
+        "lamp_positions": {
+            name: (centre + LAMP_DISTANCE * direction).round(6).tolist()
+            for name, direction in lamps.items()
+        },
         "transport": "direct light and cast shadows; no interreflection, no ambient light",
         "photos": [
-            {"file": f"lit/{Path(s.camera).stem}.exr", "light": s.lamp, "angle": round(a, 2)}
+            {
+                "file": f"lit/{Path(s.camera).stem}.exr",
+                "light": s.lamp,
+                "angle": round(a, 2),
+                "exposure": DRIFTED.get(s.camera, 1.0),
+            }
             for s, a in zip(shots, angles, strict=True)
         ],
         "background": f"black beyond {MARGIN} pixels around the object",
@@ -297,12 +316,15 @@ def truth(lamps: Mapping[str, Array], shots: Sequence[Shot], angles: Sequence[fl
 
 def check_irradiance(studio: Studio, camera: Camera, direction: Array) -> None:
     """Raise RuntimeError unless a white Lambertian plane facing the lamp has radiance E/π."""
-    studio.show(plane(direction), np.zeros(4))
+    centre = scan_turn() @ MIDDLE
+    studio.show(plane(centre, direction), np.zeros(4))
     studio.dress(lambertian())
-    studio.light(direction, IRRADIANCE)
+    studio.light(centre + LAMP_DISTANCE * direction, centre, IRRADIANCE)
     middle = studio.photograph(camera)[195:235, 172:212, :3]
     print(f"white plane facing the lamp: {middle.mean():.6f}, E/π = {IRRADIANCE / np.pi:.6f}")
-    if abs(middle.mean() - IRRADIANCE / np.pi) > 1e-4:
+    if (
+        abs(middle.mean() - IRRADIANCE / np.pi) > 1e-3
+    ):  # the lamp is near: the plane is 0.1 % darker 0.13 units off its middle
         raise RuntimeError("the irradiance of the lamp differs from that of the capture")
 
 
@@ -340,10 +362,11 @@ def make(folder: Path) -> None:
         camera, stem = cameras[shot.camera], Path(shot.camera).stem
         view = camera.position - turn @ MIDDLE
         angles.append(angle(lamps[shot.lamp], view / np.linalg.norm(view)))
-        studio.light(lamps[shot.lamp], IRRADIANCE)
+        centre = turn @ MIDDLE
+        studio.light(centre + LAMP_DISTANCE * lamps[shot.lamp], centre, IRRADIANCE)
         studio.dress(pottery())
         picture = studio.photograph(camera)
-        radiance = picture[..., :3]
+        radiance = picture[..., :3] * DRIFTED.get(shot.camera, 1.0)
         near = binary_dilation(picture[..., 3] > 0, iterations=MARGIN)
         photo = np.where(near[..., None], exposed(rng, radiance), 0.0)
         write_exr(folder / "lit" / f"{stem}.exr", photo)

@@ -12,7 +12,7 @@ from ..concurrency.job import Step
 from ..errors import InputError
 from ..output_folder import staged_folder
 from ..result import FittedMaterial, FittedResult
-from . import renderer_formats, table_formats
+from . import renderer_formats, table_formats, web_format
 from .file_names import check_distinct
 from .losses import Loss, write_losses
 from .subject import Subject
@@ -24,6 +24,7 @@ PLAIN: dict[str, Callable[[Path, Sequence[Subject]], list[Loss]]] = {
     "mtlx": renderer_formats.write_mtlx,
     "mitsuba": renderer_formats.write_mitsuba,
     "pbrt": renderer_formats.write_pbrt,
+    "web": web_format.write_web,
 }
 """Format → its writer, which needs no Blender."""
 

@@ -33,7 +33,7 @@ ROUND_SHARE = 0.6  # of the remaining time of a second fit that one round takes
 STAGE = "fitting with the named causes"
 MIN_SAMPLES = 50  # of a material after correction
 CORRECTION_SHARE = 0.3  # fraction of a second fit's time that the correction of samples takes
-NOT_DISTINCT = "The 95 % intervals of all its parameters contain 0, at which it has no effect."
+NOT_DISTINCT = "Its parameters do not differ from 0 (no effect) at the 95 % level."
 STILL_BLURRED = (
     "The highlights of this material are as wide as in the photos, because narrower ones do not "
     "predict held-out photos better. A photo under a smaller lamp would show their true width."

@@ -18,9 +18,14 @@ from ..samples import Criterion
 from ..views import photo_pictures, photo_view
 from ..views.criteria import LOOKS, Look
 from .material_section import material_section
+from .viewer_page import write_viewer_of
 
 STYLE = Path(__file__).parents[2] / "assets" / "report" / "style.css"
 MAX_SIDE = 640  # pixels of a picture in a row of photos
+VIEWER_LINK = (
+    "<p><a class='button' href='{file}'>Open the viewer</a> The object and a sphere with the "
+    "measured materials, to turn and to light.</p>"
+)
 PHOTOS_AT_ONCE = 2  # limits memory: each has a photo in its full size for a moment
 
 
@@ -37,7 +42,9 @@ def write_report(
     # the predictions use the light and camera of the capture, without the causes of a diagnosis
     if not result.effects:
         sections += [partial(_looked_at, result, place) for place in range(len(photos))]
-    body = [f"<p>Included in the fit: {escape(e.sentence)}</p>" for e in result.effects]
+    viewer = write_viewer_of(folder, result)
+    body = [] if viewer is None else [VIEWER_LINK.format(file=viewer)]
+    body += [f"<p>Included in the fit: {escape(e.sentence)}</p>" for e in result.effects]
     if result.proposed_photo is not None:
         body.append(f"<p>Proposed photo: {escape(result.proposed_photo.sentence)}</p>")
     rows, found_criteria, factors = [], set[Criterion](), set[int]()

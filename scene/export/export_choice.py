@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ...core.viewer.page import has_program
 from ..session.handlers import register_property_factory
 from ..session.last_fit import kept_fit
 from ..session.scene_properties import capture_path, stored_result
@@ -30,6 +31,11 @@ FORMATS: dict[str, tuple[str, str]] = {
         "measured material of Mitsuba",
     ),
     "pbrt": ("pbrt-v4", "A scene and the .bsdf file of its measured material"),
+    "web": (
+        "Web Page",
+        "viewer.html: the measured BRDF, the lobe stack and the Principled BSDF on a sphere, for "
+        "any browser, without a network",
+    ),
     "binary": (
         "MERL Table",
         "NAME.binary in the format of the MERL database, with values at the cell centres",
@@ -56,6 +62,8 @@ def missing(scene: bpy.types.Scene, word: str) -> str | None:
         capture = capture_path(scene)
         if kept_fit(capture, stored_result(capture)) is None:
             return "The report needs the photos of the fit; fit again in this session"
+    if word == "web" and not has_program():
+        return "The program of the viewer was not built; use a zip of the extension"
     if word == "usd" and not bpy.app.build_options.usd:
         return "This build of Blender has no USD; use a build from blender.org"
     return None

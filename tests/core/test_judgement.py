@@ -231,6 +231,22 @@ def test_parameters_that_may_all_be_0_are_not_distinct(x, distinct):
     assert trial.is_distinct == distinct
 
 
+@pytest.mark.parametrize(("x", "distinct"), [([0.5, 0.6], False), ([0.5, -0.1], True)])
+def test_parameters_that_are_uncertain_each_can_be_distinct_together(x, distinct):
+    """The sum of both is unknown, their difference is known to 0.2."""
+    correlation = np.array([[1.0, 0.98], [0.98, 1.0]])
+    trial = replace(_tried("vignetting", 2, 1.0), x=np.array(x), correlation=correlation)
+    assert trial.is_distinct == distinct
+
+
+def test_directions_that_are_not_identifiable_do_not_make_parameters_distinct():
+    """Gains of three photos relative to their mean: the common gain has no variance."""
+    correlation = np.array([[1.0, -0.5, -0.5], [-0.5, 1.0, -0.5], [-0.5, -0.5, 1.0]])
+    trial = replace(_tried("light_intensity", 3, 1.0), correlation=correlation)
+    assert not replace(trial, x=np.array([0.9, -0.5, -0.4])).is_distinct
+    assert replace(trial, x=np.array([2.6, -1.3, -1.3])).is_distinct
+
+
 def test_the_simpler_of_two_nearly_equal_effects_is_chosen():
     best = best_of([_tried("environment_reflection", 64, 100.0), _tried("ambient_light", 3, 96.0)])
     assert best is not None and best.effect.cause == "ambient_light"

@@ -27,6 +27,8 @@ PAINTS = ("acryl_blue", "garnet_red")
 SCENES = ("pebble-wavy", "bunny-openmvs", "jar-bumpy")
 BANDS = ((600, 690), (500, 590), (400, 490))  # nm: means of them are R, G and B
 NOISE_FLOOR = 1e-3  # 1/sr, a reflectance of 0.3 %: darker readings are too noisy for logarithms
+# 1/sr: the basis cannot tell darker values from black, because ε of its mapping is 1e-3
+ABOVE_EPSILON = 5e-3
 NEIGHBOURS = 8  # of a measured direction
 KNEE = np.radians(3.0)  # θh is logarithmic above it in the spline: highlights are narrow
 SMOOTHING = 0.02  # of the spline, whose error on directions left out it hardly changes
@@ -83,7 +85,7 @@ def work(task: tuple[str, str]) -> Records:
 
 def errors(paint: Paint, rho: NDArray[np.floating]) -> dict[str, float]:
     """Return the RMS and the median of |ln(fit ÷ measured)| of the values that are compared, and
-    the RMS of those with θh below PEAK."""
+    the RMS of those with θh below PEAK and of those above ABOVE_EPSILON."""
     kept = paint.compared
     off = np.log(np.maximum(np.asarray(rho, float), 1e-6) / np.maximum(paint.rho, 1e-9))
     near = kept & (paint.angles.theta_h < PEAK)[:, None]
@@ -91,6 +93,7 @@ def errors(paint: Paint, rho: NDArray[np.floating]) -> dict[str, float]:
         "log_rms": float(np.sqrt(np.mean(off[kept] ** 2))),
         "typical": float(np.median(np.abs(off[kept]))),
         "peak_rms": float(np.sqrt(np.mean(off[near] ** 2))),
+        "brighter_rms": float(np.sqrt(np.mean(off[kept & (paint.rho > ABOVE_EPSILON)] ** 2))),
     }
 
 

@@ -179,12 +179,14 @@ def goniometer(records: list[Record]) -> str:
         rows.append(
             [
                 r["material"], r["scene"], r["estimator"], number(r["log_rms"]),
-                number(ratio), number(r["typical"]), number(r["peak_rms"]),
+                number(ratio), number(r["brighter_rms"]), number(r["typical"]),
+                number(r["peak_rms"]),
                 f"{100 * r['inside']:.0f} %" if "inside" in r else "–",
             ]
         )  # fmt: skip
     head = [
-        "paint", "scene", "fit", "log RMS", "÷ paper's", "median of the absolute logarithm",
-        "log RMS, θh < 10°", "measured value in the 90 % interval",
+        "paint", "scene", "fit", "log RMS", "÷ paper's", "log RMS of values above 0.005 1/sr",
+        "median of the absolute logarithm", "log RMS, θh < 10°",
+        "measured value in the 90 % interval",
     ]  # fmt: skip
     return table(head, rows)

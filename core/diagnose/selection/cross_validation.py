@@ -147,14 +147,24 @@ def parameter_variances(fitted: ModelFit) -> tuple[Array, ...]:
     return _by_effect(fitted, change, [change])
 
 
-def parameter_variances_by_photo(fitted: ModelFit) -> tuple[Array, ...] | None:
-    """Variances of the parameters of each effect by a jackknife over photos: an error of a photo's
+@dataclass(frozen=True)
+class ParameterErrors:
+    """Errors of the parameters of each effect of a model, in the order of its effects. variances:
+    (p,) each. correlations: (p, p) each, from the curvature; None of patches and of effects that
+    are not estimated."""
+
+    variances: tuple[Array, ...]
+    correlations: tuple[Array | None, ...]
+
+
+def parameter_errors_by_photo(fitted: ModelFit) -> ParameterErrors | None:
+    """Errors of the parameters of each effect by a jackknife over photos: an error of a photo's
     camera pose or exposure is common to all its pixels. None where there are too few photos."""
     of = _photos(fitted, MAX_GROUPS)
     if of.max() < MIN_GROUPS - 1:
         return None
     whole, others, _ = _steps_without_folds(fitted, jacobian_of(fitted), of)
-    return _by_effect(fitted, whole, others)
+    return ParameterErrors(_by_effect(fitted, whole, others), _correlations(fitted, whole))
 
 
 def sum_by_region(region: NDArray[np.int32], values: Array) -> NDArray[np.float64]:
@@ -196,6 +206,22 @@ def _by_effect(fitted: ModelFit, change: Step, others: Sequence[Step]) -> tuple[
         variance.append(plain * max(more, 1.0))
         at += count
     return tuple(variance)
+
+
+def _correlations(fitted: ModelFit, change: Step) -> tuple[Array | None, ...]:
+    """Correlations between the parameters of each effect, from the curvature."""
+    model, found, at = fitted.model, list[Array | None](), 0
+    for place, effect in enumerate(model.effects):
+        if place in model.frozen or place == model.patch_place:
+            found.append(None)
+            continue
+        mine = slice(at, at + len(effect.parameters))
+        identifiable = _identifiable(effect)
+        covariance = identifiable @ change.covariance[mine, mine] @ identifiable.T
+        size = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
+        found.append(covariance / np.outer(size, size))
+        at = mine.stop
+    return tuple(found)
 
 
 def _change_of_prediction(

@@ -9,7 +9,7 @@ from ..effects.camera_pose import CameraPose
 from ..nuisances.pose_jitter import PoseJitter
 from ..solver.gauss_newton import fit
 from ..solver.model_fit import ModelFit
-from .cross_validation import parameter_variances_by_photo, predict_held_out_regions
+from .cross_validation import parameter_errors_by_photo, predict_held_out_regions
 from .diagnosis import Diagnosis, Trial
 from .held_out_error import held_out_errors
 from .residual_structure import residual_structure
@@ -48,7 +48,7 @@ def with_contradicted(
         return found
     sound = {t.effect.cause for t in found.accepted}.difference(contradicted)
     after = with_causes(found if fitted is None else replace(found, after=fitted), sound)
-    held_out, by_photo = predict_held_out_regions(after), parameter_variances_by_photo(after)
+    held_out, by_photo = predict_held_out_regions(after), parameter_errors_by_photo(after)
 
     def anew(trial: Trial) -> Trial:
         cause, model = trial.effect.cause, after.model

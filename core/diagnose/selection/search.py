@@ -22,7 +22,7 @@ from ..forward.diagnosis_context import DiagnosisContext
 from ..solver.model_fit import ModelFit
 from .baseline import fit_baseline
 from .composed_effects import with_parts_replaced, without_parts
-from .cross_validation import parameter_variances_by_photo
+from .cross_validation import parameter_errors_by_photo
 from .diagnosis import MIN_GAIN_FRACTION, Diagnosis
 from .effect_trials import (
     HeldOutPredictions,
@@ -178,7 +178,7 @@ def _in_final_fit(
     """The accepted effects with their parameters in the final joint fit. variances: of the
     parameters of each effect there."""
     found = []
-    by_photo = parameter_variances_by_photo(now) if accepted else None
+    by_photo = parameter_errors_by_photo(now) if accepted else None
     for trial in accepted:
         place = now.model.place_of(trial.effect.cause)
         frozen = place in now.model.frozen

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from ..effects.base.effect import Effect
 from ..effects.base.shown_by_background import ShownByBackground
 from ..solver.model_fit import ModelFit
-from .cross_validation import standard_error_of_sum
+from .cross_validation import ParameterErrors, standard_error_of_sum
 
 Array = NDArray[np.floating]
 Vector = NDArray[np.float64]
@@ -23,6 +24,9 @@ MAX_GROWTH, MAX_GROWTH_IF_STRONG = 1.03, 1.1
 """Of the RMS error of held-out regions. Outliers may hardly be predicted worse; where the gain is
 strong, a few pixels in highlights, which dominate the RMS error, do not outweigh all others."""
 HALF_WIDTH_95 = 1.96  # standard errors from the centre of a 95 % interval to its ends
+MIN_EIGENVALUE = (
+    1e-6  # of a correlation matrix: directions below it are not determined by definition
+)
 MODEL_ERROR_RATIO = 3.0
 """Errors of parameters in units of the standard error that curvature and jackknife give. These do
 not know that no measured material is exactly in the basis. Measured on scans with materials of no
@@ -33,7 +37,8 @@ MIN_RELATIVE_CHANGE = 0.005  # RMS change of the photos below which an effect is
 
 @dataclass(frozen=True)
 class Trial:
-    """effect: with its parameters x (p,) and their variances (p,).
+    """effect: with its parameters x (p,), their variances (p,) and correlations (p, p), None where
+    these are not known.
 
     by_region: (b,) nats by which each held-out region is predicted better; values: number of
     values (pixels times channels) in all regions. change: RMS change of the prediction, relative.
@@ -54,6 +59,7 @@ class Trial:
     ties: tuple[Effect, ...] = ()
     contradicted_by: tuple[int, ...] = ()
     growth: float = 1.0
+    correlation: Array | None = None
 
     @property
     def gain(self) -> float:
@@ -130,12 +136,21 @@ class Trial:
 
     @property
     def is_distinct(self) -> bool:
-        """Whether the 95 % interval of at least one parameter does not contain 0, no effect. True
-        where no variance is known."""
+        """Whether the parameters differ from 0, no effect, at the 95 % level: their joint
+        confidence region does not contain 0 (Wald test). Parameters can be uncertain each for
+        itself and certain together, such as the ratio of two exposures. Where correlations are not
+        known: whether the 95 % interval of any parameter does not contain 0. True where no
+        variance is known."""
         x, errors = np.ravel(self.identified), np.ravel(self.standard_errors)
         if not len(x) or len(x) != len(errors):
             return True
-        return bool(np.any(np.abs(x) > HALF_WIDTH_95 * errors))
+        if self.correlation is None or self.correlation.shape != (len(x), len(x)):
+            return bool(np.any(np.abs(x) > HALF_WIDTH_95 * errors))
+        values, vectors = np.linalg.eigh(self.correlation)
+        determined = values > MIN_EIGENVALUE
+        along = vectors.T @ (x / np.maximum(errors, np.finfo(float).tiny))
+        distance = np.sum(along[determined] ** 2 / values[determined])
+        return bool(distance > chi2.ppf(0.95, max(int(determined.sum()), 1)))
 
     def in_fit(self, fitted: ModelFit, variances: tuple[Array, ...]) -> Trial:
         """The trial with its parameters in another joint fit. variances: of the parameters of each
@@ -145,15 +160,24 @@ class Trial:
         effect = fitted.model.effects[place]
         return replace(self, fitted=fitted, effect=effect, x=x, variance=variance)
 
-    def with_photo_errors(self, by_photo: tuple[Array, ...] | None) -> Trial:
+    def with_photo_errors(self, by_photo: ParameterErrors | None) -> Trial:
         """The trial with standard errors that include errors common to a whole photo, those of a
         material that is not in the basis, and those of the effect's own approximations. Of a trial
-        with a joint fit. by_photo: its parameter_variances_by_photo."""
+        with a joint fit. by_photo: its parameter_errors_by_photo."""
         assert self.fitted is not None
         place = self.fitted.model.place_of(self.effect.cause)
         if place in self.fitted.model.frozen or not len(self.x):
             return self
-        variance = self.variance if by_photo is None else np.maximum(by_photo[place], self.variance)
-        systematic = self.effect.systematic_errors(self.identified)
-        variance = MODEL_ERROR_RATIO**2 * variance + np.square(systematic)
-        return replace(self, variance=variance)
+        variance, correlation = self.variance, None
+        if by_photo is not None:
+            variance = np.maximum(by_photo.variances[place], variance)
+            correlation = by_photo.correlations[place]
+        own = MODEL_ERROR_RATIO**2 * variance
+        systematic = np.square(self.effect.systematic_errors(self.identified))
+        if correlation is not None and correlation.shape == (len(own), len(own)):
+            # systematic errors of different parameters are independent of each other
+            size = np.sqrt(own)
+            covariance = np.outer(size, size) * correlation + np.diag(systematic)
+            total = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
+            correlation = covariance / np.outer(total, total)
+        return replace(self, variance=own + systematic, correlation=correlation)

@@ -20,7 +20,7 @@ from ..nuisances.surface_variation import ALBEDO, WAYS, SurfaceVariation
 from ..solver.gauss_newton import fit
 from ..solver.model_fit import ModelFit
 from .baseline import PRIOR_ROUNDS
-from .cross_validation import parameter_variances_by_photo, sum_by_region
+from .cross_validation import parameter_errors_by_photo, sum_by_region
 from .effect_trials import (
     STEPS,
     held_out_predictions,
@@ -73,7 +73,7 @@ def with_unusual_poses(
     trial = try_with_rays(exact, without, trial, context)
     if not trial.is_accepted or trial.fitted is None:
         return now, []
-    by_photo = parameter_variances_by_photo(trial.fitted)
+    by_photo = parameter_errors_by_photo(trial.fitted)
     return trial.fitted, [trial.with_photo_errors(by_photo)]
 
 

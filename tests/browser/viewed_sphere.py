@@ -1,0 +1,52 @@
+"""A sphere in Cycles, seen by the camera of the viewer."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from tests.wheel import cycles_sphere
+
+SIDE = 160  # pixels
+EYE = np.array([0.0, -5.2, 0.9])  # of the viewer's camera
+FIELD = 26.0  # degrees, of the viewer's camera
+LAMP = np.array([0.5, -0.6, 0.62]) / np.linalg.norm([0.5, -0.6, 0.62])
+
+
+def new_scene(samples: int) -> bpy.types.Object:
+    """The sphere of cycles_sphere, seen by the viewer's camera."""
+    sphere = cycles_sphere.new_scene(size=SIDE, samples=samples, osl=True)
+    scene = bpy.context.scene
+    scene.cycles.filter_width = 1.0
+    scene.render.film_transparent = True
+    camera = scene.camera
+    camera.data.type = "PERSP"
+    camera.data.sensor_fit, camera.data.angle = "VERTICAL", math.radians(FIELD)
+    camera.location = Vector(EYE)
+    camera.rotation_euler = Vector(EYE).to_track_quat("Z", "Y").to_euler()
+    # its poles are not in the picture then
+    sphere.rotation_euler = (math.pi / 2, 0.0, 0.0)
+    return sphere
+
+
+def inside() -> np.ndarray:
+    """(SIDE, SIDE) pixels of the sphere that are not close to its outline."""
+    distance = np.linalg.norm(EYE)
+    forward = -EYE / distance
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    u = ((np.arange(SIDE) + 0.5) / SIDE * 2 - 1) * math.tan(math.radians(FIELD / 2))
+    x, y = np.meshgrid(u, -u)
+    ray = forward + x[..., None] * right + y[..., None] * up
+    ray /= np.linalg.norm(ray, axis=-1, keepdims=True)
+    miss = np.linalg.norm(np.cross(EYE, ray), axis=-1)
+    return np.asarray(miss < 0.97)
+
+
+def relative_rms(found: np.ndarray, expected: np.ndarray) -> float:
+    kept = inside()
+    return float(np.sqrt(np.sum((found - expected)[kept] ** 2) / np.sum(expected[kept] ** 2)))

@@ -1,0 +1,247 @@
+// The page: canvas, controls, values under the pointer.
+
+import * as THREE from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { readData } from "./data.js";
+import { halfDifference, intervalFactor, reflectance } from "./evaluate.js";
+import { PICTURES, Renderer } from "./renderer.js";
+
+const MODELS = { measured: "Measured", lobes: "Lobe Stack", principled: "Principled" };
+const SMOOTH_FRAME = 33; // ms: where pictures take longer, they are smaller while the view moves
+const MIN_RESOLUTION = 0.2; // of the canvas, of these smaller pictures
+const REST = 400; // ms without a movement, after which pictures are as large as the canvas
+
+function start() {
+  const data = readData();
+  const canvas = document.querySelector("canvas");
+  const renderer = new Renderer(canvas, data);
+  const state = {
+    shown: data.object ? "object" : "sphere",
+    material: 0,
+    model: "measured",
+    difference: false,
+    light: data.worlds.length ? 0 : "lamp",
+    lamp: new THREE.Vector3(0.5, -0.6, 0.62).normalize(),
+    irradiance: Math.PI,
+    exposure: 0,
+    background: true,
+    paper: [0.5, 0.5, 0.5],
+  };
+  const orbit = new OrbitControls(renderer.camera, canvas);
+  orbit.enablePan = false;
+  orbit.minDistance = 1.5;
+  orbit.maxDistance = 20;
+  renderer.camera.position.set(0, -5.2, 0.9);
+  orbit.update();
+  orbit.addEventListener("change", () => {
+    renderer.restart();
+    renderer.moved();
+  });
+
+  connect(data, state, renderer);
+  connectLamp(canvas, state, renderer, orbit);
+  connectPointer(canvas, data, state, renderer);
+
+  // Pictures are as large as the canvas at rest, and smaller while the view moves on slow machines.
+  const speed = { resolution: 1, moving: 1, moved: -Infinity, last: 0, frames: 0, since: performance.now() };
+  const fit = () => {
+    const box = canvas.parentElement.getBoundingClientRect();
+    const ratio = speed.resolution * Math.min(window.devicePixelRatio, 2);
+    renderer.resize(Math.max(1, Math.round(box.width * ratio)), Math.max(1, Math.round(box.height * ratio)));
+  };
+  const useResolution = (resolution) => {
+    if (resolution === speed.resolution) return;
+    speed.resolution = resolution;
+    fit();
+  };
+  renderer.moved = () => {
+    speed.moved = performance.now();
+    useResolution(speed.moving);
+  };
+  new ResizeObserver(fit).observe(canvas.parentElement);
+  fit();
+
+  const bar = document.getElementById("progress");
+  const frame = (now) => {
+    const taken = now - speed.last;
+    speed.last = now;
+    if (renderer.count > 1 && taken < 2000 && performance.now() - speed.moved < REST) {
+      const wanted = speed.moving * Math.sqrt(SMOOTH_FRAME / Math.max(taken, 5));
+      speed.moving = Math.min(1, Math.max(MIN_RESOLUTION, 0.7 * speed.moving + 0.3 * wanted));
+    }
+    if (performance.now() - speed.moved > REST) useResolution(1);
+    if (renderer.step(state)) renderer.show(state);
+    bar.value = renderer.count / PICTURES;
+    bar.hidden = renderer.count >= PICTURES;
+    speed.frames += 1;
+    requestAnimationFrame(frame);
+  };
+  // for tests: the state, and the average of all pictures as linear radiance
+  window.patina = {
+    data, state, renderer,
+    finish(pictures = PICTURES) {
+      renderer.restart();
+      while (renderer.count < pictures) renderer.step(state);
+      renderer.show(state);
+      return renderer.radiance();
+    },
+    // frames a second since the last call
+    framesPerSecond() {
+      const found = (1000 * speed.frames) / (performance.now() - speed.since);
+      Object.assign(speed, { frames: 0, since: performance.now() });
+      return found;
+    },
+  };
+  requestAnimationFrame(frame);
+}
+
+// The controls of the panel.
+function connect(data, state, renderer) {
+  const change = (name, value) => {
+    state[name] = value;
+    renderer.restart();
+    describe(data, state);
+  };
+  choice("shown", data.object ? { object: "Object", sphere: "Sphere" } : { sphere: "Sphere" }, state.shown,
+    (value) => change("shown", value));
+  choice("material", Object.fromEntries(data.materials.map((m, i) => [i, m.name])), state.material,
+    (value) => change("material", Number(value)));
+  const known = Object.keys(MODELS).filter((name) => data.materials.every((m) => m.models[name]));
+  choice("model", Object.fromEntries(known.map((name) => [name, MODELS[name]])), state.model,
+    (value) => change("model", value));
+  choice("light", { lamp: "Lamp", ...Object.fromEntries(data.worlds.map((w, i) => [i, w.name])) }, state.light,
+    (value) => change("light", value === "lamp" ? value : Number(value)));
+  const difference = document.getElementById("difference");
+  difference.addEventListener("change", () => change("difference", difference.checked));
+  const exposure = document.getElementById("exposure");
+  exposure.addEventListener("input", () => {
+    state.exposure = Number(exposure.value);
+    document.getElementById("stops").textContent = `${state.exposure >= 0 ? "+" : ""}${state.exposure.toFixed(1)}`;
+    renderer.restart();
+  });
+  const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  const paper = () => {
+    state.paper = dark.matches ? [0.13, 0.13, 0.14] : [0.96, 0.96, 0.95];
+    renderer.restart();
+  };
+  dark.addEventListener("change", paper);
+  paper();
+  describe(data, state);
+}
+
+function choice(id, options, value, changed) {
+  const group = document.getElementById(id);
+  const keys = Object.keys(options);
+  group.parentElement.hidden = keys.length < 2;
+  for (const key of keys) {
+    const label = document.createElement("label");
+    const input = document.createElement("input");
+    input.type = "radio";
+    input.name = id;
+    input.checked = key === String(value);
+    input.addEventListener("change", () => changed(key));
+    label.append(input, document.createElement("span"));
+    label.lastChild.textContent = options[key];
+    group.append(label);
+  }
+}
+
+// A sentence on what is shown.
+function describe(data, state) {
+  const model = {
+    measured: "the measured BRDF, evaluated for each pixel from the fit",
+    lobes: "the lobe stack that EEVEE and other programs show",
+    principled: "the Principled BSDF that exports to games use",
+  }[state.model];
+  const what = state.difference ? `The difference: ${model}, minus the measured BRDF` : `Shown: ${model}`;
+  const colours = state.difference ? " Red is too bright, blue too dark." : "";
+  const shadows = state.light !== "lamp" && state.shown === "object" ? " Light between parts of the object is left out." : "";
+  document.getElementById("what").textContent = `${what}.${colours}${shadows}`;
+  document.getElementById("material").parentElement.hidden = state.shown === "object" || data.materials.length < 2;
+  document.getElementById("difference").disabled = state.model === "measured";
+  document.getElementById("hint").textContent =
+    state.light === "lamp"
+      ? "Drag to turn, scroll to zoom. Shift and drag to move the lamp. Point at the surface for its values."
+      : "Drag to turn, scroll to zoom. Point at the surface for its values.";
+}
+
+// Shift and drag: the lamp follows the pointer around the object.
+function connectLamp(canvas, state, renderer, orbit) {
+  let moving = false;
+  canvas.addEventListener("pointerdown", (event) => {
+    moving = event.shiftKey;
+    orbit.enabled = !moving;
+  }, { capture: true });
+  window.addEventListener("pointerup", () => {
+    moving = false;
+    orbit.enabled = true;
+  });
+  window.addEventListener("pointermove", (event) => {
+    if (!moving) return;
+    const right = new THREE.Vector3().setFromMatrixColumn(renderer.camera.matrixWorld, 0);
+    const up = new THREE.Vector3().setFromMatrixColumn(renderer.camera.matrixWorld, 1);
+    state.lamp.applyAxisAngle(up, event.movementX * 0.01).applyAxisAngle(right, event.movementY * 0.01).normalize();
+    if (state.light !== "lamp") return;
+    renderer.restart();
+    renderer.moved();
+  });
+}
+
+// Values at the pointer: reflectance towards the lamp, its angles and interval.
+function connectPointer(canvas, data, state, renderer) {
+  const box = document.getElementById("values");
+  const caster = new THREE.Raycaster();
+  canvas.addEventListener("pointerleave", () => (box.hidden = true));
+  canvas.addEventListener("pointermove", (event) => {
+    const at = canvas.getBoundingClientRect();
+    const place = new THREE.Vector2(
+      (2 * (event.clientX - at.left)) / at.width - 1, 1 - (2 * (event.clientY - at.top)) / at.height,
+    );
+    caster.setFromCamera(place, renderer.camera);
+    const [hit] = event.buttons ? [] : caster.intersectObjects(renderer.scenes[state.shown].children);
+    box.hidden = !hit;
+    if (!hit) return;
+    const normal = smoothNormal(hit);
+    const view = renderer.camera.position.clone().sub(hit.point).normalize();
+    const own = state.shown === "sphere" ? state.material : hit.object.material.userData.material;
+    const material = data.materials[own];
+    const { halves } = material.models[state.model] ?? material.models.measured;
+    const rho = reflectance(data.grid, halves, normal, state.lamp, view);
+    const angles = halfDifference(normal, state.lamp, view);
+    const degrees = (radians) => `${((180 / Math.PI) * radians).toFixed(0)}°`;
+    const between = (a, b) => degrees(Math.acos(Math.min(Math.max(a.dot(b), -1), 1)));
+    const factor = intervalFactor(data.grid, material.factor, data.interval_step, angles);
+    const lines = [
+      `${material.name}: ${rho.map((value) => value.toPrecision(2)).join(", ")} 1/sr (R, G, B)`,
+      `normal to lamp ${between(normal, state.lamp)}, to view ${between(normal, view)}`,
+      `half vector ${degrees(angles.thetaH)} from normal, lamp ${degrees(angles.thetaD)} from half vector`,
+    ];
+    if (normal.dot(state.lamp) <= 0) lines[0] = `${material.name}: turned away from the lamp`;
+    else if (factor) lines.push(`90 % interval: a factor of ${factor.toFixed(2)} either way`);
+    box.replaceChildren(...lines.map((line) => Object.assign(document.createElement("div"), { textContent: line })));
+    box.style.left = `${Math.min(event.clientX - at.left + 14, at.width - box.offsetWidth - 6)}px`;
+    box.style.top = `${Math.min(event.clientY - at.top + 14, at.height - box.offsetHeight - 6)}px`;
+  });
+}
+
+function smoothNormal(hit) {
+  const normals = hit.object.geometry.getAttribute("normal");
+  const positions = hit.object.geometry.getAttribute("position");
+  const corner = (k) => new THREE.Vector3().fromBufferAttribute(positions, k);
+  const weights = new THREE.Vector3();
+  THREE.Triangle.getBarycoord(hit.point, corner(hit.face.a), corner(hit.face.b), corner(hit.face.c), weights);
+  const out = new THREE.Vector3();
+  ["a", "b", "c"].forEach((key, i) =>
+    out.addScaledVector(new THREE.Vector3().fromBufferAttribute(normals, hit.face[key]), weights.getComponent(i)),
+  );
+  return out.normalize();
+}
+
+try {
+  start();
+} catch (error) {
+  const box = document.getElementById("failure");
+  box.hidden = false;
+  box.textContent = `The viewer cannot start: ${error.message} It needs WebGL 2 with floating-point textures.`;
+  console.error(error);
+}
