@@ -84,7 +84,8 @@ def write_results(
         for material in result.materials:
             merl_file.write(folder / f"{material.name}.binary", material.fit.brdf.table())
     with timed(stages, "report", progress, 0.92):
-        for _ in write_report(folder / report, result):
+        back = "" if report == "report" else "../index.html"
+        for _ in write_report(folder / report, result, back=back):
             pass
     notes: Sequence[str] = ()
     if has_blender():

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
-from urllib.parse import quote
 
 import numpy as np
 
@@ -17,13 +16,15 @@ from ..diagnose.selection.diagnosis import Diagnosis, Trial
 from ..diagnose.selection.residual_trends import Trend, coordinates, trend
 from ..jobs import CaptureResult
 from ..photo import write_png
+from ..viewer.page import FILE_NAME, has_program
 from ..views.sphere import write_sphere
 from .assessment_section import assessment_section
-from .page import page
-from .residual_picture import photo_most_changed, residual_picture
+from .html_parts import compared, page, summary
+from .residual_picture import photo_most_changed, radiance_picture, residual_picture
 from .trend_chart import trend_chart
 
 MAX_CHARTS = 6  # those of the coordinates along which the residual varies most
+WHITE_PERCENTILE = 99.0  # of the radiance of a photo, shown as white
 STEPS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # possible limits of a chart's vertical axis, relative
 
 
@@ -39,45 +40,101 @@ def write_pages(
     after: the fits without and with a correction for the named causes. Returns the path of
     index.html."""
     folder.mkdir(parents=True, exist_ok=True)
-    body = section(found, context) + _evidence(folder, found, context)
+    body = _summary(found, before, after) + _evidence(folder, found, context)
     body += _materials(folder, before, after)
-    body += _pictures(folder, found, context) + assessment_section(assessment)
+    body += _pictures(folder, found, context) + section(found, context)
+    body += assessment_section(assessment)
     html = page(before.capture.file.name, body)
     (folder / "index.html").write_text(html, "utf-8")
     return folder / "index.html"
 
 
+def _summary(found: Diagnosis, before: CaptureResult, after: CaptureResult) -> str:
+    """HTML: what a reader wants to know first."""
+    corrected = bool(after.effects)
+    kind = "after" if corrected else "materials/sphere"
+    pictures = [(f"{kind}_{material.name}.png", material.name) for material in after.materials]
+    rows = ""
+    for one, other in zip(before.materials, after.materials, strict=True):
+        if other.held_out is None:
+            continue
+        now = f"<span class='big'>{100 * other.held_out.typical:.1f} %</span>"
+        earlier = ""
+        if corrected and one.held_out is not None:
+            earlier = f" ({100 * one.held_out.typical:.1f} % before correction)"
+        rows += f"<li>{escape(other.name)}: {now}{earlier}</li>"
+    causes = "".join(
+        f"<li>{escape(found.sentence(trial))} {_advice(found, trial)}</li>"
+        for trial in found.reported
+    )
+    if found.unexplained:
+        causes += f"<li>{escape(found.residual.sentence())}</li>"
+    nothing = "<li>Nothing: noise and errors of the scan explain the differences.</li>"
+    parts = [
+        ("Error of a held-out photo", f"<ul>{rows}</ul>" if rows else "<p>unknown</p>"),
+        ("What is wrong with the capture", f"<ul>{causes or nothing}</ul>"),
+        ("", f"<p>{escape(found.quality.sentence())}</p>"),
+    ]
+    if after.proposed_photo is not None:
+        sentence = escape(after.proposed_photo.sentence)
+        parts.append(("The photo that would say most", f"<p>{sentence}</p>"))
+    links = "<a class='button' href='materials/index.html'>Report of the Materials</a>"
+    if has_program():
+        links += f"<a class='button' href='materials/{FILE_NAME}'>Open the Viewer</a>"
+    parts.append(("", f"<p>{links}</p>"))
+    return summary(pictures, parts)
+
+
+def _advice(found: Diagnosis, trial: Trial) -> str:
+    return f"<b>{escape(ACTIONS[trial.effect.cause])}</b>" if trial in found.named else ""
+
+
 def _pictures(folder: Path, found: Diagnosis, context: DiagnosisContext) -> str:
-    """HTML: the residual of each photo, before and after."""
+    """HTML: each photo with its prediction, and the residual, before and after."""
     pixels, rows = context.pixels, []
-    fits = {"before": found.before, "after": found.after}
-    if not found.named:
-        fits = {"before": found.before}
-    for photo in np.unique(pixels.photo):
-        pictures = ""
-        for kind, fitted in fits.items():
-            file = f"residual_{photo:02d}_{kind}.png"
+    corrected = bool(found.named)
+    for photo in np.unique(pixels.photo).tolist():
+        white = float(np.percentile(pixels.observed[pixels.photo == photo], WHITE_PERCENTILE))
+        shown = {"photo": pixels.observed, "prediction": found.after.predicted}
+        for kind, radiance in shown.items():
+            picture = radiance_picture(pixels, radiance, photo, white)
+            write_png(folder / f"compared_{photo:02d}_{kind}.png", picture)
+        pair = compared(
+            f"compared_{photo:02d}_photo.png",
+            f"compared_{photo:02d}_prediction.png",
+            (f"photo {photo + 1}", "prediction"),
+        )
+        for kind, fitted in (("before", found.before), ("after", found.after)):
+            if kind == "after" and not corrected:
+                continue
             # both in the standard deviations of the first fit, so that the colours compare
             with np.errstate(invalid="ignore"):  # pixels that do not count have none: inf / inf
                 residual = fitted.residual * (fitted.deviation / found.before.deviation)
-            write_png(folder / file, residual_picture(pixels, residual, int(photo)))
-            pictures += f"<img src='{file}' alt='{kind}'>"
-        rows.append(f"<figure>{pictures}<figcaption>Photo {photo + 1}</figcaption></figure>")
-    what = "before and after correction" if found.named else "of the first fit"
+            file = folder / f"residual_{photo:02d}_{kind}.png"
+            write_png(file, residual_picture(pixels, residual, photo))
+        if corrected:
+            pair += compared(
+                f"residual_{photo:02d}_before.png",
+                f"residual_{photo:02d}_after.png",
+                ("before", "after correction"),
+            )
+        else:
+            file = f"residual_{photo:02d}_before.png"
+            pair += f"<figure><img src='{file}' alt='difference'></figure>"
+        rows.append(f"<div>{pair}</div>")
     return (
-        f"<h2>Residuals {what}</h2><p class='sub'><span class='key'></span> Prediction too dark … "
-        "too bright. Full colour: three times the standard deviation of the pixel's residual.</p>"
-        f"<div class='residuals'>{''.join(rows)}</div>"
+        "<h2>Photos, predictions and differences</h2><p class='sub'>Only pixels that the check "
+        "uses. Differences: <span class='key'></span> prediction too dark … too bright, full "
+        "colour at three times the standard deviation of the pixel's residual.</p>"
+        f"<div class='pairs'>{''.join(rows)}</div>"
     )
 
 
 def section(found: Diagnosis, context: DiagnosisContext) -> str:
     """HTML: the ranked causes, then charts of the residual along the diagnostic coordinates."""
-    left = f"<p>{escape(found.residual.sentence())}</p>" if found.unexplained else ""
     named = ", ".join(map(cause_label, found.causes)) or "No known cause found."
     return (
-        f"<h2>Causes</h2><p><b>{escape(named)}</b></p>{left}"
-        f"<p>{escape(found.quality.sentence())}</p>"
+        f"<h2>Causes in numbers</h2><p><b>{escape(named)}</b></p>"
         "<p class='sub'>Gain: improvement of the prediction of held-out regions of the photos by "
         "the model with this cause, in standard errors.</p>"
         f"{_errors(found)}{_causes(found)}<div class='charts'>{_charts(found, context)}</div>"
@@ -164,27 +221,21 @@ def _materials(folder: Path, before: CaptureResult, after: CaptureResult) -> str
         return ""
     rows = ""
     for one, other in zip(before.materials, after.materials, strict=True):
-        cells = ""
-        for suffix, stage, material in (("before", "before", one), ("after", "after", other)):
-            name = f"{suffix}_{one.name}.png"
-            write_sphere(folder / name, material.fit.brdf.evaluate)
+        labels = []
+        for stage, material in (("before", one), ("after", other)):
+            write_sphere(folder / f"{stage}_{one.name}.png", material.fit.brdf.evaluate)
             held = material.held_out
             error = (
-                ""
-                if held is None
-                else f": error of held-out photos {100 * held.typical:.1f} % (median), "
-                f"{100 * held.error:.1f} % (RMS)"
+                "" if held is None else f": RMS error of held-out photos {100 * held.error:.0f} %"
             )
-            cells += (
-                f"<figure><img src='{escape(quote(name))}' alt='lit sphere, {stage}'>"
-                f"<figcaption>{escape(one.name)}, {stage}{error}</figcaption></figure>"
-            )
-        rows += f"<div class='triple'>{cells}</div>"
+            labels.append(f"{one.name}, {stage}{error}")
+        pair = compared(f"before_{one.name}.png", f"after_{one.name}.png", (labels[0], labels[1]))
+        rows += f"<div>{pair}</div>"
     causes = ", ".join(cause_label(effect.cause) for effect in after.effects)
     return (
-        f"<h2>Materials corrected for {escape(causes)}</h2>{rows}<p class='sub'>The samples are "
-        "corrected for the named causes before the second fit. The material after correction is "
-        "the proposed one. <a href='materials/index.html'>Report of the second fit</a>.</p>"
+        f"<h2>Materials corrected for {escape(causes)}</h2><div class='pairs'>{rows}</div><p "
+        "class='sub'>The samples are corrected for the named causes before the second fit. The "
+        "material after correction is the proposed one.</p>"
     )
 
 
@@ -192,7 +243,6 @@ def _row(trial: Trial, found: Diagnosis) -> str:
     named = trial in found.named
     width = int(np.clip(12 * trial.ratio, 0, 160))
     meaning = escape(found.sentence(trial)) if trial in found.reported else ""
-    meaning += f"<br><b>{escape(ACTIONS[trial.effect.cause])}</b>" if named else ""
     style = "background:#2f6fb0" if named else "background:#bbb"
     return (
         f"<tr><th>{escape(cause_label(trial.effect.cause))}</th><td>{trial.ratio:.1f}</td><td>"

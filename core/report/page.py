@@ -12,28 +12,29 @@ from ..concurrency.steps import drained
 from ..concurrency.thread_pool import thread_count, thread_pool
 from ..counted import counted
 from ..fit import PaperFit
-from ..jobs import CaptureResult
+from ..jobs import CaptureResult, MaterialResult
 from ..photo import write_png
 from ..samples import Criterion
 from ..views import photo_pictures, photo_view
 from ..views.criteria import LOOKS, Look
+from .html_parts import page, summary
 from .material_section import material_section
 from .viewer_page import write_viewer_of
 
-STYLE = Path(__file__).parents[2] / "assets" / "report" / "style.css"
 MAX_SIDE = 640  # pixels of a picture in a row of photos
 VIEWER_LINK = (
-    "<p><a class='button' href='{file}'>Open the viewer</a> The object and a sphere with the "
-    "measured materials, to turn and to light.</p>"
+    "<p><a class='button' href='{file}'>Open the viewer</a>object and sphere with the measured "
+    "materials, to turn and to light</p>"
 )
 PHOTOS_AT_ONCE = 2  # limits memory: each has a photo in its full size for a moment
 
 
 def write_report(
-    folder: Path, result: CaptureResult, threads: int | None = None
+    folder: Path, result: CaptureResult, threads: int | None = None, back: str = ""
 ) -> Iterator[float]:
     """Write index.html and its pictures into ``folder``; yields the fraction done. threads: None
-    for one per core."""
+    for one per core. back: the page of the check that this report is a part of, relative to the
+    folder."""
     folder.mkdir(parents=True, exist_ok=True)
     photos = [result.capture.photo_name(place) for place in range(len(result.capture.photos))]
     sections: list[Callable[[], str | photo_view.PhotoView]] = [
@@ -42,11 +43,7 @@ def write_report(
     # the predictions use the light and camera of the capture, without the causes of a diagnosis
     if not result.effects:
         sections += [partial(_looked_at, result, place) for place in range(len(photos))]
-    viewer = write_viewer_of(folder, result)
-    body = [] if viewer is None else [VIEWER_LINK.format(file=viewer)]
-    body += [f"<p>Included in the fit: {escape(e.sentence)}</p>" for e in result.effects]
-    if result.proposed_photo is not None:
-        body.append(f"<p>Proposed photo: {escape(result.proposed_photo.sentence)}</p>")
+    body = [_summary(result, write_viewer_of(folder, result))]
     rows, found_criteria, factors = [], set[Criterion](), set[int]()
     with thread_pool(min(thread_count(threads), PHOTOS_AT_ONCE)) as pool:
         made = ordered_map(pool, lambda section: section(), sections, PHOTOS_AT_ONCE - 1)
@@ -65,19 +62,33 @@ def write_report(
         f"{counted(len(result.capture.photos), 'lit photo')} · "
         f"{counted(len(result.scan.mesh.faces), 'face')} · basis {result.basis.version}"
     )
-    html = page(result.capture.file.name, "".join(body), head)
+    html = page(result.capture.file.name, "".join(body), head, back)
     (folder / "index.html").write_text(html, "utf-8")
 
 
-def page(name: str, body: str, head: str = "") -> str:
-    """A complete HTML page about a capture; body: HTML; head: plain text below the title."""
-    title = escape(name)
-    line = title if not head else f"{title} · {escape(head)}"
-    return (
-        f"<!doctype html><html lang='en'><meta charset='utf-8'><title>Patina: {title}</title>"
-        f"<style>{STYLE.read_text('utf-8')}</style><h1>Patina report</h1><p class='sub'>{line}</p>"
-        f"{body}</html>"
+def _summary(result: CaptureResult, viewer: str | None) -> str:
+    """HTML: what a reader wants to know first."""
+    pictures = [(f"sphere_{material.name}.png", material.name) for material in result.materials]
+    held_out = "".join(
+        f"<li>{escape(material.name)}: {_held_out(material)}</li>" for material in result.materials
     )
+    parts = [("Error of a held-out photo", f"<ul>{held_out}</ul>")]
+    if result.effects:
+        included = "".join(f"<li>{escape(e.sentence)}</li>" for e in result.effects)
+        parts.append(("Included in the fit", f"<ul>{included}</ul>"))
+    if result.proposed_photo is not None:
+        sentence = escape(result.proposed_photo.sentence)
+        parts.append(("The photo that would say most", f"<p>{sentence}</p>"))
+    if viewer is not None:
+        parts.append(("", VIEWER_LINK.format(file=viewer)))
+    return summary(pictures, parts)
+
+
+def _held_out(material: MaterialResult) -> str:
+    typical = material.quality.typical
+    if typical is None:
+        return "unknown; two photos or more are needed"
+    return f"<span class='big'>{100 * typical:.1f} %</span> ({material.quality.rating.value})"
 
 
 def _looked_at(result: CaptureResult, place: int) -> photo_view.PhotoView:

@@ -29,20 +29,37 @@ def residual_picture(
     """(h, w, 3) picture of the part of a photo that shows the object: blue where the prediction is
     too dark, red where it is too bright, full colour at FULL. residual: (n, 3) photo − prediction
     in standard deviations."""
-    rows = np.flatnonzero((pixels.photo == photo) & np.isfinite(residual).all(axis=1))
-    at = np.stack([pixels.x[rows], pixels.y[rows]], axis=1).astype(np.float64)
+    image = _nearest(pixels, residual.mean(axis=1, keepdims=True), photo)
+    return display.difference_picture(-image, np.zeros_like(image), FULL)
+
+
+def radiance_picture(
+    pixels: Pixels, radiance: NDArray[np.floating], photo: int, white: float
+) -> NDArray[np.uint8]:
+    """(h, w, 3) picture of the same part of a photo, or of its prediction. radiance: (n, 3); white:
+    the radiance shown as white."""
+    return display.photo_picture(_nearest(pixels, radiance, photo), white)
+
+
+def _nearest(pixels: Pixels, values: NDArray[np.floating], photo: int) -> NDArray[np.float64]:
+    """(h, w, c) for each place of the picture the values (n, c) of the nearest pixel of the photo,
+    NaN where none is near."""
+    mine = pixels.photo == photo
+    at = np.stack([pixels.x[mine], pixels.y[mine]], axis=1).astype(np.float64)
     if not len(at):
-        return np.full((1, 1, 3), display.UNKNOWN)
+        return np.full((1, 1, values.shape[1]), np.nan)
     low, high = at.min(axis=0), at.max(axis=0)
     size = float((high - low).max()) or 1.0
     width, height = np.maximum(1, np.ceil(LONGEST * (high - low) / size)).astype(int)
     columns = low[0] + (np.arange(width) + 0.5) * size / LONGEST
     lines = low[1] + (np.arange(height) + 0.5) * size / LONGEST
     grid = np.stack(np.meshgrid(columns, lines), axis=-1).reshape(-1, 2)
-    typical = np.sqrt(np.prod(np.maximum(high - low, 1e-9)) / len(at))
-    far, which = cKDTree(at).query(grid, distance_upper_bound=MAX_DISTANCE * typical)
-    known = np.isfinite(far)
-    shown = np.full((len(grid), 1), np.nan)
-    shown[known, 0] = residual[rows[which[known]]].mean(axis=1)
-    image = shown.reshape(height, width, 1)
-    return display.difference_picture(-image, np.zeros_like(image), FULL)
+    rows = np.flatnonzero(mine & np.isfinite(values).all(axis=1))
+    shown = np.full((len(grid), values.shape[1]), np.nan)
+    if len(rows):
+        typical = np.sqrt(np.prod(np.maximum(high - low, 1e-9)) / len(at))
+        places = np.stack([pixels.x[rows], pixels.y[rows]], axis=1).astype(np.float64)
+        far, which = cKDTree(places).query(grid, distance_upper_bound=MAX_DISTANCE * typical)
+        known = np.isfinite(far)
+        shown[known] = values[rows[which[known]]]
+    return shown.reshape(height, width, -1)

@@ -11,6 +11,7 @@ from .svg_element import svg_element
 
 WIDTH, HEIGHT = 280, 150
 LEFT, RIGHT, TOP, BOTTOM = 40, 8, 20, 24
+MAX_TICKS = 5  # steps between marks of the horizontal axis
 COLOURS = ("#b4443c", "#2f6fb0")  # before, after
 
 
@@ -47,14 +48,28 @@ def trend_chart(name: str, unit: str, before: Trend, after: Trend | None, most: 
                 f"<line x1='{x(a):.1f}' x2='{x(a):.1f}' y1='{y(m - 2 * e):.1f}' "
                 f"y2='{y(m + 2 * e):.1f}' stroke='{colour}' stroke-opacity='.45'/>"
             )
+    levels = "".join(
+        f"<text x='{LEFT - 4}' y='{y(share * most) + 4:.0f}' text-anchor='end'>"
+        f"{100 * share * most:+.3g} %</text>"
+        for share in (1.0, 0.5, 0.0, -0.5, -1.0)
+    )
+    ticks = "".join(
+        f"<line x1='{x(t):.1f}' x2='{x(t):.1f}' y1='{HEIGHT - BOTTOM}' y2='{HEIGHT - BOTTOM + 3}' "
+        f"stroke='#999'/><text x='{x(t):.1f}' y='{HEIGHT - 6}' text-anchor='middle'>{t:g}</text>"
+        for t in _round_values(low, high)
+    )
     label = escape(name + (f" ({unit})" if unit else ""))
     return svg_element(
         WIDTH, HEIGHT, label,
         f"<text x='{LEFT}' y='12' font-weight='bold'>{label}</text>"
-        f"<text x='{LEFT - 4}' y='{y(most) + 4:.0f}' text-anchor='end'>{100 * most:+.0f} %</text>"
-        f"<text x='{LEFT - 4}' y='{y(-most) + 4:.0f}' text-anchor='end'>{-100 * most:+.0f} %</text>"
-        f"<text x='{LEFT - 4}' y='{y(0) + 4:.0f}' text-anchor='end'>0</text>"
-        f"<text x='{LEFT}' y='{HEIGHT - 6}'>{low:.3g}</text>"
-        f"<text x='{WIDTH - RIGHT}' y='{HEIGHT - 6}' text-anchor='end'>{high:.3g}</text>"
-        f"{''.join(lines)}",
+        f"{levels}{ticks}{''.join(lines)}",
     )  # fmt: skip
+
+
+def _round_values(low: float, high: float) -> list[float]:
+    """Round values within the range, MAX_TICKS + 1 at most."""
+    span = max(high - low, 1e-9)
+    power = 10.0 ** np.floor(np.log10(span / MAX_TICKS))
+    step = next(power * m for m in (1, 2, 5, 10) if span / (power * m) <= MAX_TICKS)
+    first = int(np.ceil(low / step))
+    return [round(step * i, 12) for i in range(first, int(np.floor(high / step)) + 1)]
