@@ -119,8 +119,8 @@ def _pictures(folder: Path, found: Diagnosis, context: DiagnosisContext) -> str:
                 ("before", "after correction"),
             )
         else:
-            file = f"residual_{photo:02d}_before.png"
-            pair += f"<figure><img src='{file}' alt='difference'></figure>"
+            name = f"residual_{photo:02d}_before.png"
+            pair += f"<figure><img src='{name}' alt='difference'></figure>"
         rows.append(f"<div>{pair}</div>")
     return (
         "<h2>Photos, predictions and differences</h2><p class='sub'>Only pixels that the check "

@@ -21,12 +21,15 @@ Evaluate = Callable[[Angles], NDArray[np.floating]]
 class ViewerMaterial:
     """tables: name of a model ("measured", "lobes", "principled") → (grid.size, 3) float16, ln(ρ ·
     cosMap + ε) at the nodes. interval: (grid.size,) uint8, ln of the factor of the 90 % interval in
-    units of INTERVAL_STEP, mean of the channels; None where it is not known."""
+    units of INTERVAL_STEP, mean of the channels; None where it is not known. body: level of the
+    diffuse body in 1/sr, by which a BRDF that varies is split (core/varying/split.py); None where
+    the material is even."""
 
     name: str
     grid: AngleGrid
     tables: Mapping[str, NDArray[np.float16]]
     interval: NDArray[np.uint8] | None = None
+    body: tuple[float, float, float] | None = None
 
     @classmethod
     def of(
@@ -35,6 +38,7 @@ class ViewerMaterial:
         brdf: PrincipalBRDF,
         models: Mapping[str, Evaluate],
         factor: Evaluate | None = None,
+        body: tuple[float, float, float] | None = None,
     ) -> ViewerMaterial:
         """models: further models by name, functions angles → ρ (n, 3) in 1/sr. factor: function
         angles → (n, 3) factor by which the BRDF may be larger or smaller."""
@@ -49,4 +53,4 @@ class ViewerMaterial:
             steps = np.log(factor(nodes)).mean(axis=1) / INTERVAL_STEP
             interval = np.clip(np.round(steps), 0, 255).astype(np.uint8)
         halves = {name: np.minimum(t, MAX_LOG).astype(np.float16) for name, t in tables.items()}
-        return cls(name, grid, halves, interval)
+        return cls(name, grid, halves, interval, body)

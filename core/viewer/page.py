@@ -82,6 +82,7 @@ def _data(
             {
                 "name": material.name,
                 "models": {name: {"table": _text(t)} for name, t in material.tables.items()},
+                "body": material.body,
                 "interval": None if material.interval is None else _text(material.interval),
             }
             for material in materials
@@ -101,7 +102,12 @@ def _data(
         out["object"] = {
             "positions": _text(thing.positions),
             "parts": [
-                {"material": material, "index": _text(index)} for material, index in thing.parts
+                {
+                    "material": part.material,
+                    "index": _text(part.corners),
+                    "factors": None if part.factors is None else _text(part.factors),
+                }
+                for part in thing.parts
             ],
         }
     return out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,13 +12,28 @@ MAX_FACES = 120_000  # more are merged: a page has at most 25 MB, and a laptop d
 MARGIN = 1.02  # of the unit sphere around the object
 
 
+Array = NDArray[np.floating]
+Variation = Callable[[NDArray[np.integer], Array, Array], Array]
+
+
+@dataclass(frozen=True)
+class Part:
+    """The faces of one material: its index, and (3 f,) uint32 corners of the faces. factors: (v,
+    10) float16 for each point of the object: factors of the diffuse part (3), of the specular part
+    (3), of the roughness, and a vector (3) that is added to the normal; None where the material is
+    even."""
+
+    material: int
+    corners: NDArray[np.uint32]
+    factors: NDArray[np.float16] | None = None
+
+
 @dataclass(frozen=True)
 class ViewerObject:
-    """positions: (v, 3) float32, z up. parts: (index of a material, (3 f,) uint32 corners of its
-    faces)."""
+    """positions: (v, 3) float32, z up."""
 
     positions: NDArray[np.float32]
-    parts: tuple[tuple[int, NDArray[np.uint32]], ...]
+    parts: tuple[Part, ...]
 
     @classmethod
     def of(
@@ -27,10 +43,13 @@ class ViewerObject:
         material: NDArray[np.integer],
         up: NDArray[np.floating] | None = None,
         seen_from: NDArray[np.floating] | None = None,
+        variation: Variation | None = None,
     ) -> ViewerObject:
         """vertices: (v, 3); faces: (f, 3); material: (f,) index of each face's material, negative
         for none. up: (3,) unit vector in their frame, None for z. seen_from: (3,) a point of the
-        same frame from which the viewer shows the object first."""
+        same frame from which the viewer shows the object first. variation: function (face,
+        barycentric weights of its second and third corner) → (m, 10) like Part.factors, the vector
+        in the frame of the vertices."""
         used, corners = np.unique(faces, return_inverse=True)
         points, faces = np.asarray(vertices, float)[used], corners.reshape(-1, 3)
         turn = np.eye(3) if up is None else _upright(np.asarray(up, float))
@@ -41,11 +60,33 @@ class ViewerObject:
         material = np.maximum(np.asarray(material)[kept], 0)
         points = points - (points.min(axis=0) + points.max(axis=0)) / 2
         points /= MARGIN * np.linalg.norm(points, axis=1).max()
-        parts = tuple(
-            (int(own), faces[material == own].astype(np.uint32).ravel())
-            for own in np.unique(material)
-        )
-        return cls(points.astype(np.float32), parts)
+        parts = []
+        for own in np.unique(material):
+            mine = material == own
+            factors = None
+            if variation is not None:
+                factors = _at_points(variation, faces[mine], kept[mine], len(points), turn)
+            parts.append(Part(int(own), faces[mine].astype(np.uint32).ravel(), factors))
+        return cls(points.astype(np.float32), tuple(parts))
+
+
+def _at_points(
+    variation: Variation,
+    faces: NDArray[np.integer],
+    original: NDArray[np.integer],
+    count: int,
+    turn: NDArray[np.float64],
+) -> NDArray[np.float16]:
+    """(count, 10) the variation at the points of some faces, from one of the faces of each. turn:
+    rotation of the vector."""
+    corners = faces.T.ravel()  # all first corners, all second, all third
+    used, place = np.unique(corners, return_index=True)
+    which, corner = original[place % len(faces)], place // len(faces)
+    found = variation(which, (corner == 1).astype(float), (corner == 2).astype(float))
+    out = np.zeros((count, 10), np.float16)
+    out[used, :7] = found[:, :7]
+    out[used, 7:] = found[:, 7:] @ turn.T
+    return out
 
 
 def simplified(

@@ -18,28 +18,9 @@ from patina.core.viewer.model_tables import INTERVAL_STEP, ViewerMaterial
 from patina.core.viewer.skies import Sky, computed_skies
 from patina.core.viewer.viewer_object import ViewerObject, simplified
 from tests.projected import projected
+from tests.sphere_mesh import sphere
 
 MODEL = Principled(base_color=np.array([0.4, 0.1, 0.05]), roughness=0.3)
-
-
-def sphere(rows: int) -> tuple[np.ndarray, np.ndarray]:
-    """(points, faces) of a closed unit sphere with about 4 rows² faces."""
-    theta = np.linspace(0, np.pi, rows + 1)[1:-1]
-    phi = np.arange(2 * rows) / rows * np.pi
-    t, p = np.meshgrid(theta, phi, indexing="ij")
-    rings = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1).reshape(-1, 3)
-    points = np.concatenate([rings, [[0, 0, 1], [0, 0, -1]]])
-    faces = []
-    columns = 2 * rows
-    for ring in range(rows - 2):
-        for i in range(columns):
-            a, b = ring * columns + i, ring * columns + (i + 1) % columns
-            faces += [[a, a + columns, b], [b, a + columns, b + columns]]
-    last = (rows - 2) * columns
-    for i in range(columns):
-        faces.append([len(rings), i, (i + 1) % columns])
-        faces.append([last + (i + 1) % columns, last + i, len(rings) + 1])
-    return points, np.array(faces)
 
 
 def test_tables_hold_the_brdf_within_the_rounding_of_half_floats():
@@ -83,8 +64,8 @@ def test_parts_are_those_of_the_materials():
     points, faces = sphere(6)
     material = np.arange(len(faces)) % 2
     made = ViewerObject.of(points, faces, material)
-    assert [own for own, _ in made.parts] == [0, 1]
-    assert sum(len(index) for _, index in made.parts) == 3 * len(faces)
+    assert [part.material for part in made.parts] == [0, 1]
+    assert sum(len(part.corners) for part in made.parts) == 3 * len(faces)
 
 
 def test_a_large_mesh_is_simplified_without_leaving_its_surface():

@@ -15,8 +15,8 @@ void frameOf(vec3 n, out vec3 t, out vec3 b) {
   b = cross(n, t);
 }
 
-// Reflectance in 1/sr; n, l, v of unit length, away from the surface.
-vec3 reflectance(sampler3D table, vec3 n, vec3 l, vec3 v) {
+// Reflectance in 1/sr; n, l, v of unit length, away from the surface. roughness: factor of alpha.
+vec3 reflectance(sampler3D table, vec3 n, vec3 l, vec3 v, float roughness) {
   float cosI = dot(n, l), cosO = dot(n, v);
   if (cosI <= 0.0 || cosO <= 0.0) return vec3(0.0);
   vec3 h = normalize(l + v);
@@ -28,12 +28,18 @@ vec3 reflectance(sampler3D table, vec3 n, vec3 l, vec3 v) {
   float dx = dot(l, t), dy = dot(l, b);
   float thetaD = atan(length(vec2(dx, dy)), dot(l, h));
   float phiD = length(vec2(dx, dy)) > 1e-7 ? atan(dy, dx) : 0.0;
+  float cosines = cosI * cosO;
+  if (roughness != 1.0) { // the same lobe, stretched (core/varying/node_model.py)
+    thetaH = atan(tan(min(thetaH, 1.55)) / roughness);
+    float along = cos(thetaH) * cos(thetaD), across = sin(thetaH) * sin(thetaD) * cos(phiD);
+    cosines = along * along - across * across;
+  }
   vec3 at = vec3(
     phiD / PI * nodes.x,
     clamp(thetaD / HALF_PI, 0.0, 1.0) * (nodes.y - 1.0),
     log(1.0 + clamp(thetaH, 0.0, HALF_PI) / knee) / log(1.0 + HALF_PI / knee) * (nodes.z - 1.0)
   );
   vec3 logarithm = texture(table, (at + 0.5) / nodes).rgb;
-  return max(exp(logarithm) - epsilon, 0.0) / clamp(cosI * cosO, 0.01, 1.0);
+  return max(exp(logarithm) - epsilon, 0.0) / clamp(cosines, 0.01, 1.0);
 }
 `;

@@ -23,7 +23,11 @@ export function readData() {
   for (const world of data.worlds) Object.assign(world, readWorld(world));
   if (data.object) {
     data.object.positions = new Float32Array(bytes(data.object.positions));
-    data.object.parts = data.object.parts.map((part) => ({ ...part, index: new Uint32Array(bytes(part.index)) }));
+    data.object.parts = data.object.parts.map((part) => ({
+      ...part,
+      index: new Uint32Array(bytes(part.index)),
+      factors: part.factors && Float32Array.from(new Uint16Array(bytes(part.factors)), THREE.DataUtils.fromHalfFloat),
+    }));
   }
   return data;
 }

@@ -40,16 +40,29 @@ function corners(grid, { thetaH, thetaD, phiD }) {
   return found;
 }
 
-// [R, G, B] in 1/sr.
-export function reflectance(grid, halves, normal, light, view) {
+// [R, G, B] in 1/sr. varied: factors of a material that varies (core/varying/node_model.py), or null.
+export function reflectance(grid, halves, normal, light, view, varied) {
   const cosI = normal.dot(light),
     cosO = normal.dot(view);
   if (cosI <= 0 || cosO <= 0) return [0, 0, 0];
+  const angles = halfDifference(normal, light, view);
+  let cosines = cosI * cosO;
+  if (varied) {
+    angles.thetaH = Math.atan(Math.tan(Math.min(angles.thetaH, 1.55)) / varied.roughness);
+    const along = Math.cos(angles.thetaH) * Math.cos(angles.thetaD);
+    const across = Math.sin(angles.thetaH) * Math.sin(angles.thetaD) * Math.cos(angles.phiD);
+    cosines = along * along - across * across;
+  }
   const logarithm = [0, 0, 0];
-  for (const [node, weight] of corners(grid, halfDifference(normal, light, view)))
+  for (const [node, weight] of corners(grid, angles))
     for (let c = 0; c < 3; c++) logarithm[c] += weight * DataUtils.fromHalfFloat(halves[3 * node + c]);
-  const cosMap = Math.min(Math.max(cosI * cosO, 0.01), 1);
-  return logarithm.map((value) => Math.max(Math.exp(value) - grid.epsilon, 0) / cosMap);
+  const cosMap = Math.min(Math.max(cosines, 0.01), 1);
+  const rho = logarithm.map((value) => Math.max(Math.exp(value) - grid.epsilon, 0) / cosMap);
+  if (!varied) return rho;
+  return rho.map((value, c) => {
+    const below = Math.min(value, varied.body[c]);
+    return varied.diffuse[c] * below + (varied.specular[c] / varied.roughness ** 2) * (value - below);
+  });
 }
 
 // The factor either way of the 90 % interval; null where it is not known.

@@ -201,12 +201,12 @@ function connectPointer(canvas, data, state, renderer) {
     const [hit] = event.buttons ? [] : caster.intersectObjects(renderer.scenes[state.shown].children);
     box.hidden = !hit;
     if (!hit) return;
-    const normal = smoothNormal(hit);
+    const { normal, factors } = surfaceAt(hit);
     const view = renderer.camera.position.clone().sub(hit.point).normalize();
     const own = state.shown === "sphere" ? state.material : hit.object.material.userData.material;
     const material = data.materials[own];
     const { halves } = material.models[state.model] ?? material.models.measured;
-    const rho = reflectance(data.grid, halves, normal, state.lamp, view);
+    const rho = reflectance(data.grid, halves, normal, state.lamp, view, factors && { ...factors, body: material.body });
     const angles = halfDifference(normal, state.lamp, view);
     const degrees = (radians) => `${((180 / Math.PI) * radians).toFixed(0)}°`;
     const between = (a, b) => degrees(Math.acos(Math.min(Math.max(a.dot(b), -1), 1)));
@@ -224,17 +224,23 @@ function connectPointer(canvas, data, state, renderer) {
   });
 }
 
-function smoothNormal(hit) {
-  const normals = hit.object.geometry.getAttribute("normal");
-  const positions = hit.object.geometry.getAttribute("position");
-  const corner = (k) => new THREE.Vector3().fromBufferAttribute(positions, k);
+// The normal where the pointer meets the surface, and the factors of a material that varies.
+function surfaceAt(hit) {
+  const geometry = hit.object.geometry;
+  const corners = [hit.face.a, hit.face.b, hit.face.c];
+  const vertex = (name, k) => new THREE.Vector3().fromBufferAttribute(geometry.getAttribute(name), k);
   const weights = new THREE.Vector3();
-  THREE.Triangle.getBarycoord(hit.point, corner(hit.face.a), corner(hit.face.b), corner(hit.face.c), weights);
-  const out = new THREE.Vector3();
-  ["a", "b", "c"].forEach((key, i) =>
-    out.addScaledVector(new THREE.Vector3().fromBufferAttribute(normals, hit.face[key]), weights.getComponent(i)),
+  THREE.Triangle.getBarycoord(hit.point, ...corners.map((k) => vertex("position", k)), weights);
+  const mean = (name) =>
+    corners.reduce((sum, k, i) => sum.addScaledVector(vertex(name, k), weights.getComponent(i)), new THREE.Vector3());
+  const normal = mean("normal").normalize();
+  if (!geometry.getAttribute("tilt")) return { normal, factors: null };
+  const tilt = mean("tilt");
+  const roughness = corners.reduce(
+    (sum, k, i) => sum + weights.getComponent(i) * geometry.getAttribute("factorRoughness").getX(k), 0,
   );
-  return out.normalize();
+  const factors = { diffuse: mean("factorDiffuse").toArray(), specular: mean("factorSpecular").toArray(), roughness };
+  return { normal: normal.clone().addScaledVector(normal, -tilt.dot(normal)).add(tilt).normalize(), factors };
 }
 
 try {

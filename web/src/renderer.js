@@ -46,7 +46,7 @@ export class Renderer {
     this.moved = () => {};
   }
 
-  shading(material) {
+  shading(material, varies = false) {
     const grid = this.data.grid;
     return new THREE.ShaderMaterial({
       glslVersion: THREE.GLSL3,
@@ -54,6 +54,7 @@ export class Renderer {
       fragmentShader: FRAGMENT,
       side: THREE.DoubleSide,
       userData: { material },
+      defines: varies ? { VARIES: 1 } : {},
       uniforms: {
         nodes: { value: new THREE.Vector3(grid.n_p, grid.n_d, grid.n_h) },
         knee: { value: grid.knee },
@@ -61,7 +62,7 @@ export class Renderer {
         table: { value: null },
         measured: { value: null },
         difference: { value: false },
-        scale: { value: 1 },
+        body: { value: new THREE.Vector3(...(this.data.materials[material].body ?? [0, 0, 0])) },
         quantiles: { value: null },
         sky: { value: false },
         world: { value: this.none },
@@ -100,7 +101,13 @@ export class Renderer {
       geometry.setAttribute("position", attribute);
       geometry.setAttribute("normal", whole.getAttribute("normal"));
       geometry.setIndex(new THREE.BufferAttribute(part.index, 1));
-      scene.add(new THREE.Mesh(geometry, this.shading(part.material)));
+      if (part.factors) {
+        const buffer = new THREE.InterleavedBuffer(part.factors, 10);
+        const columns = { factorDiffuse: [3, 0], factorSpecular: [3, 3], factorRoughness: [1, 6], tilt: [3, 7] };
+        for (const [name, [size, first]] of Object.entries(columns))
+          geometry.setAttribute(name, new THREE.InterleavedBufferAttribute(buffer, size, first));
+      }
+      scene.add(new THREE.Mesh(geometry, this.shading(part.material, Boolean(part.factors))));
     }
     return scene;
   }

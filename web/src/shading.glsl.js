@@ -9,10 +9,27 @@ import { BRDF } from "./brdf.glsl.js";
 export const VERTEX = /* glsl */ `
 out vec3 point;
 out vec3 smoothNormal;
+out vec3 diffuseFactor;
+out vec3 specularFactor;
+out float roughness;
+#ifdef VARIES
+in vec3 factorDiffuse;
+in vec3 factorSpecular;
+in float factorRoughness;
+in vec3 tilt;
+#endif
 void main() {
+  diffuseFactor = specularFactor = vec3(1.0);
+  roughness = 1.0;
+  smoothNormal = normal;
+#ifdef VARIES
+  diffuseFactor = factorDiffuse;
+  specularFactor = factorSpecular;
+  roughness = factorRoughness;
+  smoothNormal = normalize(normal + tilt - dot(tilt, normal) * normal);
+#endif
   vec4 world = modelMatrix * vec4(position, 1.0);
   point = world.xyz;
-  smoothNormal = mat3(modelMatrix) * normal;
   gl_Position = projectionMatrix * viewMatrix * world;
 }
 `;
@@ -26,7 +43,7 @@ const int QUANTILES = 256;
 uniform sampler3D table; // of the model that is shown
 uniform sampler3D measured; // subtracted in the difference
 uniform bool difference;
-uniform float scale; // factor on the reflectance
+uniform vec3 body; // 1/sr, level of the diffuse body, of a material that varies
 uniform sampler2D quantiles; // of theta_h of the material's half vectors, radians
 uniform bool sky;
 uniform sampler2D world; // radiance, and in alpha the density of the shared directions, 1/sr
@@ -41,6 +58,9 @@ uniform vec2 shift; // quasi-random, of this picture
 uniform vec3 eye;
 in vec3 point;
 in vec3 smoothNormal;
+in vec3 diffuseFactor;
+in vec3 specularFactor;
+in float roughness;
 out vec4 radiance;
 
 float visibility(vec3 at) {
@@ -76,9 +96,18 @@ float densityOfHalf(vec3 n, vec3 l, vec3 v) {
   return halfDensity(acos(clamp(dot(n, h), -1.0, 1.0))) / (4.0 * max(dot(v, h), 1e-4));
 }
 
+vec3 ofModel(sampler3D model, vec3 n, vec3 l, vec3 v) {
+  vec3 rho = reflectance(model, n, l, v, roughness);
+#ifdef VARIES
+  vec3 below = min(rho, body);
+  rho = diffuseFactor * below + specularFactor / (roughness * roughness) * (rho - below);
+#endif
+  return rho;
+}
+
 vec3 shown(vec3 n, vec3 l, vec3 v) {
-  vec3 rho = reflectance(table, n, l, v);
-  return scale * (difference ? rho - reflectance(measured, n, l, v) : rho);
+  vec3 rho = ofModel(table, n, l, v);
+  return difference ? rho - ofModel(measured, n, l, v) : rho;
 }
 
 // Two numbers in [0, 1) of a pixel (Jarzynski and Olano 2020, pcg2d).
