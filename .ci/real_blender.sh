@@ -10,6 +10,8 @@
 #   real_blender.sh own DIR NAME OUT    tools/window/own_shoots.py: an own object by mouse, from the
 #                                       folder NAME in the home folder's Scans, or "demo"
 #   real_blender.sh ended DIR OUT       tools/window/ended_process.py: the process of a fit is ended
+#   real_blender.sh looks DIR OUT       tools/window/looks.py: the sidebar of the .blend in OUT in both
+#                                       themes, at twice the size, and in other languages
 #   real_blender.sh chromium DIR ARGS   run Debian's Chromium; it sees the folder /tmp
 # Debian's build has no OSL and no USD; these are tested with the bpy wheel.
 set -euo pipefail
@@ -80,11 +82,12 @@ chromium)
     chromium fonts-dejavu-core >/dev/null
   bind "$dir" /tmp
   exec chroot "$dir" /usr/bin/chromium --no-sandbox "$@" ;;
-session | own | ended)
+session | own | ended | looks)
   dir=$1; shift
   script=(tools/window/session.py --)
   if [ "$what" = own ]; then script=(tools/window/own_shoots.py -- "$1"); shift; fi
   if [ "$what" = ended ]; then script=(tools/window/ended_process.py --); fi
+  if [ "$what" = looks ]; then script=(tools/window/looks.py --); fi
   mkdir -p "$1"; out=$(realpath "$1")
   cache=${PATINA_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/patina}
   system "$dir"
@@ -103,5 +106,5 @@ session | own | ended)
     sleep 2 # it may still be starting
     if grep -qs '^State:[[:space:]]*[^ZX]' "/proc/$left/status"; then echo "process $left has outlived its Blender"; exit 1; fi
   fi ;;
-*) sed -n '2,13p' "$0"; exit 2 ;;
+*) sed -n '2,15p' "$0"; exit 2 ;;
 esac

@@ -1,8 +1,8 @@
 """`run.py pictures`: render docs/images/demo.jpg from the embedded capture, and diagnosis.jpg
 (hunt/picture.py).
 
-From left to right: a lit photo, its prediction, the signed difference, and the fitted materials
-under another environment (Cycles, OSL).
+From left to right: a lit photo, the differences to its prediction without and with the causes that
+the check finds, and the materials under another environment (Cycles, OSL).
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ from .common import ROOT
 from .package import load_patina
 
 TARGET = ROOT / "docs" / "images" / "demo.jpg"
-PHOTO = 0  # index in the capture: the key light from the front
+PHOTO = 0  # index in the capture: the key light from the front, whose camera sees the relit scene
+EXPLAINED = 3  # of the photo whose differences are shown; its lamp's other photo was exposed more
+HEIGHT = 420  # pixels of each panel
 GAP = 12  # pixels between panels
 SAMPLES = 1024  # per pixel
 
@@ -30,8 +32,9 @@ def main() -> int:
     patina = load_patina()
     patina.register()
     from patina.commands.demo import CAPTURE
-    from patina.commands.fit import fit_to_folder
-    from patina.core.geometry import view_surface
+    from patina.commands.diagnose import diagnose_to_folder
+    from patina.core.capture import read_capture
+    from patina.core.geometry import RayScene, view_surface
     from patina.core.inputs import capture_data
     from patina.core.views import display
 
@@ -39,19 +42,26 @@ def main() -> int:
 
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "demo"
-        result = fit_to_folder(CAPTURE, out)
-        camera = capture_data.camera_of(result.capture, result.scan, PHOTO)
-        box = display.crop_box(view_surface(result.rays, camera).seen, margin=12)
+        diagnose_to_folder(CAPTURE, out)
+        capture = read_capture(CAPTURE)
+        scan = capture_data.open_scan(capture)
+        camera = capture_data.camera_of(capture, scan, PHOTO)
+        seen = view_surface(RayScene.build(scan.mesh), camera).seen
+        box = display.crop_box(seen, margin=12)
         panels = [
-            read(out / "report" / f"photo_{PHOTO:02d}_{kind}.png")
-            for kind in ("measured", "predicted", "difference")
+            read(out / "report" / f"{kind}.png")
+            for kind in (
+                f"compared_{EXPLAINED:02d}_photo",
+                f"residual_{EXPLAINED:02d}_before",
+                f"residual_{EXPLAINED:02d}_after",
+            )
         ]
         panels.append(relit(out / "scene.blend", Path(folder), box))
-    height = min(panel.shape[0] for panel in panels)
     TARGET.parent.mkdir(parents=True, exist_ok=True)
-    write(TARGET, with_gaps([panel[:height] for panel in panels], axis=1))
+    write(TARGET, with_gaps([of_height(panel, HEIGHT) for panel in panels], axis=1))
     print(f"wrote {TARGET}: {TARGET.stat().st_size / 1000:.0f} kB")
-    diagnosis_picture()
+    if "--demo" not in sys.argv:
+        diagnosis_picture()
     return 0
 
 
@@ -79,6 +89,16 @@ def relit(blend: Path, folder: Path, box: tuple[slice, slice]) -> np.ndarray:
     scene.render.filepath = str(folder / "relit.png")
     bpy.ops.render.render(write_still=True)
     return read(Path(scene.render.filepath))[box]
+
+
+def of_height(pixels: np.ndarray, height: int) -> np.ndarray:
+    """Resample (h, w, 3) 8-bit pixels to a height."""
+    source = oiio.ImageBuf(oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "uint8"))
+    source.set_pixels(oiio.ROI(), np.ascontiguousarray(pixels))
+    width = round(pixels.shape[1] * height / pixels.shape[0])
+    return oiio.ImageBufAlgo.resize(
+        source, roi=oiio.ROI(0, width, 0, height, 0, 1, 0, 3)
+    ).get_pixels(oiio.UINT8)
 
 
 def with_gaps(panels: Sequence[np.ndarray], axis: int) -> np.ndarray:
