@@ -1,5 +1,5 @@
 """`run.py pictures`: render docs/images/demo.jpg from the embedded capture, and diagnosis.jpg
-(hunt/picture.py).
+(hunt/picture.py); `run.py pictures demo`: only the first.
 
 From left to right: a lit photo, the differences to its prediction without and with the causes that
 the check finds, and the materials under another environment (Cycles, OSL).
@@ -23,6 +23,7 @@ TARGET = ROOT / "docs" / "images" / "demo.jpg"
 PHOTO = 0  # index in the capture: the key light from the front, whose camera sees the relit scene
 EXPLAINED = 3  # of the photo whose differences are shown; its lamp's other photo was exposed more
 HEIGHT = 420  # pixels of each panel
+WHITE_PERCENTILE = 99.5  # of the photo, with its black surroundings
 GAP = 12  # pixels between panels
 SAMPLES = 1024  # per pixel
 
@@ -45,22 +46,21 @@ def main() -> int:
         diagnose_to_folder(CAPTURE, out)
         capture = read_capture(CAPTURE)
         scan = capture_data.open_scan(capture)
-        camera = capture_data.camera_of(capture, scan, PHOTO)
-        seen = view_surface(RayScene.build(scan.mesh), camera).seen
-        box = display.crop_box(seen, margin=12)
-        panels = [
-            read(out / "report" / f"{kind}.png")
-            for kind in (
-                f"compared_{EXPLAINED:02d}_photo",
-                f"residual_{EXPLAINED:02d}_before",
-                f"residual_{EXPLAINED:02d}_after",
+        rays = RayScene.build(scan.mesh)
+        boxes = [
+            display.crop_box(
+                view_surface(rays, capture_data.camera_of(capture, scan, place)).seen, margin=margin
             )
+            for place, margin in ((PHOTO, 12), (EXPLAINED, 0))
         ]
-        panels.append(relit(out / "scene.blend", Path(folder), box))
+        panels = [lit_photo(CAPTURE.parent / capture.photos[EXPLAINED].file)[boxes[1]]]
+        for kind in ("before", "after"):
+            panels.append(read(out / "report" / f"residual_{EXPLAINED:02d}_{kind}.png"))
+        panels.append(relit(out / "scene.blend", Path(folder), boxes[0]))
     TARGET.parent.mkdir(parents=True, exist_ok=True)
     write(TARGET, with_gaps([of_height(panel, HEIGHT) for panel in panels], axis=1))
     print(f"wrote {TARGET}: {TARGET.stat().st_size / 1000:.0f} kB")
-    if "--demo" not in sys.argv:
+    if sys.argv[1:] != ["demo"]:
         diagnosis_picture()
     return 0
 
@@ -108,6 +108,14 @@ def with_gaps(panels: Sequence[np.ndarray], axis: int) -> np.ndarray:
     strip = [np.full(shape, 255, np.uint8)] * (2 * len(panels) - 1)
     strip[::2] = panels
     return np.concatenate(strip, axis=axis)
+
+
+def lit_photo(path: Path) -> np.ndarray:
+    """(h, w, 3) 8-bit pixels of a linear photo, its highlights clipped."""
+    from patina.core.views import display
+
+    radiance = oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT)[..., :3]
+    return display.photo_picture(radiance, display.white_level(radiance, WHITE_PERCENTILE))
 
 
 def read(path: Path) -> np.ndarray:

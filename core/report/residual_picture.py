@@ -11,6 +11,10 @@ from ..views import display
 
 LONGEST = 260  # pixels, of the longer side
 MAX_DISTANCE = 3.0  # of a shown place to the nearest selected pixel, in their typical spacing
+NEIGHBOURS = 5  # pixels that are averaged at a place
+SOFTNESS = (
+    0.3  # of the weights, in the typical spacing: at the pixel itself it outweighs the others
+)
 FULL = 3.0  # standard deviations, for full colour
 
 
@@ -29,7 +33,7 @@ def residual_picture(
     """(h, w, 3) picture of the part of a photo that shows the object: blue where the prediction is
     too dark, red where it is too bright, full colour at FULL. residual: (n, 3) photo − prediction
     in standard deviations."""
-    image = _nearest(pixels, residual.mean(axis=1, keepdims=True), photo)
+    image = _interpolated(pixels, residual.mean(axis=1, keepdims=True), photo)
     return display.difference_picture(-image, np.zeros_like(image), FULL)
 
 
@@ -38,12 +42,12 @@ def radiance_picture(
 ) -> NDArray[np.uint8]:
     """(h, w, 3) picture of the same part of a photo, or of its prediction. radiance: (n, 3); white:
     the radiance shown as white."""
-    return display.photo_picture(_nearest(pixels, radiance, photo), white)
+    return display.photo_picture(_interpolated(pixels, radiance, photo), white)
 
 
-def _nearest(pixels: Pixels, values: NDArray[np.floating], photo: int) -> NDArray[np.float64]:
-    """(h, w, c) for each place of the picture the values (n, c) of the nearest pixel of the photo,
-    NaN where none is near."""
+def _interpolated(pixels: Pixels, values: NDArray[np.floating], photo: int) -> NDArray[np.float64]:
+    """(h, w, c) for each place of the picture the mean of the values (n, c) of the nearest pixels
+    of the photo, weighted by their distance; NaN where none is near."""
     mine = pixels.photo == photo
     at = np.stack([pixels.x[mine], pixels.y[mine]], axis=1).astype(np.float64)
     if not len(at):
@@ -59,7 +63,12 @@ def _nearest(pixels: Pixels, values: NDArray[np.floating], photo: int) -> NDArra
     if len(rows):
         typical = np.sqrt(np.prod(np.maximum(high - low, 1e-9)) / len(at))
         places = np.stack([pixels.x[rows], pixels.y[rows]], axis=1).astype(np.float64)
-        far, which = cKDTree(places).query(grid, distance_upper_bound=MAX_DISTANCE * typical)
-        known = np.isfinite(far)
-        shown[known] = values[rows[which[known]]]
+        limit = MAX_DISTANCE * typical
+        far, which = cKDTree(places).query(grid, min(NEIGHBOURS, len(rows)), 0, 2, limit)
+        far, which = far.reshape(len(grid), -1), which.reshape(len(grid), -1)
+        known = np.isfinite(far[:, 0])
+        weight = 1 / (far[known] ** 2 + (SOFTNESS * typical) ** 2)  # 0 where there is none
+        nearest = values[rows[np.minimum(which[known], len(rows) - 1)]]
+        weight /= weight.sum(axis=1, keepdims=True)
+        shown[known] = np.einsum("mk,mkc->mc", weight, nearest)
     return shown.reshape(height, width, -1)
