@@ -58,7 +58,7 @@ def draw_check(
     others = [c for c in ranked if c not in reported]
     if others:
         header, body = layout.panel("patina_causes_without_effect", default_closed=True)
-        header.label(text="Also Tested, Without Effect")
+        header.label(text="Also Tested, Not Accepted")
         for cause in others[:MAX_CAUSES] if body is not None else ():
             _draw_cause(body, cause, causes, largest, shown)
     if len(causes):

@@ -68,7 +68,8 @@ def _pulls(parameters: JointParameters) -> str:
     return (
         "<h3>Parameters</h3><p class='sub'>Pull: the estimate in units of the standard deviation "
         "of its prior, largest first. Errors of the scan are part of every fit.</p>"
-        "<table><tr><th>Effect</th><th>Parameter</th><th>Estimate</th><th>Prior</th><th>Pull</th></tr>"
+        "<table><tr><th>Effect</th><th>Parameter</th><th>Estimate ± "
+        "standard error</th><th>Standard deviation of the prior</th><th>Pull</th></tr>"
         f"{rows}</table>"
     )
 
@@ -132,9 +133,10 @@ def _calibration(calibration: Calibration) -> str:
     )
     inside = "inside" if calibration.is_calibrated else "not inside"
     return (
-        "<h3>Calibration</h3><p class='sub'>Probability that the prediction of a held-out region "
-        "gave to a smaller value. Even, if the stated errors are right; high at both ends, if they "
-        f"are too small. Grey: the band of all bins at once ({100 * CONFIDENCE:.0f} %).</p>"
+        "<h3>Calibration</h3><p class='sub'>Histogram of the probability that the prediction of a "
+        "held-out region gave to a smaller value. Flat if the stated errors are right; high at "
+        f"both ends if they are too small. Grey: {100 * CONFIDENCE:.0f} % band of a flat "
+        "histogram; red bars are outside it.</p>"
         f"{svg_element(WIDTH, HEIGHT, 'Histogram of the probability integral transform', drawn)}"
         f"<p>The histogram is {inside} the band. {100 * calibration.covered:.0f} % of the held-out "
         f"values are inside the {100 * INTERVAL:.0f} % interval.</p>"
@@ -145,8 +147,8 @@ def _sensor(sensor: SensorResiduals) -> str:
     down, across = sensor.mean.shape
     cells = "".join(
         _cell(
-            column, row, float(sensor.mean[row, column]), FULL_RESIDUAL,
-            f"{100 * sensor.mean[row, column]:+.1f} ± {100 * sensor.error[row, column]:.1f} %",
+            column, row, -float(sensor.mean[row, column]), FULL_RESIDUAL,
+            f"{-100 * sensor.mean[row, column]:+.1f} ± {100 * sensor.error[row, column]:.1f} %",
         )
         for row, column in np.argwhere(np.isfinite(sensor.mean))
     )  # fmt: skip
@@ -155,9 +157,9 @@ def _sensor(sensor: SensorResiduals) -> str:
         f"stroke='{GREY}'/>"
     )
     return (
-        "<h3>Residuals on the sensor</h3><p class='sub'>Photo minus prediction, mean over all "
-        f"photos at each place of the sensor. Red: the photos are brighter, blue: darker; full "
-        f"colour: {100 * FULL_RESIDUAL:.0f} %. Beyond two standard errors: "
+        "<h3>Residuals on the sensor</h3><p class='sub'>Prediction minus photo, mean over all "
+        f"photos at each place of the sensor. Red: the prediction is too bright, blue: too dark; "
+        f"full colour: {100 * FULL_RESIDUAL:.0f} %. Beyond two standard errors: "
         f"{100 * sensor.significant:.0f} % of the cells.</p>"
         f"{svg_element(across * CELL, down * CELL, 'Mean residual on the sensor', frame + cells)}"
     )

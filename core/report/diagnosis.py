@@ -19,7 +19,7 @@ from ..photo import write_png
 from ..viewer.page import FILE_NAME, has_program
 from ..views.sphere import write_sphere
 from .assessment_section import assessment_section
-from .html_parts import compared, page, summary
+from .html_parts import ERROR_HEADING, PHOTO_HEADING, compared, page, summary
 from .residual_picture import photo_most_changed, radiance_picture, residual_picture
 from .trend_chart import trend_chart
 
@@ -44,7 +44,7 @@ def write_pages(
     body += _materials(folder, before, after)
     body += _pictures(folder, found, context) + section(found, context)
     body += assessment_section(assessment)
-    html = page(before.capture.file.name, body)
+    html = page("Check of the capture", before.capture.file.name, body)
     (folder / "index.html").write_text(html, "utf-8")
     return folder / "index.html"
 
@@ -69,15 +69,18 @@ def _summary(found: Diagnosis, before: CaptureResult, after: CaptureResult) -> s
     )
     if found.unexplained:
         causes += f"<li>{escape(found.residual.sentence())}</li>"
+    problems = "Problems of the capture"
+    if corrected:
+        problems += ", corrected in these materials"
     nothing = "<li>Nothing: noise and errors of the scan explain the differences.</li>"
     parts = [
-        ("Error of a held-out photo", f"<ul>{rows}</ul>" if rows else "<p>unknown</p>"),
-        ("What is wrong with the capture", f"<ul>{causes or nothing}</ul>"),
+        (ERROR_HEADING, f"<ul>{rows}</ul>" if rows else "<p>unknown</p>"),
+        (problems, f"<ul>{causes or nothing}</ul>"),
         ("", f"<p>{escape(found.quality.sentence())}</p>"),
     ]
     if after.proposed_photo is not None:
         sentence = escape(after.proposed_photo.sentence)
-        parts.append(("The photo that would say most", f"<p>{sentence}</p>"))
+        parts.append((PHOTO_HEADING, f"<p>{sentence}</p>"))
     links = "<a class='button' href='materials/index.html'>Report of the Materials</a>"
     if has_program():
         links += f"<a class='button' href='materials/{FILE_NAME}'>Open the Viewer</a>"
@@ -86,7 +89,9 @@ def _summary(found: Diagnosis, before: CaptureResult, after: CaptureResult) -> s
 
 
 def _advice(found: Diagnosis, trial: Trial) -> str:
-    return f"<b>{escape(ACTIONS[trial.effect.cause])}</b>" if trial in found.named else ""
+    if trial not in found.named:
+        return ""
+    return f"<br>For the next capture: <b>{escape(ACTIONS[trial.effect.cause])}</b>"
 
 
 def _pictures(folder: Path, found: Diagnosis, context: DiagnosisContext) -> str:
@@ -123,8 +128,9 @@ def _pictures(folder: Path, found: Diagnosis, context: DiagnosisContext) -> str:
             pair += f"<figure><img src='{name}' alt='difference'></figure>"
         rows.append(f"<div>{pair}</div>")
     return (
-        "<h2>Photos, predictions and differences</h2><p class='sub'>Only pixels that the check "
-        "uses. Differences: <span class='key'></span> prediction too dark … too bright, full "
+        "<h2>Photos, predictions and differences</h2><p class='sub'>Move the dividers to compare. "
+        f"Only pixels that the check uses{', predictions after correction' if corrected else ''}. "
+        "Differences: <span class='key'></span> prediction too dark … too bright, full "
         "colour at three times the standard deviation of the pixel's residual.</p>"
         f"<div class='pairs'>{''.join(rows)}</div>"
     )
@@ -152,8 +158,10 @@ def _causes(found: Diagnosis) -> str:
     others = [t for t in found.ranked if t not in found.reported]
     if others:
         html += (
-            f"<details><summary>Tested without effect ({len(others)}): with these causes, the "
-            f"photos are not predicted better</summary>{_table(others, found)}</details>"
+            f"<details><summary>Tested, not accepted ({len(others)})</summary><p class='sub'>Gains "
+            "are those before the accepted causes were included. With these in the model, the "
+            "causes below do not improve the prediction of the photos enough.</p>"
+            f"{_table(sorted(others, key=lambda trial: -trial.ratio), found)}</details>"
         )
     return html
 
@@ -225,9 +233,7 @@ def _materials(folder: Path, before: CaptureResult, after: CaptureResult) -> str
         for stage, material in (("before", one), ("after", other)):
             write_sphere(folder / f"{stage}_{one.name}.png", material.fit.brdf.evaluate)
             held = material.held_out
-            error = (
-                "" if held is None else f": RMS error of held-out photos {100 * held.error:.0f} %"
-            )
+            error = "" if held is None else f": {100 * held.typical:.1f} %"
             labels.append(f"{one.name}, {stage}{error}")
         pair = compared(f"before_{one.name}.png", f"after_{one.name}.png", (labels[0], labels[1]))
         rows += f"<div>{pair}</div>"

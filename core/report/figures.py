@@ -115,8 +115,8 @@ def _samples(material: MaterialResult) -> str:
     if material.used >= material.samples:
         return f"{material.samples:,} lit pixels, all of them used."
     return (
-        f"{material.samples:,} lit pixels; {material.used:,} of them are used, as a representative "
-        "selection from each photo."
+        f"{material.samples:,} lit pixels; {material.used:,} of them "
+        f"({100 * material.used / material.samples:.3g} %) are used, a selection from each photo."
     )
 
 

@@ -8,19 +8,22 @@ from pathlib import Path
 from urllib.parse import quote
 
 ASSETS = Path(__file__).parents[2] / "assets" / "report"
+# of the same parts of both pages
+ERROR_HEADING = "Median error of a pixel in a photo that was left out of the fit"
+PHOTO_HEADING = "The most useful next photo"
 STYLE, SCRIPT = ASSETS / "style.css", ASSETS / "script.js"
 
 
-def page(name: str, body: str, head: str = "", back: str = "") -> str:
-    """A complete HTML page about a capture; body: HTML; head: plain text below the title; back: the
-    page that this one is a part of, relative to it."""
-    title = escape(name)
-    line = title if not head else f"{title} · {escape(head)}"
+def page(heading: str, name: str, body: str, head: str = "", back: str = "") -> str:
+    """A complete HTML page about a capture; name: of the capture; body: HTML; head: plain text
+    below the heading; back: the page that this one is a part of, relative to it."""
+    title = escape(f"{heading}: {name}")
+    line = escape(name) if not head else f"{escape(name)} · {escape(head)}"
     up = f"<p><a href='{back}'>← Check of the capture</a></p>" if back else ""
     return (
         "<!doctype html><html lang='en'><meta charset='utf-8'><meta name='viewport' "
-        f"content='width=device-width'><title>Patina: {title}</title>"
-        f"<style>{STYLE.read_text('utf-8')}</style>{up}<h1>Patina report</h1>"
+        f"content='width=device-width'><title>{title}</title>"
+        f"<style>{STYLE.read_text('utf-8')}</style>{up}<h1>{escape(heading)}</h1>"
         f"<p class='sub'>{line}</p>{body}<script>{SCRIPT.read_text('utf-8')}</script></html>"
     )
 

@@ -17,13 +17,13 @@ from ..photo import write_png
 from ..samples import Criterion
 from ..views import photo_pictures, photo_view
 from ..views.criteria import LOOKS, Look
-from .html_parts import page, summary
+from .html_parts import ERROR_HEADING, PHOTO_HEADING, page, summary
 from .material_section import material_section
 from .viewer_page import write_viewer_of
 
 MAX_SIDE = 640  # pixels of a picture in a row of photos
 VIEWER_LINK = (
-    "<p><a class='button' href='{file}'>Open the viewer</a>object and sphere with the measured "
+    "<p><a class='button' href='{file}'>Open the Viewer</a>object and sphere with the measured "
     "materials, to turn and to light</p>"
 )
 PHOTOS_AT_ONCE = 2  # limits memory: each has a photo in its full size for a moment
@@ -62,7 +62,7 @@ def write_report(
         f"{counted(len(result.capture.photos), 'lit photo')} · "
         f"{counted(len(result.scan.mesh.faces), 'face')} · basis {result.basis.version}"
     )
-    html = page(result.capture.file.name, "".join(body), head, back)
+    html = page("Measured materials", result.capture.file.name, "".join(body), head, back)
     (folder / "index.html").write_text(html, "utf-8")
 
 
@@ -72,13 +72,13 @@ def _summary(result: CaptureResult, viewer: str | None) -> str:
     held_out = "".join(
         f"<li>{escape(material.name)}: {_held_out(material)}</li>" for material in result.materials
     )
-    parts = [("Error of a held-out photo", f"<ul>{held_out}</ul>")]
+    parts = [(ERROR_HEADING, f"<ul>{held_out}</ul>")]
     if result.effects:
         included = "".join(f"<li>{escape(e.sentence)}</li>" for e in result.effects)
-        parts.append(("Included in the fit", f"<ul>{included}</ul>"))
+        parts.append(("Problems of the capture, corrected in this fit", f"<ul>{included}</ul>"))
     if result.proposed_photo is not None:
         sentence = escape(result.proposed_photo.sentence)
-        parts.append(("The photo that would say most", f"<p>{sentence}</p>"))
+        parts.append((PHOTO_HEADING, f"<p>{sentence}</p>"))
     if viewer is not None:
         parts.append(("", VIEWER_LINK.format(file=viewer)))
     return summary(pictures, parts)

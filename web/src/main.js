@@ -149,24 +149,28 @@ function choice(id, options, value, changed) {
 // A sentence on what is shown.
 function describe(data, state) {
   const model = {
-    measured: "the measured BRDF, evaluated for each pixel from the fit",
-    lobes: "the lobe stack that EEVEE and other programs show",
-    principled: "the Principled BSDF that exports to games use",
+    measured: "the BRDF fitted to the photos; in directions that no photo shows, it is extrapolated",
+    lobes: "the lobe stack, which approximates the BRDF in EEVEE and other programs",
+    principled: "the Principled BSDF, which approximates the BRDF in exports to game engines",
   }[state.model];
-  const what = state.difference ? `The difference: ${model}, minus the measured BRDF` : `Shown: ${model}`;
+  const what = state.difference ? `Shown: ${model}, minus the BRDF fitted to the photos` : `Shown: ${model}`;
   const colours = state.difference ? " Red is too bright, blue too dark." : "";
-  const shadows = state.light !== "lamp" && state.shown === "object" ? " Light between parts of the object is left out." : "";
+  const shadows = state.light !== "lamp" && state.shown === "object" ? " Interreflection is not shown." : "";
   document.getElementById("what").textContent = `${what}.${colours}${shadows}`;
   document.getElementById("material").parentElement.hidden = state.shown === "object" || data.materials.length < 2;
-  document.getElementById("difference").disabled = state.model === "measured";
-  document.getElementById("hint").textContent =
-    state.light === "lamp"
-      ? "Drag to turn, scroll to zoom. Shift and drag to move the lamp. Point at the surface for its values."
-      : "Drag to turn, scroll to zoom. Point at the surface for its values.";
+  const difference = document.getElementById("difference");
+  difference.disabled = state.model === "measured";
+  difference.parentElement.title = difference.disabled ? "Select another model first" : "";
+  const lamp = state.light === "lamp";
+  document.getElementById("lamp").hidden = !lamp;
+  const turn = window.matchMedia("(pointer: coarse)").matches ? "Drag to turn, pinch to zoom." : "Drag to turn, scroll to zoom.";
+  const values = "Point at the surface for its reflectance and interval.";
+  document.getElementById("hint").textContent = lamp ? `${turn} Shift and drag moves the lamp. ${values}` : turn;
 }
 
 // Shift and drag: the lamp follows the pointer around the object.
 function connectLamp(canvas, state, renderer, orbit) {
+  const sliders = lampSliders(state, renderer);
   let moving = false;
   canvas.addEventListener("pointerdown", (event) => {
     moving = event.shiftKey;
@@ -175,6 +179,7 @@ function connectLamp(canvas, state, renderer, orbit) {
   window.addEventListener("pointerup", () => {
     moving = false;
     orbit.enabled = true;
+    sliders.follow();
   });
   window.addEventListener("pointermove", (event) => {
     if (!moving) return;
@@ -185,6 +190,24 @@ function connectLamp(canvas, state, renderer, orbit) {
     renderer.restart();
     renderer.moved();
   });
+}
+
+// Azimuth and elevation of the lamp.
+function lampSliders(state, renderer) {
+  const [around, height] = ["around", "height"].map((id) => document.getElementById(id));
+  const place = () => {
+    const [a, h] = [around, height].map((slider) => (Number(slider.value) * Math.PI) / 180);
+    state.lamp.set(Math.cos(h) * Math.sin(a), -Math.cos(h) * Math.cos(a), Math.sin(h));
+    renderer.restart();
+    renderer.moved();
+  };
+  const follow = () => {
+    around.value = (180 / Math.PI) * Math.atan2(state.lamp.x, -state.lamp.y);
+    height.value = (180 / Math.PI) * Math.asin(state.lamp.z);
+  };
+  for (const slider of [around, height]) slider.addEventListener("input", place);
+  follow();
+  return { follow };
 }
 
 // Values at the pointer: reflectance towards the lamp, its angles and interval.
@@ -198,7 +221,7 @@ function connectPointer(canvas, data, state, renderer) {
       (2 * (event.clientX - at.left)) / at.width - 1, 1 - (2 * (event.clientY - at.top)) / at.height,
     );
     caster.setFromCamera(place, renderer.camera);
-    const [hit] = event.buttons ? [] : caster.intersectObjects(renderer.scenes[state.shown].children);
+    const [hit] = event.buttons || state.light !== "lamp" ? [] : caster.intersectObjects(renderer.scenes[state.shown].children);
     box.hidden = !hit;
     if (!hit) return;
     const { normal, factors } = surfaceAt(hit);
@@ -210,9 +233,9 @@ function connectPointer(canvas, data, state, renderer) {
     const angles = halfDifference(normal, state.lamp, view);
     const degrees = (radians) => `${((180 / Math.PI) * radians).toFixed(0)}°`;
     const between = (a, b) => degrees(Math.acos(Math.min(Math.max(a.dot(b), -1), 1)));
-    const factor = intervalFactor(data.grid, material.factor, data.interval_step, angles);
+    const factor = state.model === "measured" && intervalFactor(data.grid, material.factor, data.interval_step, angles);
     const lines = [
-      `${material.name}: ${rho.map((value) => value.toPrecision(2)).join(", ")} 1/sr (R, G, B)`,
+      `${material.name}, ${MODELS[state.model]}: ${rho.map((value) => value.toPrecision(2)).join(", ")} 1/sr (R, G, B)`,
       `normal to lamp ${between(normal, state.lamp)}, to view ${between(normal, view)}`,
       `half vector ${degrees(angles.thetaH)} from normal, lamp ${degrees(angles.thetaD)} from half vector`,
     ];

@@ -110,15 +110,28 @@ class NearLight(ChangesShading, DisplacesLamp):
         return replace(state, light=towards / length, irradiance=irradiance)
 
     def sentence(self, x: np.ndarray, error: np.ndarray) -> str:
-        nearest = int(np.argmax(self.nearness(x)))
-        nearness = max(float(self.nearness(x)[nearest]), 1e-9)
-        half = min(nearness / 2, 0.9)
+        nearness = np.maximum(self.nearness(x), 1e-9)
+        order = np.argsort(-nearness)
+        near = [k for k in order if nearness[k] > MIN_NEARNESS] or [int(order[0])]
+        half = min(float(nearness[near[0]]) / 2, 0.9)
         unevenness = 100 * (((1 + half) / (1 - half)) ** 2 - 1)
+        distances = ", ".join(
+            f"{self.from_afar.names[k]!r} {self.size / nearness[k]:.3g}" for k in near
+        )
+        if len(near) == 1:
+            start = (
+                f"The lamp {self.from_afar.names[near[0]]!r} is near the object: its distance is "
+                f"about {self.size / nearness[near[0]]:.3g} scan units "
+                f"({1 / nearness[near[0]]:.1f} times the size of the object)"
+            )
+        else:
+            start = (
+                f"{len(near)} lamps are near the object. Their distances are about {distances} "
+                f"scan units (the object's size is {self.size:.3g})"
+            )
         return (
-            f"The lamp {self.from_afar.names[nearest]!r} is near the object: its distance is about "
-            f"{self.size / nearness:.3g} scan units ({1 / nearness:.1f} times the size of the "
-            f"object), so the near side gets up to {unevenness:.0f} % more light than the far "
-            "side."
+            f"{start}; the near side of the object gets up to {unevenness:.0f} % more light than "
+            "the far side."
         )
 
 
