@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # A real Blender on a Debian machine, as root: Debian's package, in a chroot.
-#   real_blender.sh install [DIR]       Blender 4.3 with Python 3.13 (about 2 minutes, 1.5 GB)
+#   real_blender.sh install [DIR]       Blender 4.3 with Python 3.13, and Chromium (3 minutes, 2 GB)
 #   real_blender.sh blender DIR ARGS    run that Blender; the current folder, the checkout, the
 #                                       folder ../shared and Patina's cache have the same paths
 #   real_blender.sh python DIR ARGS     run its Python 3.13 in the same way
@@ -52,6 +52,10 @@ install() { # DIR
     inside "$dir" apt-get update -qq
     inside "$dir" apt-get install -y -qq --no-install-recommends python3-numpy >/dev/null
   }
+  [ -x "$dir/usr/bin/chromium" ] || {
+    inside "$dir" apt-get update -qq
+    inside "$dir" apt-get install -y -qq --no-install-recommends chromium fonts-dejavu-core >/dev/null
+  }
   inside "$dir" blender -b --version | sed -n 1p
 }
 
@@ -78,8 +82,7 @@ blender | python)
 chromium)
   dir=$1; shift
   system "$dir"
-  [ -x "$dir/usr/bin/chromium" ] || inside "$dir" apt-get install -y -qq --no-install-recommends \
-    chromium fonts-dejavu-core >/dev/null
+  [ -x "$dir/usr/bin/chromium" ] || { echo "no Chromium in $dir; run: real_blender.sh install $dir" >&2; exit 1; }
   bind "$dir" /tmp
   exec chroot "$dir" /usr/bin/chromium --no-sandbox "$@" ;;
 session | own | ended | looks)

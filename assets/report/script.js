@@ -44,7 +44,7 @@ addEventListener("DOMContentLoaded", () => {
     frame.scrollTop -= event.movementY;
     dragged += Math.hypot(event.movementX, event.movementY);
   });
-  frame.addEventListener("pointerdown", () => (dragged = 0));
+  dialog.addEventListener("pointerdown", () => (dragged = 0));
   large.addEventListener("dragstart", (event) => event.preventDefault());
   dialog.addEventListener("click", () => dragged < 5 && dialog.close());
 

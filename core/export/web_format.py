@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
+from ..basis.log_table import LogTable
 from ..viewer.model_tables import ViewerMaterial
 from ..viewer.page import FILE_NAME, write_viewer
 from ..viewer.skies import computed_skies
@@ -42,12 +45,17 @@ def write_web(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
             subject.name,
             (FILE_NAME,),
             {
-                "measured": 0.0,
+                "measured": subject.error(_stored(material).evaluate),
                 "lobe stack": subject.error(subject.lobes.stack.evaluate),
                 "Principled": subject.error(subject.material.principled.evaluate),
             },
             dropped=(NO_SURFACE,),
             notes=subject.scale_note,
         )
-        for subject in subjects
+        for subject, material in zip(subjects, materials, strict=True)
     ]
+
+
+def _stored(material: ViewerMaterial) -> LogTable:
+    """The measured BRDF as the page stores it, in half floats."""
+    return LogTable(material.grid, material.tables["measured"].astype(np.float32))

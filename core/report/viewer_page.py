@@ -38,7 +38,7 @@ def write_viewer_of(folder: Path, result: CaptureResult) -> str | None:
         mesh.vertices,
         mesh.faces,
         result.face_material,
-        None if up is None else up.direction,
+        None if up is None or not up.reliable else up.direction,
         None if first is None else first.pose.centre,
         None if varying is None else partial(_factors, varying),
     )

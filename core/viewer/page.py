@@ -54,8 +54,8 @@ def write_viewer(
         "TITLE": escape(title),
         "STYLE": (ASSETS / "style.css").read_text("utf-8"),
         "NOTES": "".join(f'<p class="note">{escape(note)}</p>' for note in notes),
-        # "</" would end the script element
-        "DATA": json.dumps(data, separators=(",", ":")).replace("</", "<\\/"),
+        # "<" could end the script element, or begin a comment in it
+        "DATA": json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
         "PROGRAM": PROGRAM.read_text("utf-8").replace("</script", "<\\/script"),
     }
     first, *rest = (ASSETS / "page.html").read_text("utf-8").split("@")

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-MAX_FACES = 120_000  # more are merged: a page has at most 25 MB, and a laptop draws this in 1 ms
+MAX_FACES = 120_000  # more are merged: 2 MB in the page, and a laptop draws them in 1 ms
+MAX_CELLS = 2**20  # along each axis: three numbers of a cell are one integer
 MARGIN = 1.02  # of the unit sphere around the object
 
 
@@ -99,7 +100,11 @@ def simplified(
         return points, faces, kept
     low = points.min(axis=0)
     extent = float((points.max(axis=0) - low).max())
-    cells = np.sqrt(most)  # a closed surface crosses about two faces in each of its cells
+    corners = points[faces]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    total = float(np.linalg.norm(area, axis=1).sum()) / 2
+    # a surface has about three faces for each square of the grid that its area fills
+    cells = min(extent / max(np.sqrt(3 * total / most), 1e-12), MAX_CELLS)
     while True:
         place = np.floor((points - low) / extent * cells).astype(np.int64)
         key = (place[:, 0] << 42) + (place[:, 1] << 21) + place[:, 2]

@@ -31,8 +31,6 @@ from tests.wheel.world_light import assign_material  # noqa: E402
 
 if material_nodes.osl_missing():
     pytest.skip(f"{material_nodes.osl_missing()}", allow_module_level=True)
-if not viewer_page.has_program():
-    pytest.skip("the viewer's program was not built", allow_module_level=True)
 
 PICTURES = 400  # that the viewer averages
 MODELS = {

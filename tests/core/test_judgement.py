@@ -256,3 +256,16 @@ def test_a_room_is_commoner_than_lifted_blacks():
     best = best_of([_tried("black_level", 3, 100.0), _tried("ambient_light", 3, 100.0)])
     assert best is not None and best.effect.cause == "ambient_light"
     assert [effect.cause for effect in best.ties] == ["black_level"]
+
+
+def test_one_certain_parameter_among_many_is_distinct():
+    x = np.zeros(20)
+    x[7] = 5.0
+    trial = replace(_tried("environment_reflection", 20, 1.0), x=x, correlation=np.eye(20))
+    assert trial.is_distinct
+
+
+def test_a_parameter_at_a_limit_is_distinct():
+    """It has no variance there."""
+    trial = replace(_tried("subsurface", 1, 1.0), x=np.array([1.5]), variance=np.zeros(1))
+    assert replace(trial, correlation=np.zeros((1, 1))).is_distinct

@@ -117,7 +117,7 @@ def test_wide_intervals_are_written_as_factors() -> None:
 def test_unused_samples_are_reported(result: CaptureResult) -> None:
     material = replace(result.materials[0], samples=2_500_000, used=400_001)
     shown = dict(figures.figures(material, ["a"] * 3))["Samples"]
-    assert shown.startswith("2,500,000 lit pixels; 400,001 of them are used, as a representative")
+    assert shown.startswith("2,500,000 lit pixels; 400,001 of them (16 %) are used")
 
 
 def test_page_shows_uncertainty(result: CaptureResult, tmp_path: Path) -> None:

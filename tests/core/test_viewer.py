@@ -125,3 +125,12 @@ def test_without_its_program_there_is_no_page(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"run\.py build"):
         page.write_viewer(tmp_path / "viewer.html", "a", [], [])
     assert not (tmp_path / "viewer.html").exists()
+
+
+def test_a_stray_triangle_does_not_coarsen_an_object():
+    points, faces = sphere(120)
+    stray = np.array([[50.0, 0, 0], [50.1, 0, 0], [50.0, 0.1, 0]])
+    more = np.arange(3)[None] + len(points)
+    points, faces = np.concatenate([points, stray]), np.concatenate([faces, more])
+    _, kept, _ = simplified(points, faces, most=9000)
+    assert 3000 < len(kept) <= 9000

@@ -1,4 +1,4 @@
-// The data of the page (core/export/web/page.py) as typed arrays and textures.
+// The data of the page (core/viewer/page.py) as typed arrays and textures.
 
 import * as THREE from "three";
 
@@ -140,7 +140,8 @@ function halfVectorQuantiles(grid, halves) {
     let sum = 0;
     for (let d = 0; d < rows; d++) {
       const at = 3 * (h * grid.n_d + d) * grid.n_p;
-      sum += Math.max(Math.exp(THREE.DataUtils.fromHalfFloat(halves[at + 1])) - grid.epsilon, 0);
+      for (let c = 0; c < 3; c++)
+        sum += Math.max(Math.exp(THREE.DataUtils.fromHalfFloat(halves[at + c])) - grid.epsilon, 0);
     }
     return sum / rows;
   });
@@ -166,7 +167,7 @@ function halfVectorQuantiles(grid, halves) {
   let evenly = 0;
   for (let i = 0; i < FINE; i++) {
     evenly += even[i] * 2; // the integral of sin·cos is 1/2
-    cumulative[i + 1] = (1 - EVEN_SHARE) * (cumulative[i + 1] / whole) + EVEN_SHARE * evenly;
+    cumulative[i + 1] = (1 - EVEN_SHARE) * (cumulative[i + 1] / Math.max(whole, 1e-12)) + EVEN_SHARE * evenly;
   }
   const out = new Float32Array(QUANTILES + 1);
   let i = 0;

@@ -107,8 +107,10 @@ function connect(data, state, renderer) {
   choice("material", Object.fromEntries(data.materials.map((m, i) => [i, m.name])), state.material,
     (value) => change("material", Number(value)));
   const known = Object.keys(MODELS).filter((name) => data.materials.every((m) => m.models[name]));
-  choice("model", Object.fromEntries(known.map((name) => [name, MODELS[name]])), state.model,
-    (value) => change("model", value));
+  choice("model", Object.fromEntries(known.map((name) => [name, MODELS[name]])), state.model, (value) => {
+    if (value === "measured") state.difference = document.getElementById("difference").checked = false;
+    change("model", value);
+  });
   choice("light", { lamp: "Lamp", ...Object.fromEntries(data.worlds.map((w, i) => [i, w.name])) }, state.light,
     (value) => change("light", value === "lamp" ? value : Number(value)));
   const difference = document.getElementById("difference");

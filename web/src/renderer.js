@@ -8,11 +8,11 @@ import {
 
 export const PICTURES = 400; // that are averaged
 const SHADOW_SIZE = 2048; // texels
-const SHADOW_BIAS = 2.5e-3; // of the depth of the object's bounding sphere
+const SHADOW_BIAS = 2.5e-3; // of the lamp camera's depth range, twice the object's diameter
 // additive recurrences (Roberts 2018) for the sky's directions, and the pixels' half vectors
 const SKY = [0.8191725133961645, 0.6710436067037893, 0.5497004779019703];
 const HALF = [0.7548776662466927, 0.5698402909980532];
-// the pixel's area is covered by an R2 sequence too, of another start
+const PIXEL = [0.8566748838545029, 0.733891856627126]; // over the pixel's area
 const START = 0.5;
 
 export class Renderer {
@@ -44,6 +44,7 @@ export class Renderer {
     this.targets = null;
     this.count = 0;
     this.moved = () => {};
+    canvas.addEventListener("webglcontextrestored", () => this.restart());
   }
 
   shading(material, varies = false) {
@@ -126,7 +127,7 @@ export class Renderer {
     this.count = 0;
   }
 
-  // Add one picture to the average. state: see panel.js.
+  // Add one picture to the average. state: see main.js.
   step(state) {
     if (this.count >= PICTURES) return false;
     const i = this.count;
@@ -142,7 +143,7 @@ export class Renderer {
     for (const mesh of scene.children) this.setUniforms(mesh.material, state, drawn, toLight, i);
     const { width, height } = picture;
     this.camera.setViewOffset(
-      width, height, ((START + i * HALF[0]) % 1) - 0.5, ((START + i * HALF[1]) % 1) - 0.5, width, height,
+      width, height, ((START + i * PIXEL[0]) % 1) - 0.5, ((START + i * PIXEL[1]) % 1) - 0.5, width, height,
     );
     this.clear(picture);
     this.gl.render(scene, this.camera);

@@ -14,7 +14,8 @@ from .base.parameters import Parameters, mean_removal, parameter_columns
 
 PRIOR_SCALE = 0.1  # of ln gain, standard deviation of the prior
 GAIN_ERROR = 0.02  # of ln gain, assumed: errors of the BRDF that a whole photo has in common
-MIN_DRIFT = 0.03  # of ln gain: a smaller difference between photos of one lamp is not named
+# of the ratio of two gains, its logarithm: a smaller one is not named; two standard errors
+MIN_DRIFT = 2 * np.sqrt(2) * GAIN_ERROR
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from ..effects.base.effect import Effect
 from ..effects.base.shown_by_background import ShownByBackground
@@ -136,13 +136,15 @@ class Trial:
 
     @property
     def is_distinct(self) -> bool:
-        """Whether the parameters differ from 0, no effect, at the 95 % level: their joint
-        confidence region does not contain 0 (Wald test). Parameters can be uncertain each for
-        itself and certain together, such as the ratio of two exposures. Where correlations are not
-        known: whether the 95 % interval of any parameter does not contain 0. True where no
-        variance is known."""
+        """Whether the parameters differ from 0, no effect, at the 95 % level: all of them jointly
+        (Wald test) or one alone (Bonferroni). They can be uncertain each for itself and certain
+        together, such as the ratio of two exposures. Where correlations are not known: whether the
+        95 % interval of any parameter does not contain 0. True where no variance is known."""
         x, errors = np.ravel(self.identified), np.ravel(self.standard_errors)
         if not len(x) or len(x) != len(errors):
+            return True
+        # one alone, among as many as there are; at a limit, a parameter has no variance
+        if np.any(np.abs(x) > norm.ppf(1 - 0.025 / len(x)) * errors):
             return True
         if self.correlation is None or self.correlation.shape != (len(x), len(x)):
             return bool(np.any(np.abs(x) > HALF_WIDTH_95 * errors))
@@ -177,7 +179,10 @@ class Trial:
         if correlation is not None and correlation.shape == (len(own), len(own)):
             # systematic errors of different parameters are independent of each other
             size = np.sqrt(own)
-            covariance = np.outer(size, size) * correlation + np.diag(systematic)
+            known = self.effect.identifiable
+            project = np.eye(len(own)) if known is None else known
+            covariance = np.outer(size, size) * correlation
+            covariance += project @ np.diag(systematic) @ project.T
             total = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
             correlation = covariance / np.outer(total, total)
         return replace(self, variance=own + systematic, correlation=correlation)
