@@ -18,6 +18,7 @@ class StagePanel:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Patina"
+    bl_translation_context = "Patina"  # Blender has other meanings of some labels
     stage = ""
 
     def draw_header(self, context: bpy.types.Context) -> None:

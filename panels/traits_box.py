@@ -27,6 +27,7 @@ class PATINA_PT_traits(bpy.types.Panel):
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Patina"
+    bl_translation_context = "Patina"  # Blender has other meanings of some labels
     bl_parent_id = "PATINA_PT_material"
     bl_options = {"DEFAULT_CLOSED"}
 

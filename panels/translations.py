@@ -9,7 +9,8 @@ from pathlib import Path
 import bpy
 
 FOLDER = Path(__file__).parents[1] / "assets" / "translations"
-CONTEXTS = ("*", "Operator")  # of messages; the second is that of the operators' names
+# of messages; "Operator": names of operators; "Patina": the panels (stage.py)
+CONTEXTS = ("*", "Operator", "Patina")
 
 
 def tables() -> dict[str, dict[tuple[str, str], str]]:

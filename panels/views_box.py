@@ -23,6 +23,7 @@ class PATINA_PT_views(bpy.types.Panel):
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Patina"
+    bl_translation_context = "Patina"  # Blender has other meanings of some labels
     bl_parent_id = "PATINA_PT_check"
     bl_options = {"DEFAULT_CLOSED"}
 
