@@ -1,4 +1,4 @@
-"""Renders of the demo capture: Cycles with one small lamp, direct light and cast shadows only."""
+"""Renders of the demo capture: Cycles with one lamp, direct light and cast shadows only."""
 
 from __future__ import annotations
 
@@ -114,8 +114,8 @@ class Studio:
         scene.render.film_transparent = True
         image = scene.render.image_settings
         image.file_format, image.color_mode, image.color_depth = "OPEN_EXR", "RGBA", "32"
-        lamp = bpy.data.lights.new("lamp", "POINT")
-        lamp.shadow_soft_size = 0.0
+        lamp = bpy.data.lights.new("lamp", "SUN")
+        lamp.angle = 0.0
         lens = bpy.data.cameras.new("lens")
         lens.clip_start = 0.01
         self.lamp = bpy.data.objects.new("lamp", lamp)
@@ -124,6 +124,7 @@ class Studio:
             scene.collection.objects.link(thing)
         scene.camera = self.lens
         self.body: bpy.types.Object | None = None
+        self.point: bpy.types.Object | None = None
 
     def show(self, surface: Surface, glazed: Array) -> None:
         """Replace the object by a mesh; `glazed` (v,) is per point."""
@@ -143,14 +144,24 @@ class Studio:
         self.body.data.materials.clear()
         self.body.data.materials.append(material)
 
-    def light(self, position: Array, lit: Array, irradiance: float) -> None:
-        """Place the lamp; it has the irradiance at the point ``lit``, on a surface that faces it.
+    def light(self, direction: Array, irradiance: float) -> None:
+        """Set the direction (surface → light) and irradiance of the sun."""
+        self.lamp.data.energy = irradiance
+        self.lamp.rotation_mode = "QUATERNION"
+        self.lamp.rotation_quaternion = Vector(direction).to_track_quat("Z", "Y")
 
-        Blender's point lamp of power P has radiant intensity P / (4π).
-        """
-        square = float(np.sum((np.asarray(position) - lit) ** 2))
-        self.lamp.data.energy = 4 * np.pi * irradiance * square
-        self.lamp.location = Vector(position)
+    def near(self, position: Array, irradiance: float, centre: Array) -> None:
+        """Use a point lamp at ``position``, as bright at ``centre`` as a sun of this irradiance."""
+        if self.point is None:
+            lamp = bpy.data.lights.new("near", "POINT")
+            lamp.shadow_soft_size = 0.0
+            self.point = bpy.data.objects.new("near", lamp)
+            self.scene.collection.objects.link(self.point)
+        distance = float(np.linalg.norm(position - centre))
+        # Blender's watts of a point lamp: intensity W / (4π · π) per sr and unit of radiance
+        self.point.data.energy = 4 * np.pi**2 * irradiance / np.pi * distance**2
+        self.point.location = position
+        self.lamp.hide_render = True
 
     def photograph(self, camera: Camera) -> Array:
         """Render linear RGBA (height, width, 4), row 0 on top; alpha: coverage by the object."""

@@ -319,7 +319,7 @@ def check_irradiance(studio: Studio, camera: Camera, direction: Array) -> None:
     centre = scan_turn() @ MIDDLE
     studio.show(plane(centre, direction), np.zeros(4))
     studio.dress(lambertian())
-    studio.light(centre + LAMP_DISTANCE * direction, centre, IRRADIANCE)
+    studio.near(centre + LAMP_DISTANCE * direction, IRRADIANCE, centre)
     middle = studio.photograph(camera)[195:235, 172:212, :3]
     print(f"white plane facing the lamp: {middle.mean():.6f}, E/π = {IRRADIANCE / np.pi:.6f}")
     if (
@@ -363,7 +363,7 @@ def make(folder: Path) -> None:
         view = camera.position - turn @ MIDDLE
         angles.append(angle(lamps[shot.lamp], view / np.linalg.norm(view)))
         centre = turn @ MIDDLE
-        studio.light(centre + LAMP_DISTANCE * lamps[shot.lamp], centre, IRRADIANCE)
+        studio.near(centre + LAMP_DISTANCE * lamps[shot.lamp], IRRADIANCE, centre)
         studio.dress(pottery())
         picture = studio.photograph(camera)
         radiance = picture[..., :3] * DRIFTED.get(shot.camera, 1.0)

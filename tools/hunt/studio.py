@@ -25,7 +25,6 @@ class HuntStudio(Studio):
         super().__init__(samples)
         self.scene.cycles.shading_system = True
         self.scene.render.use_persistent_data = True
-        self.point: bpy.types.Object | None = None
         self.disc: bpy.types.Object | None = None
 
     def shape(self, surface: Surface) -> None:
@@ -37,19 +36,6 @@ class HuntStudio(Studio):
         files = osl_files.ensure_files(brdf)
         fit = fit_principled(brdf.evaluate, coat=False, nodes=(12, 6, 4))
         return material_nodes.create_material("measured", brdf, fit, files)
-
-    def near(self, position: Array, irradiance: float, centre: Array) -> None:
-        """Use a point lamp at ``position``, as bright at ``centre`` as a sun of this irradiance."""
-        if self.point is None:
-            lamp = bpy.data.lights.new("near", "POINT")
-            lamp.shadow_soft_size = 0.0
-            self.point = bpy.data.objects.new("near", lamp)
-            self.scene.collection.objects.link(self.point)
-        distance = float(np.linalg.norm(position - centre))
-        # Blender's watts of a point lamp: intensity W / (4π · π) per sr and unit of radiance
-        self.point.data.energy = 4 * np.pi**2 * irradiance / np.pi * distance**2
-        self.point.location = position
-        self.lamp.hide_render = True
 
     def dress_part(self, material: bpy.types.Material, where: Array) -> None:
         """Assign another material to the faces whose vertices are all true in ``where``, (v,)."""

@@ -24,7 +24,7 @@ LOOKS = {  # name → (scale of the interface, light theme, language)
     "german": (1.0, True, "de_DE"),
     "japanese": (1.0, False, "ja_JP"),
 }
-PAGES = 4  # screenshots of each look, further down
+PAGES = 2  # screenshots of each look, further down
 SCROLLS = 22  # steps between them
 REDRAW = 1.5  # seconds after which a window has been redrawn
 

@@ -13,7 +13,9 @@ from .base.image_formation import ChangesShading
 from .base.parameters import Parameters, mean_removal, parameter_columns
 
 PRIOR_SCALE = 0.1  # of ln gain, standard deviation of the prior
-GAIN_ERROR = 0.02  # of ln gain, assumed: errors of the BRDF that a whole photo has in common
+# of ln gain: errors of the BRDF that a whole photo has in common, such as those of interpolation in
+# the basis (1 %, `run.py bench basis`)
+GAIN_ERROR = 0.01
 # of the ratio of two gains, its logarithm: a smaller one is not named; two standard errors
 MIN_DRIFT = 2 * np.sqrt(2) * GAIN_ERROR
 
