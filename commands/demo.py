@@ -25,8 +25,9 @@ def run(arguments: argparse.Namespace) -> None:
     out = arguments.out
     diagnose_to_folder(CAPTURE, out)
     _show_under_other_light(out)
-    page = out / MATERIALS / "index.html"
-    print(f"Open {page} to see the materials. The report named above shows the diagnosis.")
+    print(
+        f"Open {out / 'report' / 'index.html'}: what is wrong with the capture, and the materials."
+    )
 
 
 def _show_under_other_light(out: Path) -> None:
