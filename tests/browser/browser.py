@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
+from tools.browser_options import SOFTWARE_GL
+
 FOLDER = Path(__file__).parent
-SOFTWARE_GL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 START_MS, ACTION_MS = 120_000, 300_000
 
 

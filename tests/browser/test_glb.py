@@ -21,7 +21,8 @@ from patina.scene.export import relight  # noqa: E402
 from patina.scene.export.export_gltf import write_glb  # noqa: E402
 from patina.scene.material import material_nodes  # noqa: E402
 from tests.browser import browser  # noqa: E402
-from tests.browser.viewed_sphere import EYE, FIELD, LAMP, SIDE, inside, new_scene  # noqa: E402
+from tests.browser.viewed_sphere import inside, new_scene  # noqa: E402
+from tests.browser.viewer_camera import EYE, FIELD, LAMP, SIDE  # noqa: E402
 from tests.projected import projected  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
 from tests.wheel.world_light import assign_material  # noqa: E402

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from pathlib import Path
 
@@ -24,7 +23,8 @@ from patina.core.viewer.skies import Sky, computed_skies  # noqa: E402
 from patina.scene.export import relight  # noqa: E402
 from patina.scene.material import material_nodes  # noqa: E402
 from tests.browser import browser  # noqa: E402
-from tests.browser.viewed_sphere import LAMP, SIDE, new_scene, relative_rms  # noqa: E402
+from tests.browser.viewed_sphere import new_scene, relative_rms  # noqa: E402
+from tests.browser.viewer_camera import LAMP, averaged  # noqa: E402
 from tests.projected import projected  # noqa: E402
 from tests.wheel import cycles_sphere  # noqa: E402
 from tests.wheel.world_light import assign_material  # noqa: E402
@@ -67,23 +67,11 @@ def in_browser(page_file, skies) -> dict[tuple[str, str], np.ndarray]:
     """(material, light) → (SIDE, SIDE, 4) mean of the viewer's pictures, row 0 on top."""
     found = {}
     with browser.opened(page_file, (900, 600)) as (page, errors):
-        page.wait_for_function("window.patina !== undefined")
         for place, name in enumerate(MODELS):
             for light in ["lamp", *range(len(skies))]:
-                text = page.evaluate(
-                    f"""() => {{
-                      const {{ state, renderer }} = window.patina;
-                      Object.assign(state, {{ material: {place}, light: {light!r} }});
-                      renderer.resize({SIDE}, {SIDE});
-                      const values = window.patina.finish({PICTURES});
-                      const raw = new Uint8Array(values.buffer);
-                      let text = "";
-                      for (const each of raw) text += String.fromCharCode(each);
-                      return btoa(text);
-                    }}"""
-                )
-                values = np.frombuffer(base64.b64decode(text), "<f4").reshape(SIDE, SIDE, 4)
-                found[name, "lamp" if light == "lamp" else skies[light].name] = values[::-1]
+                state = f"{{ material: {place}, light: {light!r} }}"
+                shown = "lamp" if light == "lamp" else skies[light].name
+                found[name, shown] = averaged(page, PICTURES, state)
         assert errors == []
     return found
 

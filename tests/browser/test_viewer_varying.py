@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import math
-
 import numpy as np
 import pytest
 
@@ -15,15 +12,12 @@ from patina.core.viewer import page as viewer_page
 from patina.core.viewer.model_tables import ViewerMaterial
 from patina.core.viewer.viewer_object import MARGIN, ViewerObject
 from tests.browser import browser
+from tests.browser.viewer_camera import EYE, LAMP, SIDE, averaged, rays
 from tests.projected import projected
 from tests.sphere_mesh import sphere
 
 pytestmark = pytest.mark.slow
 
-SIDE = 160  # pixels
-EYE = np.array([0.0, -5.2, 0.9])  # of the viewer's camera
-FIELD = 26.0  # degrees, of the viewer's camera
-LAMP = np.array([0.5, -0.6, 0.62]) / np.linalg.norm([0.5, -0.6, 0.62])
 MODEL = Principled(base_color=np.array([0.4, 0.1, 0.05]), roughness=0.3)
 PARAMETERS = np.zeros((1, 10), np.float32)
 PARAMETERS[0, :3] = np.log([0.6, 1.5, 2.0])
@@ -47,30 +41,14 @@ def drawn(folder, brdf, node_model) -> np.ndarray:
     file = folder / "viewer.html"
     viewer_page.write_viewer(file, "A painted sphere", [material], [], thing)
     with browser.opened(file, (600, 400)) as (page, errors):
-        page.wait_for_function("window.patina !== undefined")
-        text = page.evaluate(
-            f"""() => {{
-              window.patina.renderer.resize({SIDE}, {SIDE});
-              const raw = new Uint8Array(window.patina.finish(100).buffer);
-              let text = "";
-              for (const each of raw) text += String.fromCharCode(each);
-              return btoa(text);
-            }}"""
-        )
+        found = averaged(page, 100)
         assert errors == []
-    return np.frombuffer(base64.b64decode(text), "<f4").reshape(SIDE, SIDE, 4)[::-1]
+    return found
 
 
 def expected(node_model) -> tuple[np.ndarray, np.ndarray]:
     """(radiance (SIDE, SIDE, 3), pixels inside the sphere and lit) at the pixels' centres."""
-    forward = -EYE / np.linalg.norm(EYE)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    up = np.cross(right, forward)
-    u = ((np.arange(SIDE) + 0.5) / SIDE * 2 - 1) * math.tan(math.radians(FIELD / 2))
-    x, y = np.meshgrid(u, -u)
-    ray = forward + x[..., None] * right + y[..., None] * up
-    ray /= np.linalg.norm(ray, axis=-1, keepdims=True)
+    ray = rays()
     radius = 1 / MARGIN
     along = -ray @ EYE
     miss = EYE @ EYE - along**2

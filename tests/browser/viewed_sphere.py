@@ -8,12 +8,8 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from tests.browser.viewer_camera import EYE, FIELD, SIDE, rays
 from tests.wheel import cycles_sphere
-
-SIDE = 160  # pixels
-EYE = np.array([0.0, -5.2, 0.9])  # of the viewer's camera
-FIELD = 26.0  # degrees, of the viewer's camera
-LAMP = np.array([0.5, -0.6, 0.62]) / np.linalg.norm([0.5, -0.6, 0.62])
 
 
 def new_scene(samples: int) -> bpy.types.Object:
@@ -34,16 +30,7 @@ def new_scene(samples: int) -> bpy.types.Object:
 
 def inside() -> np.ndarray:
     """(SIDE, SIDE) pixels of the sphere that are not close to its outline."""
-    distance = np.linalg.norm(EYE)
-    forward = -EYE / distance
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    up = np.cross(right, forward)
-    u = ((np.arange(SIDE) + 0.5) / SIDE * 2 - 1) * math.tan(math.radians(FIELD / 2))
-    x, y = np.meshgrid(u, -u)
-    ray = forward + x[..., None] * right + y[..., None] * up
-    ray /= np.linalg.norm(ray, axis=-1, keepdims=True)
-    miss = np.linalg.norm(np.cross(EYE, ray), axis=-1)
+    miss = np.linalg.norm(np.cross(EYE, rays()), axis=-1)
     return np.asarray(miss < 0.97)
 
 
