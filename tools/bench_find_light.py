@@ -24,6 +24,7 @@ from .find_light_simulated import (
     print_row,
     print_summary,
 )
+from .near_lamps_simulated import near_or_distant
 
 UNEQUAL = (1.0, 3.0, 0.5, 1.0)  # strengths of the lamps of one bunny
 
@@ -48,6 +49,7 @@ def run(data: Path) -> None:
     )
     flashes()
     near_lamps()
+    near_or_distant()
     painted_shapes()
     _strengths(data)
     _real(data)

@@ -65,7 +65,7 @@ def own_captures() -> Iterable[Found]:
             shots = scenes.rig(SEED + count, LAMPS * PHOTOS_OF_LAMP, scenes.ANGLES)
             lamps = [shot.light for shot in shots[:LAMPS]]
             shots = tuple(Shot(s.camera, lamps[i % LAMPS]) for i, s in enumerate(shots))
-            pictures = _pictures(true, shots, material.evaluate, SEED + count)
+            pictures = simulated_pictures(true, shots, material.evaluate, SEED + count)
             start = time.perf_counter()
             lights = [DistantLight(f"lamp {i}", np.array([0.0, 0.0, 1.0])) for i in range(LAMPS)]
             lamp_of = [i % LAMPS for i in range(len(shots))]
@@ -109,7 +109,7 @@ def flashes() -> None:
         flash = MountedLight("flash", np.array(offset), np.full(3, 10.0))
         shots = [Shot(shot.camera, flash) for shot in scenes.rig(7, 8, scenes.ANGLES)]
         evaluate = materials([MATERIALS[material]])[0].evaluate
-        pictures = _pictures(true, shots, evaluate, 7)
+        pictures = simulated_pictures(true, shots, evaluate, 7)
         start = MountedLight("flash", np.zeros(3))
         found = _search(mesh, shots, pictures, [start], [0] * len(shots))[0]
         away = 100 * (found.light.offset - offset) / scenes.DISTANCE
@@ -138,7 +138,7 @@ def near_lamps() -> None:
         mesh = mesh_error.make(kind)(true, degrees, 0)
         lamp = NearLight("lamp", np.array(position), np.full(3, 10.0))
         shots = [Shot(shot.camera, lamp) for shot in scenes.rig(9, 6, scenes.ANGLES)]
-        pictures = _pictures(true, shots, materials([material])[0].evaluate, 9)
+        pictures = simulated_pictures(true, shots, materials([material])[0].evaluate, 9)
         start = NearLight("lamp", np.zeros(3))
         found = _search(mesh, shots, pictures, [start], [0] * len(shots))[0]
         towards = np.array(position) - shapes.CENTRE
@@ -169,7 +169,7 @@ def painted_shapes() -> None:
         shots = scenes.rig(9, 6, scenes.ANGLES)
         lamps = [shot.light for shot in shots[:3]]
         shots = [Shot(shot.camera, lamps[i % 3]) for i, shot in enumerate(shots)]
-        pictures = _pictures(
+        pictures = simulated_pictures(
             true, shots, materials([material])[0].evaluate, 9,
             lambda points: np.where(waves(points) > 0, 1.0, 0.25),
         )  # fmt: skip
@@ -183,7 +183,7 @@ def painted_shapes() -> None:
     print()
 
 
-def _pictures(true, shots, evaluate, seed, albedo=None) -> list[NDArray[np.float32]]:
+def simulated_pictures(true, shots, evaluate, seed, albedo=None) -> list[NDArray[np.float32]]:
     """(h, w, 3) noisy photos of the exact surface; a near light's falloff is that of its pixels.
     albedo: (n, 3) points → (n,) factors."""
     from patina.core.geometry import RayScene, view_surface

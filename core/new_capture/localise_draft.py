@@ -21,7 +21,7 @@ from .propose_lamps import with_lamps
 
 READING, GROUPING = "reading files", "grouping photos by lamp"
 READ_SHARE, LOCALISE_SHARE = 0.02, 0.9  # of the job's time, at the ends of these parts
-PROPOSED = {LampKind.UNKNOWN, LampKind.FLASH}  # kinds of lamps that nobody has edited
+PROPOSED = {LampKind.UNKNOWN, LampKind.FLASH, LampKind.NEAR}  # kinds of lamps that are proposed
 
 
 class LocaliseDraftJob(Job):

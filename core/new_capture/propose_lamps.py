@@ -20,8 +20,9 @@ from ..photo import Transfer, read_exif, read_photo
 from ..scan import Camera, Mesh
 from ..scan.scan import find_camera
 from . import group_lamps
-from .draft import Draft, DraftLamp, DraftPhoto, LampKind
+from .draft import NEAR_KINDS, Draft, DraftLamp, DraftPhoto, LampKind
 from .match_photos import time_of
+from .near_lamps import NearLamps, near_lamps
 from .opened_scan import OpenedScan
 from .photo_content import PIXELS as COARSE_PIXELS
 from .photo_content import best_direction, fits_size
@@ -35,10 +36,11 @@ FLASH_COSINE = np.cos(np.radians(25.0))  # between light and view, of a flash on
 MIN_FLASH_SHARE = 0.8  # of the photos
 FIRED_COSINE, MIN_FIRED_SHARE = np.cos(np.radians(45.0)), 0.5  # where EXIF says that it fired
 MIN_FLASH_PHOTOS = 3
+MIN_NEAR_PHOTOS = 3  # to tell near lamps from distant ones
 HIDDEN_COSINE = np.cos(np.radians(5.0))  # between a lamp and a camera that would hide it
 MAX_FLASH_OFFSET = 0.25  # of a flash from its lens, in distances of the object
 BY_SHADING = "by shading"
-COMPARE_SHARE = 0.4  # of the time, before the lamps are searched together
+COMPARE_SHARE, DISTANT_SHARE = 0.2, 0.5  # of the time, at the ends of these parts
 
 
 def with_lamps(
@@ -76,12 +78,21 @@ def with_lamps(
         lamps, how = [0] * len(used), "the light comes from the camera"
         made = [_flash()]
     else:
+        distant: list[FoundLamp | None] = []
         if len(used) <= MAX_SEARCHED_PHOTOS:
-            directions = yield from _searched(parts, opened)
+            distant = yield from scaled(_searched(parts, opened), COMPARE_SHARE, DISTANT_SHARE)
+            directions = [None if one is None else _direction(one) for one in distant]
         lamps, how = _groups(draft, used, directions)
         if how == BY_SHADING and max(lamps) == 0 and _behind_camera(parts, directions, opened):
             how = "a lamp there would stand behind the camera, so the light comes from the camera"
             return _with_made(draft, used, lamps, [_flash()], how)
+        if len(distant) >= MIN_NEAR_PHOTOS and None not in distant and may_be_near(draft.lamps):
+            known = lamps if how != BY_SHADING else None
+            steps = _near(parts, distant, known, opened)
+            near = yield from scaled(steps, DISTANT_SHARE, 1.0)
+            if near is not None:
+                how += "; the light comes from near the object"
+                return _with_made(draft, used, near.groups, _near_made(draft, near), how)
         made = [
             DraftLamp(
                 f"lamp {len(draft.lamps) + k + 1}",
@@ -94,6 +105,35 @@ def with_lamps(
             for k in range(max(lamps) + 1)
         ]  # fmt: skip
     return _with_made(draft, used, lamps, made, how)
+
+
+def may_be_near(lamps: Sequence[DraftLamp]) -> bool:
+    """Whether new lamps may be near ones: near and distant lamps have no common scale."""
+    return all(lamp.kind in NEAR_KINDS for lamp in lamps)
+
+
+def _near(
+    parts: Sequence[LampPhoto | None],
+    distant: Sequence[FoundLamp | None],
+    groups: list[int] | None,
+    opened: OpenedScan,
+) -> Generator[float, None, NearLamps | None]:
+    """near_lamps of photos that all show enough."""
+    shown = [part for part in parts if part is not None]
+    found = [one for one in distant if one is not None]
+    return (yield from near_lamps(shown, found, groups, _centre(opened.scan.mesh), opened))
+
+
+def _near_made(draft: Draft, near: NearLamps) -> list[DraftLamp]:
+    return [
+        DraftLamp(f"lamp {len(draft.lamps) + k + 1}", LampKind.NEAR, _three(position))
+        for k, position in enumerate(near.positions)
+    ]
+
+
+def _three(values: Array) -> tuple[float, float, float]:
+    x, y, z = values
+    return float(x), float(y), float(z)
 
 
 def _flash() -> DraftLamp:
@@ -183,8 +223,7 @@ def _behind_camera(
 def _mean(directions: list[Array]) -> tuple[float, float, float]:
     """The mean direction, (0, 0, 1) of none."""
     total = np.sum(directions, axis=0) if directions else np.array([0.0, 0.0, 1.0])
-    x, y, z = total / max(float(np.linalg.norm(total)), 1e-9)
-    return float(x), float(y), float(z)
+    return _three(total / max(float(np.linalg.norm(total)), 1e-9))
 
 
 def _pixels(photo: DraftPhoto, opened: OpenedScan) -> LampPhoto | None:
@@ -206,8 +245,8 @@ def _pixels(photo: DraftPhoto, opened: OpenedScan) -> LampPhoto | None:
 
 def _searched(
     parts: list[LampPhoto | None], opened: OpenedScan
-) -> Generator[float, None, list[Array | None]]:
-    """Direction of the light of each photo, all photos together; None without pixels."""
+) -> Generator[float, None, list[FoundLamp | None]]:
+    """The distant lamp of each photo, all photos together; None without pixels."""
     lamps = [
         UnknownLamp(DistantLight(f"{k}", np.array([0.0, 0.0, 1.0])), (part,))
         for k, part in enumerate(parts)
@@ -215,14 +254,13 @@ def _searched(
     ]
     if not lamps:
         return [None] * len(parts)
-    steps = find_lamps(lamps, 1, opened.rays, opened.dictionary, with_errors=False)
-    result = yield from scaled(steps, COMPARE_SHARE, 1.0)
+    result = yield from find_lamps(lamps, 1, opened.rays, opened.dictionary, with_errors=False)
     found = iter(result.lamps)
-    return [None if part is None else _direction(next(found)) for part in parts]
+    return [None if part is None else next(found) for part in parts]
 
 
-def _direction(lamp: FoundLamp | None) -> Array:
-    assert lamp is not None and isinstance(lamp.light, DistantLight)  # as they were searched
+def _direction(lamp: FoundLamp) -> Array:
+    assert isinstance(lamp.light, DistantLight)  # as it was searched
     return lamp.light.direction
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -29,6 +30,7 @@ from patina.core.scan.camera import Pose
 from tests import make_capture as made
 
 START = datetime(2024, 5, 1, 12)
+DEMO = Path(__file__).parents[2] / "assets" / "demo" / "demo.capture.toml"
 
 
 def camera(label: str) -> Camera:
@@ -228,3 +230,53 @@ def test_lamp_near_one_camera_is_no_flash(tmp_path: Path) -> None:
     path.unlink()
     draft = drafted(path.parent)
     assert [lamp.kind for lamp in draft.lamps] != [LampKind.FLASH]
+
+
+EXTENT = 2.0 * np.sqrt(3)  # diagonal of the box of the sphere
+
+
+def photographed(folder: Path, lamps: list[np.ndarray], distance: float | None) -> Draft:
+    """The draft of six photos of a sphere, two for each lamp. lamps: (3,) unit directions;
+    distance: from the centre of the sphere, None for distant lamps."""
+    path = made.make_capture(folder)
+    path.unlink()
+    for k, (turn, shift) in enumerate(made.poses(6)):
+        towards = lamps[k // 2]
+        lamp = None if distance is None else (made.CENTRE + distance * towards, 1.0)
+        picture = made.photo(turn, shift, towards, lamp=lamp)
+        (folder / f"lit_{k + 1}.exr").unlink()
+        made.write_exr(folder / f"view_{k + 1:02}.exr", picture.astype(np.float32))
+    return drafted(folder)
+
+
+@pytest.mark.parametrize("far", [None, 1.0])
+def test_near_lamps_are_told_from_distant_ones(far: float | None, tmp_path: Path) -> None:
+    views = [-rotation[2] for rotation, _ in made.poses()]
+    lamps = [views[k] + views[k + 1] + np.array([0, 0, 1.0]) for k in (0, 2, 4)]
+    lamps = [towards / np.linalg.norm(towards) for towards in lamps]
+    draft = photographed(tmp_path, lamps, None if far is None else far * EXTENT)
+    kind = LampKind.UNKNOWN if far is None else LampKind.NEAR
+    assert [lamp.kind for lamp in draft.lamps] == 3 * [kind]
+    assert [photo.lamp for photo in draft.photos] == [0, 0, 1, 1, 2, 2]
+    assert ("near the object" in draft.found[-1]) == (far is not None)
+    assert draft.missing is None and not any(lamp.stated for lamp in draft.lamps)
+    for lamp, towards in zip(draft.lamps, lamps, strict=True):
+        away = np.array(lamp.values) - (0 if far is None else np.array(made.CENTRE))
+        assert away @ towards > np.cos(np.radians(5)) * np.linalg.norm(away)
+
+
+@pytest.mark.slow
+def test_near_lamps_of_the_demo(tmp_path: Path) -> None:
+    """Photos that Cycles rendered, of a lamp that is 2.8 extents of the object away."""
+    shutil.copytree(DEMO.parent / "sparse", tmp_path / "sparse")
+    shutil.copy(DEMO.parent / "mesh.ply", tmp_path)
+    true = {}
+    for letter, shot in zip("hcfaegdb", read_capture(DEMO).photos, strict=True):
+        shutil.copy(shot.file, tmp_path / f"shot_{letter}.exr")
+        true[f"shot_{letter}.exr"] = shot.light
+    draft = drafted(tmp_path)
+    found = [photo for photo in draft.photos if photo.camera is not None]
+    pairs = {(true[photo.file.name], photo.lamp) for photo in found}
+    assert len(found) >= 7
+    assert {lamp.kind for lamp in draft.lamps} == {LampKind.NEAR}
+    assert len(pairs) == len(draft.lamps) == len(set(true.values()))

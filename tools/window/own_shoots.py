@@ -36,7 +36,8 @@ SCANS = Path.home() / "Scans"
 DEMO_LETTERS = "hcafbged"  # of the demo's loose photos: an order that matches no camera
 MAX_CLICKS = 15
 BOX_OF_ROW = -16  # pixels, from the left end of a photo's name to its box
-MAX_DEGREES_OFF = 5.0  # of the demo's lamps
+MAX_DEGREES_OFF = 5.0  # of the demo's lamps, as seen from the jar
+MAX_DISTANCE_RATIO = 1.7  # found ÷ true or true ÷ found, of these lamps
 
 hand = mouse.Mouse()
 found: dict[str, object] = {"name": NAME}
@@ -143,16 +144,25 @@ def make_demo() -> dict[str, str]:
 
 
 def check_demo(cameras: dict[str, str]) -> None:
-    """Compare what was found with the demo's capture file."""
-    capture = part("core.capture").read_capture(part("operators.import_capture").DEMO)
-    true = [light.direction for light in capture.lights]
-    off = [
-        float(np.degrees(np.arccos(min(max(np.dot(d, one) for d in true), 1.0))))
-        for one in found["lights"].values()
-    ]
+    """Compare what was found with the truth of the demo's photos: its lamps are near the jar, at
+    truth.json's ``lamp_positions``."""
+    truth = json.loads((Path(__file__).parents[2] / "assets" / "demo" / "truth.json").read_text())
+    away = truth["lamp_distance"]
+    true = {name: np.array(truth["lights"][name]) for name in truth["lamp_positions"]}
+    centre = np.mean([np.array(truth["lamp_positions"][n]) - away * true[n] for n in true], axis=0)
+    off, distances, nearest = [], [], []
+    for place in found["lights"].values():
+        towards = np.array(place) - centre
+        distance = float(np.linalg.norm(towards))
+        cosine = {name: float(towards @ d) / distance for name, d in true.items()}
+        distances.append(distance / away)
+        nearest.append(max(cosine, key=cosine.__getitem__))
+        off.append(float(np.degrees(np.arccos(min(cosine[nearest[-1]], 1.0)))))
     found["degrees off"] = [round(value, 2) for value in off]
+    found["distances ÷ true"] = [round(value, 2) for value in distances]
     assert not found["wrong cameras"], found
-    assert len(off) == len(true) and max(off) < MAX_DEGREES_OFF, found
+    assert sorted(nearest) == sorted(true) and max(off) < MAX_DEGREES_OFF, found
+    assert 1 / MAX_DISTANCE_RATIO < min(distances) < max(distances) < MAX_DISTANCE_RATIO, found
     assert len(cameras) >= len(DEMO_LETTERS) - 1, found
     assert hand.clicks <= MAX_CLICKS, found
 
