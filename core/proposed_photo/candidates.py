@@ -26,6 +26,10 @@ FAR = 1e6  # scan units, of a lamp that counts as infinitely far
 EDGE = 0.25  # of the picture's size: a lamp so far beside the picture still dazzles the lens
 MIN_LENS_ANGLE = np.radians(20.0)  # between a lamp and the axis of an orthographic camera
 MIN_AROUND = np.radians(30.0)  # from that mean: nearer cameras do not stand around it
+MAX_LAMP_ANGLE = np.radians(130.0)
+"""Between lamp and camera, seen from the object: beyond, light and view are so grazing that the
+errors of a stereo mesh outweigh what the photo says. On the scanned bunny, a ninth photo at 147°
+made fits worse in 4 of 5 cases, and one at 130° better in 4 of 5."""
 BELOW = 0.1  # sine by which a lamp may be lower than the horizon, or than the lowest camera
 
 
@@ -110,6 +114,13 @@ def in_picture(camera: Camera, lamps: Array) -> NDArray[np.bool_]:
     pixels = camera.project(camera.pose.centre + FAR * lamps)
     near = np.all((pixels > -EDGE * size) & (pixels < (1 + EDGE) * size), axis=1)
     return np.asarray(ahead & near)
+
+
+def too_grazing(camera: Camera, centre: Array, lamps: Array) -> NDArray[np.bool_]:
+    """(l,) whether a lamp in unit directions (l, 3) is nearly opposite to the camera. centre: (3,)
+    of the object."""
+    towards = directions_to(camera, centre[None])[0]
+    return np.asarray(lamps @ towards < np.cos(MAX_LAMP_ANGLE))
 
 
 def seen_from(rays: RayScene, surface: SurfacePoints, camera: Camera) -> NDArray[np.bool_]:

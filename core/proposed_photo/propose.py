@@ -28,6 +28,7 @@ from .candidates import (
     lit_from,
     moves_with_camera,
     seen_from,
+    too_grazing,
 )
 from .proposal import ProposedPhoto
 from .uncertainty import DirectionUncertainty
@@ -82,7 +83,8 @@ def propose(
             after.append(np.sqrt(material.uncertainty.variance_after(counts)))
         mean = np.mean(after, axis=0)
         if flash is None:
-            mean = np.where(in_picture(camera, lamps), np.inf, mean)
+            useless = in_picture(camera, lamps) | too_grazing(camera, centre, lamps)
+            mean = np.where(useless, np.inf, mean)
         place = int(np.argmin(mean))
         if np.isfinite(mean[place]) and (best is None or mean[place] < best.after):
             lamp = None if flash is not None else lamps[place]
