@@ -11,7 +11,6 @@ from pathlib import Path
 from ..core.brdf import merl_file
 from ..core.capture import read_capture
 from ..core.concurrency.job import Step, peak_memory
-from ..core.fit.fit_quality import FitQuality
 from ..core.fit.measured_result import MeasuredResult
 from ..core.jobs import CaptureResult, FitJob, Stage, finished
 from ..core.jobs.varying.variation_estimator import MODES
@@ -19,8 +18,8 @@ from ..core.jobs.varying.varying_job import VaryingJob
 from ..core.output_folder import check_out, staged_folder
 from ..core.report import result_json, write_report
 from ..core.report.figures import reach
+from ..core.report.held_out import varied_quality
 from ..core.varying import storage
-from ..core.varying.varying_surface import EVEN
 from . import capture_arguments
 from .needs_blender import has_blender
 from .progress import Progress, print_note
@@ -110,19 +109,14 @@ def timed(stages: list[Stage], name: str, progress: Progress, fraction: float) -
 
 def print_summary(out: Path, result: CaptureResult) -> None:
     """Print a summary of a fit: errors, warnings, notes, refined lights and files."""
-    kinds = () if result.varying is None else result.varying.materials
-    varying = {
-        m.name: k.typical.get(k.kind)
-        for m, k in zip(result.materials, kinds, strict=False)
-        if k.kind != EVEN
-    }
+    varied = varied_quality(result)
     for material in result.materials:
         held = material.held_out
         rms = "" if held is None else f", relative RMS {100 * held.error:.0f} %"
         quality = material.quality.sentence + rms
-        typical = varying.get(material.name)
-        if typical is not None:
-            quality = f"{FitQuality(typical).sentence}, one BRDF: {material.quality.sentence}"
+        if material.name in varied:
+            with_variation = varied[material.name].sentence
+            quality = f"{with_variation}, one BRDF: {material.quality.sentence}"
         print(f"{material.name}: {material.samples:,} samples. {quality}")
         if isinstance(material.fit, MeasuredResult):
             print(f"  90 % interval: {reach(material.spread)}")

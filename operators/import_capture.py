@@ -18,7 +18,8 @@ from ..scene.session.camera_view import show_camera_view
 from ..scene.session.folders import rectified_folder
 from .report_errors import report_and_cancel
 
-DEMO = Path(__file__).parents[1] / "assets" / "demo" / "demo.capture.toml"
+ASSETS = Path(__file__).parents[1] / "assets"
+DEMO, WORN = ASSETS / "demo" / "demo.capture.toml", ASSETS / "worn" / "worn.capture.toml"
 
 
 class PATINA_OT_import_capture(bpy.types.Operator):
@@ -49,8 +50,17 @@ class PATINA_OT_import_demo(bpy.types.Operator):
     bl_label = "Import Demo Capture"
     bl_options = {"REGISTER", "UNDO"}
 
+    subject: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Demo",
+        items=(
+            ("GLAZED", "Glazed Jar", "Two materials, and two mistakes that a check finds"),
+            ("WORN", "Worn Jar", "One material that varies: paint, metal and dirt"),
+        ),
+        options={"SKIP_SAVE"},
+    )
+
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return import_into_scene(self, context, DEMO)
+        return import_into_scene(self, context, WORN if self.subject == "WORN" else DEMO)
 
 
 def import_into_scene(

@@ -40,7 +40,7 @@ class PATINA_PT_scan(StagePanel, bpy.types.Panel):
         if mesh is None or mesh.name not in context.scene.objects:
             layout.operator("patina.add_files", icon="FILE_NEW")
             layout.operator("patina.solve_photos", icon="CAMERA_DATA")
-            layout.operator("patina.import_demo", icon="MONKEY")
+            layout.operator_menu_enum("patina.import_demo", "subject", icon="MONKEY")
         else:
             layout.operator("patina.import_capture", icon="IMPORT")
             layout.operator("patina.add_files", icon="FILE_NEW")

@@ -22,8 +22,10 @@ PIXELS = 3000  # of a photo, as in new_capture
 def near_or_distant() -> None:
     """Print a row for each distance of the lamps."""
     print("## near lamps and distant lamps, four lamps with two photos each, no group known\n")
-    print("| lamps | captures | called near | lamps found | pairs of photos grouped rightly | largest "
-          "direction error |")  # fmt: skip
+    print(
+        "| lamps | captures | called near | lamps found | pairs of photos grouped rightly | "
+        "largest direction error |"
+    )
     print("|---|---|---|---|---|---|")
     for distance in DISTANCES:
         rows = [_row(count, distance) for count in range(CAPTURES)]

@@ -12,13 +12,16 @@ from ..concurrency.steps import drained
 from ..concurrency.thread_pool import thread_count, thread_pool
 from ..counted import counted
 from ..fit import PaperFit
+from ..fit.fit_quality import FitQuality
 from ..jobs import CaptureResult, MaterialResult
 from ..photo import write_png
 from ..samples import Criterion
 from ..views import photo_pictures, photo_view
 from ..views.criteria import LOOKS, Look
+from .held_out import varied_quality
 from .html_parts import ERROR_HEADING, PHOTO_HEADING, page, summary
 from .material_section import material_section
+from .variation_section import variation_section
 from .viewer_page import write_viewer_of
 
 MAX_SIDE = 640  # pixels of a picture in a row of photos
@@ -40,6 +43,7 @@ def write_report(
     sections: list[Callable[[], str | photo_view.PhotoView]] = [
         partial(material_section, folder, material, photos) for material in result.materials
     ]
+    sections.append(partial(variation_section, folder, result))
     # the predictions use the light and camera of the capture, without the causes of a diagnosis
     if not result.effects:
         sections += [partial(_looked_at, result, place) for place in range(len(photos))]
@@ -69,8 +73,10 @@ def write_report(
 def _summary(result: CaptureResult, viewer: str | None) -> str:
     """HTML: what a reader wants to know first."""
     pictures = [(f"sphere_{material.name}.png", material.name) for material in result.materials]
+    varied = varied_quality(result)
     held_out = "".join(
-        f"<li>{escape(material.name)}: {_held_out(material)}</li>" for material in result.materials
+        f"<li>{escape(material.name)}: {_held_out(material, varied.get(material.name))}</li>"
+        for material in result.materials
     )
     parts = [(ERROR_HEADING, f"<ul>{held_out}</ul>")]
     if result.effects:
@@ -84,11 +90,15 @@ def _summary(result: CaptureResult, viewer: str | None) -> str:
     return summary(pictures, parts)
 
 
-def _held_out(material: MaterialResult) -> str:
-    typical = material.quality.typical
-    if typical is None:
+def _held_out(material: MaterialResult, varied: FitQuality | None) -> str:
+    """HTML: the typical error. varied: with the variation over the surface."""
+    quality = varied or material.quality
+    if quality.typical is None:
         return "unknown; two photos or more are needed"
-    return f"<span class='big'>{100 * typical:.1f} %</span> ({material.quality.rating.value})"
+    text = f"<span class='big'>{100 * quality.typical:.1f} %</span> ({quality.rating.value})"
+    if varied is None or material.quality.typical is None:
+        return text
+    return f"{text}; {100 * material.quality.typical:.0f} % if it were the same everywhere"
 
 
 def _looked_at(result: CaptureResult, place: int) -> photo_view.PhotoView:

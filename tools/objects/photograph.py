@@ -20,6 +20,7 @@ from ..demo_render import Camera, Studio
 from ..demo_shape import Surface, vertex_normals
 from ..experiments.bunnies import folder as scan_folder
 from ..experiments.bunnies import opened, true_bunny
+from .coat import coated
 from .finish import finish_of
 
 SCAN = "OpenMVS"  # the stereo tool of the mesh
@@ -78,35 +79,11 @@ def photograph(folder: Path, count: int) -> Path:
 
 
 def _studio() -> Studio:
-    import bpy
-
     mesh = true_bunny()
     studio = Studio(SAMPLES)
     normals = vertex_normals(mesh.vertices, mesh.faces)
     studio.show(Surface(mesh.vertices, mesh.faces, normals), np.zeros(len(mesh.vertices)))
-    finish = finish_of(mesh.vertices)
-    layers = studio.body.data.attributes
-    rgba = np.concatenate([finish.colour, np.ones((len(mesh.vertices), 1))], axis=1)
-    layers.new("colour", "FLOAT_COLOR", "POINT").data.foreach_set(
-        "color", rgba.astype(np.float32).ravel()
-    )
-    values = {"metallic": finish.metallic, "roughness": finish.roughness}
-    for name, value in values.items():
-        layers.new(name, "FLOAT", "POINT").data.foreach_set("value", value.astype(np.float32))
-    material = bpy.data.materials.new("object")
-    material.use_nodes = True
-    tree = material.node_tree
-    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
-    shader.distribution = "GGX"
-    for name, output, socket in (
-        ("colour", "Color", "Base Color"),
-        ("metallic", "Fac", "Metallic"),
-        ("roughness", "Fac", "Roughness"),
-    ):
-        node = tree.nodes.new("ShaderNodeAttribute")
-        node.attribute_name = name
-        tree.links.new(node.outputs[output], shader.inputs[socket])
-    studio.dress(material)
+    studio.dress(coated(studio.body, finish_of(mesh.vertices)))
     return studio
 
 
