@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import OpenImageIO as oiio
 import pytest
 
 import patina
@@ -140,6 +141,17 @@ def test_fit_writes_the_variation_and_predict_uses_it(tmp_path, monkeypatch):
     described = json.loads((tmp_path / "auto" / "result.json").read_text("utf-8"))["varying"]
     assert described["file"] == "varying.npz" and described["materials"][0]["varies"] != "even"
     assert errors[1]["encoded_rmse"] < 0.6 * errors[0]["encoded_rmse"]
+    pages = [tmp_path / mode / "report" / "index.html" for mode in ("never", "auto")]
+    even, varied = (page.read_text("utf-8") for page in pages)
+    assert "What varies" in varied and "What varies" not in even
+    typical = described["materials"][0]["held_out_typical"][described["materials"][0]["varies"]]
+    assert f"<span class='big'>{100 * typical:.1f} %</span>" in varied
+    file = str(pages[1].parent / "varies_0_colour.png")
+    colour = oiio.ImageBuf(file).get_pixels(oiio.FLOAT)[..., :3] * 255
+    shown = np.ptp(colour, axis=-1) > 20  # the background is grey
+    assert shown.sum() > 500
+    ratio = np.log(colour[shown][:, 0] + 1) - np.log(colour[shown][:, 1] + 1)
+    assert ratio.std() > 0.1  # the bands
     with pytest.raises(InputError, match="expected one of auto, never, always"):
         patina.fit(patina.load_capture(capture), varying="sometimes")
     (tmp_path / "auto" / "varying.npz").unlink()
