@@ -307,16 +307,17 @@ class FitJob(Job):
         start: float,
         share: float,
         judge: Judge | None = None,
+        clipped: SampleTable | None = None,
     ) -> Generator[Step, None, MaterialResult]:
         """Fit a material again to other samples, in the same unit as before.
 
         index: of the material; before: its result so far. start, share: the part of the job that
         this takes. judge: predicts a held-out photo and measures the error (None: from
-        ``table``).
+        ``table``). clipped: samples with a clipped channel, in addition.
         """
         basis, counts = finished(self.result).basis, np.array(before.per_photo)
         unit = before.irradiance_known, before.scale
-        steps = self._material(index, table, basis, unit, counts, start, share, None, judge)
+        steps = self._material(index, table, basis, unit, counts, start, share, clipped, judge)
         return (yield from steps)
 
     def _material(

@@ -72,8 +72,10 @@ def write_report(
 
 def _summary(result: CaptureResult, viewer: str | None) -> str:
     """HTML: what a reader wants to know first."""
-    pictures = [(f"sphere_{material.name}.png", material.name) for material in result.materials]
     varied = varied_quality(result)
+    pictures = [(f"sphere_{material.name}.png", material.name) for material in result.materials]
+    if varied and not result.effects:  # a sphere of the typical material says little
+        pictures = [("photo_00_prediction.png", f"Prediction of {result.capture.photo_name(0)}")]
     held_out = "".join(
         f"<li>{escape(material.name)}: {_held_out(material, varied.get(material.name))}</li>"
         for material in result.materials

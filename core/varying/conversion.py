@@ -22,19 +22,26 @@ MAX_SAMPLES = 60_000  # of a regular subset: more do not change the BRDF
 MIN_FACTOR, MAX_FACTOR = 0.02, 50.0  # of the radiance
 
 
+def typical_parameters(seen: Observations, parameters: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(10,) of the typical material: medians over the nodes that are seen. parameters: (n, 10)."""
+    return np.asarray(np.median(parameters[np.unique(seen.node)], axis=0), np.float32)
+
+
 def typical_samples(
     model: NodeModel,
     seen: Observations,
     points: NDArray[np.float64],
     normals: NDArray[np.float32],
     parameters: NDArray[np.float32],
+    typical: NDArray[np.float32],
 ) -> SampleTable:
-    """Samples of the typical material, in the scale of ``model``. seen: without clipped ones;
-    points, normals: (n, 3) of the nodes; parameters: (n, 10)."""
+    """Samples of the typical material, in the scale of ``model``. Clipped channels have response 0:
+    their radiance is a lower limit. points, normals: (n, 3) of the nodes; parameters: (n, 10);
+    typical: (10,)."""
     step = -(-len(seen) // MAX_SAMPLES)
     some = seen.select(np.arange(0, len(seen), max(step, 1)))
     own = parameters[some.node]
-    typical = np.tile(np.median(parameters[np.unique(seen.node)], axis=0), (len(own), 1))
+    typical = np.tile(typical, (len(own), 1))
     typical[:, TILT] = own[:, TILT]
     normal = normals[some.node]
     factor = model.radiance(some.shading, normal, typical) / np.maximum(
@@ -45,4 +52,5 @@ def typical_samples(
     pixel = np.arange(len(some), dtype=np.int32)
     converted = replace(some, radiance=radiance)
     table = samples_of(converted, pixel, points[some.node], normal, model.scale)
+    table = replace(table, response=(~some.clipped).astype(np.float32))
     return table.select(np.flatnonzero((table.cos_i > MIN_COSINE) & (table.cos_o > MIN_COSINE)))

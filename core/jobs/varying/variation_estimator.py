@@ -9,8 +9,9 @@ import numpy as np
 
 from ...concurrency.background import in_background
 from ...concurrency.job import Step
+from ...samples import SampleTable
 from ...varying.choice import Nodes
-from ...varying.conversion import typical_samples
+from ...varying.conversion import typical_parameters, typical_samples
 from ...varying.corrected_observations import ObservationCorrection
 from ...varying.labels import PackedLabels
 from ...varying.node_model import COUNT
@@ -122,15 +123,25 @@ class VariationEstimator:
         step, model = Step("fitting without the variation", start), model_of(material)
         exact = seen.measured()
         fields = yield from final_fields(nodes, model, exact, DIFFUSE, step, 0.0)
-        table = yield from in_background(
-            lambda: typical_samples(model, exact, nodes.points, nodes.normals, fields.parameters),
-            step,
-        )
+        clipped = seen.select(np.flatnonzero(seen.clipped.any(axis=1)))
+
+        def converted() -> tuple[SampleTable, SampleTable | None]:
+            typical = typical_parameters(exact, fields.parameters)
+            tables = [
+                typical_samples(
+                    model, some, nodes.points, nodes.normals, fields.parameters, typical
+                )
+                for some in (exact, clipped)
+                if len(some)
+            ]
+            return tables[0], tables[1] if len(tables) > 1 else None
+
+        table, limits = yield from in_background(converted, step)
         capture = self.fit.capture
         self.fit.capture = replace(capture, fit=replace(capture.fit, held_out=False))
         try:
             again = yield from self.fit.fit_again(
-                index, table, material, start + 0.3 * share, 0.7 * share
+                index, table, material, start + 0.3 * share, 0.7 * share, clipped=limits
             )
         finally:
             self.fit.capture = capture
