@@ -7,8 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from patina.core.angles import Angles, light_view
+from patina.core.basis import default_basis
 from patina.core.concurrency.steps import drained
+from patina.core.fit.measured import fit_measured
 from patina.core.varying.choice import Nodes, choose
+from patina.core.varying.conversion import typical_parameters, typical_samples
 from patina.core.varying.hierarchy import NodeFields
 from patina.core.varying.node_model import (
     COUNT,
@@ -25,6 +29,7 @@ from tests.core.varying_scene import (
     SPACING,
     VaryingScene,
     fitted_model,
+    ggx,
     scene,
 )
 
@@ -107,6 +112,32 @@ def test_clipped_highlights_are_at_least_white(model):
         return np.median(np.log(out.radiance / predicted)[bright])
 
     assert shortfall(limited) < 0.7 * shortfall(limited.measured())
+
+
+@pytest.mark.slow
+def test_typical_material_keeps_highlights_that_are_clipped(model):
+    """Clipped observations become lower limits of the typical material, for its stripe or not."""
+    made = scene(6, 4)
+    white = np.float32(np.quantile(made.seen.radiance, 0.97))
+    clipped = made.seen.radiance > white
+    limited = replace(made.seen, radiance=np.minimum(made.seen.radiance, white), clipped=clipped)
+    parameters = np.zeros((len(made.points), COUNT), np.float32)
+    parameters[:, DIFFUSE] = np.log(made.colour / ALBEDO)
+    exact, some = limited.measured(), limited.select(clipped.any(axis=1))
+    typical = typical_parameters(exact, parameters)
+    table, limits = (
+        typical_samples(model, one, made.points, made.normals, parameters, typical)
+        for one in (exact, some)
+    )
+    assert np.array_equal(limits.response == 0, some.clipped) and (table.response == 1).all()
+    angles = Angles(*(np.full(5, v, np.float32) for v in (0.02, 0.5, 1.5)))
+    light, view = light_view(*angles)
+    true = ALBEDO / np.pi + ggx(np.tile([0.0, 0.0, 1.0], (5, 1)), light, view)[:, None]
+    kept, lost = (
+        fit_measured(table, default_basis(), clipped=one).brdf.evaluate(angles).mean() / true.mean()
+        for one in (limits, None)
+    )
+    assert 0.6 < kept < 1.6 and abs(np.log(kept)) < abs(np.log(lost))
 
 
 def test_standard_errors_cover_the_errors_of_the_colour(model):
