@@ -43,7 +43,8 @@ def write_report(
     sections: list[Callable[[], str | photo_view.PhotoView]] = [
         partial(material_section, folder, material, photos) for material in result.materials
     ]
-    sections.append(partial(variation_section, folder, result))
+    if result.varying is not None and result.varying.varies:
+        sections.append(partial(variation_section, folder, result, result.varying))
     # the predictions use the light and camera of the capture, without the causes of a diagnosis
     if not result.effects:
         sections += [partial(_looked_at, result, place) for place in range(len(photos))]

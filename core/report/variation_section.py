@@ -28,11 +28,8 @@ LOW, NONE, HIGH = (np.array(c) for c in ([0.03, 0.12, 0.55], [0.85] * 3, [0.62, 
 ALBEDO = "Diffuse colour, without light and highlights"
 
 
-def variation_section(folder: Path, result: CaptureResult) -> str:
-    """HTML, empty where nothing varies; writes the pictures into ``folder``."""
-    surface = result.varying
-    if surface is None or not surface.varies:
-        return ""
+def variation_section(folder: Path, result: CaptureResult, surface: VaryingSurface) -> str:
+    """HTML; writes the pictures into ``folder``. surface: of the result, not even."""
     shown: list[tuple[str, str, Callable[[SurfaceView], Array]]] = [
         ("colour", ALBEDO, lambda view: _albedo(result, surface, view))
     ]
