@@ -229,6 +229,18 @@ def exposed(rng: np.random.Generator, radiance: Array) -> Array:
     return np.round(seen / step) * step
 
 
+def developed(rng: np.random.Generator, radiance: Array, coverage: Array) -> Array:
+    """Return the photo of a radiance, black beyond MARGIN pixels around the object."""
+    near = binary_dilation(coverage > 0, iterations=MARGIN)
+    return np.where(near[..., None], exposed(rng, radiance), 0.0)
+
+
+def print_size(folder: Path) -> None:
+    """Print how large the files of a folder are together."""
+    total = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+    print(f"{folder.name}: {total / 1e6:.2f} MB")
+
+
 def write_exr(path: Path, pixels: Array) -> None:
     """Write linear RGB (height, width, 3) as half floats."""
     write_image(path, np.asarray(pixels, np.float32), "half")
@@ -367,8 +379,7 @@ def make(folder: Path) -> None:
         studio.dress(pottery())
         picture = studio.photograph(camera)
         radiance = picture[..., :3] * DRIFTED.get(shot.camera, 1.0)
-        near = binary_dilation(picture[..., 3] > 0, iterations=MARGIN)
-        photo = np.where(near[..., None], exposed(rng, radiance), 0.0)
+        photo = developed(rng, radiance, picture[..., 3])
         write_exr(folder / "lit" / f"{stem}.exr", photo)
         studio.dress(identity())
         masks = masks_of(studio.photograph(camera))
@@ -381,8 +392,7 @@ def make(folder: Path) -> None:
         print(f"{stem}: {shot.lamp} {angles[-1]:.1f}°, brightest {radiance.max():.1f}, {shares}")
     (folder / "demo.capture.toml").write_text(toml(lamps, shots), encoding="utf-8")
     (folder / "truth.json").write_text(truth(lamps, shots, angles), encoding="utf-8")
-    total = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
-    print(f"{folder.name}: {total / 1e6:.2f} MB")
+    print_size(folder)
 
 
 if __name__ == "__main__":

@@ -13,13 +13,21 @@ from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
-from scipy.ndimage import binary_dilation
 
 from .common import ROOT
 from .demo_render import Studio
 from .demo_shape import Array, Surface, make_field, mesh_of
 from .demo_worn import convexity, worn_finish
-from .make_demo import MARGIN, MIDDLE, SEED, TRUE_CELL, exposed, on_sphere, scan_cameras, scan_turn
+from .make_demo import (
+    MIDDLE,
+    SEED,
+    TRUE_CELL,
+    developed,
+    on_sphere,
+    print_size,
+    scan_cameras,
+    scan_turn,
+)
 from .objects.coat import coated
 
 IRRADIANCE = 1.7  # of every lamp, at normal incidence
@@ -30,7 +38,6 @@ LAMPS = {
 }  # fmt: skip
 """Azimuth and elevation in degrees."""
 
-MAX_ANGLE = 115.0  # degrees between lamp and view
 QUALITY = 95  # of the JPEGs
 
 
@@ -100,15 +107,13 @@ def make(folder: Path) -> None:
         for view in own:
             studio.light(lamps[name], IRRADIANCE)
             picture = studio.photograph(cameras[view])
-            near = binary_dilation(picture[..., 3] > 0, iterations=MARGIN)
-            photo = np.where(near[..., None], exposed(rng, picture[..., :3]), 0.0)
+            photo = developed(rng, picture[..., :3], picture[..., 3])
             write_jpeg(folder / "lit" / view, photo)
             angle = np.degrees(np.arccos(views[view] @ lamps[name]))
             full = (photo.max(axis=-1) >= 1.0).sum() / max((picture[..., 3] > 0).sum(), 1)
             print(f"{view}: {name} {angle:.0f}°, clipped {full:.1%}")
     (folder / "worn.capture.toml").write_text(toml(lamps, shots), encoding="utf-8")
-    total = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
-    print(f"{folder.name}: {total / 1e6:.2f} MB")
+    print_size(folder)
 
 
 if __name__ == "__main__":

@@ -58,7 +58,7 @@ def near_lamps(
     if groups is None:
         towards = positions - centre
         near_angle = _angles(towards / np.linalg.norm(towards, axis=1, keepdims=True))
-        angle = 0.5 * (near_angle + _angles(np.array([_direction(one) for one in distant])))
+        angle = 0.5 * (near_angle + _angles(np.array([direction_of(one) for one in distant])))
         steps = _grouped(angle, [one.cost for one in near], parts, opened)
         groups = yield from scaled(steps, share, 1.0)
     index = np.array(groups)
@@ -111,8 +111,9 @@ def _cost(lamps: Sequence[FoundLamp]) -> float:
     return float(np.sum([one.cost for one in lamps]))
 
 
-def _direction(lamp: FoundLamp) -> Array:
-    assert isinstance(lamp.light, DistantLight)  # as it was searched
+def direction_of(lamp: FoundLamp) -> Array:
+    """(3,) of a lamp that was searched as a distant one."""
+    assert isinstance(lamp.light, DistantLight)
     return lamp.light.direction
 
 

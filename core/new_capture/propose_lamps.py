@@ -22,7 +22,7 @@ from ..scan.scan import find_camera
 from . import group_lamps
 from .draft import NEAR_KINDS, Draft, DraftLamp, DraftPhoto, LampKind
 from .match_photos import time_of
-from .near_lamps import NearLamps, near_lamps
+from .near_lamps import NearLamps, direction_of, near_lamps
 from .opened_scan import OpenedScan
 from .photo_content import PIXELS as COARSE_PIXELS
 from .photo_content import best_direction, fits_size
@@ -81,7 +81,7 @@ def with_lamps(
         distant: list[FoundLamp | None] = []
         if len(used) <= MAX_SEARCHED_PHOTOS:
             distant = yield from scaled(_searched(parts, opened), COMPARE_SHARE, DISTANT_SHARE)
-            directions = [None if one is None else _direction(one) for one in distant]
+            directions = [None if one is None else direction_of(one) for one in distant]
         lamps, how = _groups(draft, used, directions)
         if how == BY_SHADING and max(lamps) == 0 and _behind_camera(parts, directions, opened):
             how = "a lamp there would stand behind the camera, so the light comes from the camera"
@@ -257,11 +257,6 @@ def _searched(
     result = yield from find_lamps(lamps, 1, opened.rays, opened.dictionary, with_errors=False)
     found = iter(result.lamps)
     return [None if part is None else next(found) for part in parts]
-
-
-def _direction(lamp: FoundLamp) -> Array:
-    assert isinstance(lamp.light, DistantLight)  # as it was searched
-    return lamp.light.direction
 
 
 def _cosine_to_camera(direction: Array, camera: Camera, opened: OpenedScan) -> float:

@@ -21,7 +21,7 @@ from ..views.surface_view import QUANTITIES, shown_quantities
 
 Array = NDArray[np.floating]
 
-SIDE = 360  # pixels of a picture
+SIDE, MARGIN = 360, 4  # pixels of a picture, and around the object
 LOW, NONE, HIGH = (np.array(c) for c in ([0.03, 0.12, 0.55], [0.85] * 3, [0.62, 0.05, 0.05]))
 """Linear colours of −1, 0 and 1 of a scale."""
 
@@ -31,7 +31,7 @@ ALBEDO = "Diffuse colour, without light and highlights"
 def variation_section(folder: Path, result: CaptureResult, surface: VaryingSurface) -> str:
     """HTML; writes the pictures into ``folder``. surface: of the result, not even."""
     shown: list[tuple[str, str, Callable[[SurfaceView], Array]]] = [
-        ("colour", ALBEDO, lambda view: _albedo(result, surface, view))
+        ("colour", ALBEDO, _albedo(result, surface))
     ]
     for kind in shown_quantities(surface):
         quantity = QUANTITIES[kind]
@@ -45,7 +45,10 @@ def variation_section(folder: Path, result: CaptureResult, surface: VaryingSurfa
         for kind, text, colours in shown:
             file = f"varies_{number}_{kind}.png"
             picture = view.image(colours(view).astype(np.float32))
-            write_png(folder / file, display.photo_picture(picture[_box(view)], 1.0))
+            write_png(
+                folder / file,
+                display.photo_picture(picture[display.crop_box(view.seen, MARGIN)], 1.0),
+            )
             cells += (
                 f"<figure><img src='{file}' alt='{escape(text)}' loading='lazy'>"
                 f"<figcaption>{escape(text)}</figcaption></figure>"
@@ -77,24 +80,21 @@ def _cameras(result: CaptureResult) -> list[Camera]:
     return found
 
 
-def _box(view: SurfaceView) -> tuple[slice, slice]:
-    return display.crop_box(view.seen, 4)
+def _albedo(result: CaptureResult, surface: VaryingSurface) -> Callable[[SurfaceView], Array]:
+    """π × the diffuse level (n, 3) at the pixels of a view, at most 1; NaN where no material was
+    fitted."""
+    levels = [np.pi * NodeModel.of(m.fit.brdf, m.scale).body for m in result.materials]
 
+    def colours(view: SurfaceView) -> Array:
+        second, third = barycentric(surface.grid.mesh, view.face, view.point)
+        factor = diffuse_factor(surface.at(view.face, second, third))
+        found = np.full((len(view.face), 3), np.nan, np.float32)
+        for index, level in enumerate(levels):
+            own = result.face_material[view.face] == index
+            found[own] = np.minimum(level * factor[own], 1.0)
+        return found
 
-def _parameters(surface: VaryingSurface, view: SurfaceView) -> NDArray[np.float32]:
-    """(n, 10) of the pixels of a view."""
-    return surface.at(view.face, *barycentric(surface.grid.mesh, view.face, view.point))
-
-
-def _albedo(result: CaptureResult, surface: VaryingSurface, view: SurfaceView) -> Array:
-    """(n, 3) π × the diffuse level of each pixel, at most 1; NaN where no material was fitted."""
-    factor = diffuse_factor(_parameters(surface, view))
-    found = np.full((len(view.face), 3), np.nan, np.float32)
-    for index, material in enumerate(result.materials):
-        own = result.face_material[view.face] == index
-        level = np.pi * NodeModel.of(material.fit.brdf, material.scale).body
-        found[own] = np.minimum(level * factor[own], 1.0)
-    return found
+    return colours
 
 
 def _scaled(surface: VaryingSurface, kind: str) -> Callable[[SurfaceView], Array]:
