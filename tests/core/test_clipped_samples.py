@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from patina.core.angles import Angles
+from patina.core.angles import Angles, cosines
 from patina.core.basis import default_basis
 from patina.core.capture import read_capture
 from patina.core.concurrency.steps import drained
 from patina.core.fit.measured import MeasuredFit, MeasuredSettings, fit_measured
 from patina.core.fit.measured.cells import gather
+from patina.core.fit.measured.normals import with_normals
 from patina.core.fit.measured_result import MeasuredResult
 from patina.core.geometry import RayScene
 from patina.core.inputs import capture_data
@@ -26,7 +27,7 @@ from patina.core.samples.clipped import WHITE_MARGIN, White
 from tests import make_capture as made
 
 WHITE = 1.2  # radiance at which the photos are clipped; the highlights reach 2.5
-SETTINGS = MeasuredSettings(rounds=0)
+SETTINGS = MeasuredSettings(rounds=0, normal_deviation=0.1)  # the mesh of the ball is exact
 PEAK = Angles(*np.radians([[0.5, 1.0, 2.0], [20.0, 25.0, 30.0], [90.0, 60.0, 120.0]]))
 
 
@@ -100,6 +101,47 @@ def test_limits_bring_the_peak_back(fits: dict[str, MeasuredFit]) -> None:
     error = {name: np.abs(np.log(values)).mean() for name, values in ratio.items()}
     assert error["limits"] < 0.8 * error["dropped"]
     assert (ratio["limits"] > 0.5).all() and (ratio["limits"] < 2.0).all()
+
+
+def coat(angles: Angles) -> np.ndarray:
+    """(n, 3) ρ of a coat on a dark base: Walter et al. 2007, equations 33 and 34."""
+    alpha, f0 = 0.15, 0.05
+    cos_h, cos_d = np.cos(angles.theta_h), np.cos(angles.theta_d)
+    both = cosines(*angles)
+    distribution = alpha**2 / (np.pi * (cos_h**2 * (alpha**2 - 1) + 1) ** 2)
+    fresnel = f0 + (1 - f0) * (1 - cos_d) ** 5
+    smith = 1 + sum((np.sqrt(1 + alpha**2 * (1 / c**2 - 1)) - 1) / 2 for c in both)
+    lobe = distribution * fresnel / (4 * smith * both[0] * both[1])
+    return np.array([0.06, 0.05, 0.04]) + lobe[:, None]
+
+
+def test_errors_of_the_normals_do_not_select_samples(
+    tables: tuple[SampleTable, SampleTable],
+) -> None:
+    """Where a wrong normal says that a pixel is on the highlight, it is clipped or dark: the cells
+    of the dark ones alone would say that there is no highlight. The white level is a third of the
+    peak."""
+    deviation = 1.5  # degrees along each axis
+    table = SampleTable.concatenate(list(tables))
+    light = coat(Angles(*(a.astype(float) for a in table.angles))) * table.cos_i[:, None]
+    table = replace(table, radiance=(light * table.irradiance).astype(np.float32))
+    white = np.percentile(table.radiance.max(axis=1), 95).astype(np.float32)
+    error = np.random.default_rng(4).normal(0, np.radians(deviation), table.normal.shape)
+    turned = table.normal + error
+    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+    cos_i, cos_o = (np.sum(turned * to, axis=1) for to in (table.light, table.view))
+    seen = np.minimum(cos_i, cos_o) > 0.05
+    table = with_normals(table.select(seen), turned[seen])
+    limited = table.radiance > white
+    clipped = replace(
+        table,
+        radiance=np.minimum(table.radiance, white),
+        response=(~limited).astype(np.float32),
+    ).select(limited.any(axis=1))
+    settings = MeasuredSettings(rounds=0, normal_deviation=deviation)
+    fit = fit_measured(table.select(~limited.any(axis=1)), default_basis(), settings, clipped)
+    ratio = fit.brdf.evaluate(PEAK) / coat(PEAK)
+    assert np.abs(np.log(ratio)).mean() < np.log(1.25)
 
 
 def test_interval_at_the_peak_contains_the_truth(fits: dict[str, MeasuredFit]) -> None:

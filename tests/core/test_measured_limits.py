@@ -232,6 +232,7 @@ def model_of(photos: int, cells: int, basis: Basis) -> CellModel:
             np.ones(cells),
             np.zeros(cells),
             np.zeros((cells, 3)),
+            np.full((cells, 3), np.inf),
         ),
         basis,
     )

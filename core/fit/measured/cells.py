@@ -34,7 +34,8 @@ class AngleCells:
     cosine at the mean angles. noise: (m, 3) variance of L/E of one sample by the photo's noise,
     on the same scale. bright: (m,) L/E of the bright parts of the photo. normal_error: (m,)
     radians, RMS error of the normals along each tangent. clipped: (m, 3) fraction of the samples
-    that are clipped: above 0, ``reflected`` is a lower limit of the mean.
+    that are clipped: they count with the level at which the photo is clipped. white: (m, 3) this
+    level, on the scale of ``reflected``; infinite in photos without clipped samples.
     """
 
     photo: NDArray[np.int16]
@@ -45,6 +46,7 @@ class AngleCells:
     bright: NDArray[np.float64]
     normal_error: NDArray[np.float64]
     clipped: NDArray[np.float64]
+    white: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.photo)
@@ -60,6 +62,7 @@ class AngleCells:
             self.bright[which],
             self.normal_error[which],
             self.clipped[which],
+            self.white[which],
         )
 
 
@@ -104,10 +107,30 @@ def gather(
         error = np.full(m, float(normal_error))
     photo = table.photo[first]
     bright = bright_parts(light.mean(axis=1), table.photo)[photo]
-    share = np.zeros((m, 3))
+    share, white = np.zeros((m, 3)), np.full((m, 3), np.inf)
     if clipped is not None:
         share = np.stack([mean(clipped[:, c].astype(float)) for c in range(3)], axis=1)
-    return AngleCells(photo, count, angles, reflected, noise, bright, error, share)
+        part = np.stack([mean(clipped[:, c] * light[:, c]) * level for c in range(3)], axis=1)
+        white = _white(part, share, photo)
+    return AngleCells(photo, count, angles, reflected, noise, bright, error, share, white)
+
+
+def _white(
+    part: NDArray[np.float64], share: NDArray[np.float64], photo: NDArray[np.int16]
+) -> NDArray[np.float64]:
+    """(m, 3) the level at which cells are clipped, from the part of their mean that clipped samples
+    contribute and the fraction of these, both (m, 3). A cell without clipped samples has the mean
+    of its photo."""
+    photos = int(photo.max()) + 1
+    out = np.full_like(part, np.inf)
+    for c in range(3):
+        some = share[:, c] > 0
+        out[some, c] = part[some, c] / share[some, c]
+        count = np.bincount(photo[some], minlength=photos)
+        mean = np.full(photos, np.inf)
+        np.divide(np.bincount(photo[some], out[some, c], photos), count, out=mean, where=count > 0)
+        out[~some, c] = mean[photo[~some]]
+    return out
 
 
 def unfolded_phi_d(table: SampleTable) -> NDArray[np.float64]:

@@ -1,5 +1,11 @@
 """Forward model: the expected value of every cell for given coefficients, and its derivatives by
-them."""
+them.
+
+A clipped photo shows the radiance up to its white level. The samples of a cell whose normal is
+wrong may be clipped or not, whatever the cell's own angles are. So a cell's prediction is clipped
+as the photo is: at each quadrature normal, before the mean. Its clipped samples then count with the
+white level, and no sample is left out for being bright or dark.
+"""
 
 from __future__ import annotations
 
@@ -38,6 +44,8 @@ class CellModel:
     weights of the quadrature normals. factor: (m, j) what (exp(log) − ε) at a quadrature normal is
     multiplied by before it is added to ρ·cos θi. used: (u,) grid nodes that any cell needs.
     corners: (m·j, u) interpolates between them. pairs: the distinct pairs of a cell and a node.
+    white: (m, j, 3) the level at which each quadrature normal's part of ρ·cos θi is clipped; None
+    where no photo is.
     """
 
     basis: Basis
@@ -49,6 +57,7 @@ class CellModel:
     used: NDArray[np.intp]
     corners: csr_array
     pairs: CellNodes
+    white: NDArray[np.float32] | None
 
     @classmethod
     def of(cls, cells: AngleCells, basis: Basis) -> CellModel:
@@ -77,6 +86,7 @@ class CellModel:
             used=used,
             corners=csr_array((weight, index, starts), shape=(m * j, len(used))),
             pairs=CellNodes.of(index.reshape(m, -1), weight.reshape(m, -1)),
+            white=_white_of_parts(cells.white, share),
         )
 
     def select(self, which: NDArray[np.bool_]) -> CellModel:
@@ -91,6 +101,7 @@ class CellModel:
             self.used,
             self.corners[np.repeat(which, len(self.share))],
             self.pairs.select(which),
+            None if self.white is None else self.white[which],
         )
 
     def predict(self, coefficients: NDArray[np.floating], jacobian: bool = True) -> Prediction:
@@ -100,6 +111,9 @@ class CellModel:
         exponential = exponential.reshape(*self.factor.shape, 3)
         factor = self.factor[..., None]
         parts = factor * np.maximum(exponential - np.float32(mapping.EPSILON), 0)
+        if self.white is not None:
+            parts = np.minimum(parts, self.white)
+            exponential = np.where(parts < self.white, exponential, 0)  # no derivative above white
         total = parts.sum(axis=1, dtype=np.float64)
         scale = self.scale[:, None]
         level = total * scale + mapping.EPSILON
@@ -122,6 +136,15 @@ class CellModel:
         """(u, k) the first components of the basis at the used nodes, contiguous: a sparse product
         would copy others."""
         return np.ascontiguousarray(self.basis.nodes[self.used, 1 : 1 + k])
+
+
+def _white_of_parts(
+    white: NDArray[np.float64], share: NDArray[np.float64]
+) -> NDArray[np.float32] | None:
+    """(m, j, 3) white levels (m, 3) times the weights (j,) of the quadrature normals."""
+    if not np.isfinite(white).any():
+        return None
+    return (share[None, :, None] * white[:, None]).astype(np.float32)
 
 
 @dataclass(frozen=True)

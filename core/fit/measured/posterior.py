@@ -4,8 +4,9 @@ without each photo.
 Gauss–Newton on the residuals in the mapped space. The weights are computed anew at every step from
 each cell's uncertainty: the noise model of a pixel (core/noise) divided by the number of samples,
 the error of the basis, and the normals' error times the slope of the BRDF. A Student-t error model
-limits the influence of outliers, such as shadows that the mesh does not explain. A cell with
-clipped samples is a censored observation: it counts only where the prediction is below its limit.
+limits the influence of outliers, such as shadows that the mesh does not explain. Predictions of
+clipped photos are clipped too (forward.py): where the BRDF is brighter than a photo shows, that
+photo does not change it.
 """
 
 from __future__ import annotations
@@ -27,6 +28,9 @@ from .prior import CoefficientPrior
 ITERATIONS = 12
 SAMPLES_PER_NORMAL = 30  # so many neighbouring samples share one error of the normal
 MAX_STEP = 2.0  # largest change of a parameter in one iteration, in prior standard deviations
+# fraction of a cell's samples: above it, the cell says how large the BRDF is at least, and nothing
+# about how much larger it can be
+MOSTLY_CLIPPED = 0.5
 CONVERGED = 0.01  # the same: the iteration ends where no parameter changes more
 GAIN_DEVIATION = 0.03  # prior standard deviation of the logarithm of a photo's gain
 # the same of the mean over all samples: the irradiance says how bright all photos together are.
@@ -38,9 +42,8 @@ MEAN_GAIN_DEVIATION = 0.005
 class Posterior:
     """coefficients: (3, k), the mode. precision: at the mode, of the coefficients, channel after
     channel, and of the photos' log gains. gains: photo → gain. without: photo → (3, k) coefficients
-    without that photo. measured: the precision without cells with clipped samples, None where there
-    are none: these say how large the BRDF is at least, and nothing about how much larger it can
-    be."""
+    without that photo. measured: the precision without cells that are mostly clipped, None where
+    there are none."""
 
     coefficients: NDArray[np.float64]
     precision: Arrow
@@ -53,7 +56,7 @@ class Posterior:
         return self._channels(self.precision)
 
     def covariance_of_measured(self) -> NDArray[np.float64] | None:
-        """The same without cells with clipped samples; None where there are none."""
+        """The same without cells that are mostly clipped; None where there are none."""
         return None if self.measured is None else self._channels(self.measured)
 
     def _channels(self, precision: Arrow) -> NDArray[np.float64]:
@@ -73,7 +76,7 @@ def solve(
     """The posterior of a model's coefficients, by Gauss–Newton from ``start`` (3, k), or from 0.
 
     floor: relative standard deviation of the basis' error far from black. leave_out: compute the
-    coefficients without each photo and the precision without clipped samples too. Cells are
+    coefficients without each photo and the precision without clipped cells too. Cells are
     weighted by region (cell_weights.py).
     """
     k = len(prior.mean)
@@ -102,7 +105,7 @@ def solve(
         state = state + step * min(1.0, MAX_STEP / max(largest_change, 1e-12))
         if largest_change < CONVERGED:
             break
-    measured, limited = None, model.cells.clipped > 0
+    measured, limited = None, model.cells.clipped > MOSTLY_CLIPPED
     if leave_out and limited.any():
         known = np.where(limited, 0.0, weight)
         each = (_equations(prediction, residual, known, own) for own in cells)
@@ -139,7 +142,6 @@ def _residuals(
         + _of_pixel(model, level) / count
     )
     weight = weights_of_squares(residual**2 / variance) / variance
-    weight[(model.cells.clipped > 0) & (residual < 0)] = 0.0
     return residual, weight
 
 
