@@ -98,6 +98,7 @@ MODULES: tuple[str, ...] = (
     "operators.fit",
     "operators.check",
     "operators.look_through",
+    "operators.explain_scan_quality",
     "operators.show_proposed_photo",
     "operators.save_lights",
     "operators.find_lights",

@@ -7,12 +7,18 @@ from typing import Any
 import bpy
 
 from ..core.diagnose.effects.labels import ORIGINS, cause_label, origin_of
+from ..core.diagnose.selection.scan_rating import ScanRating, rated_figures
 from ..scene.session.lengths import with_lengths
 from ..scene.session.overlay_shading import overlay_shown
 from ..scene.views.evidence import RESIDUAL
 from .wrapped import IN_BOX, wrapped
 
 HEADINGS = ("Held-out regions, RMS error:", "Held-out photos, median error:")
+RATING_ICONS = {
+    ScanRating.GOOD: "STRIP_COLOR_04",  # green
+    ScanRating.FAIR: "STRIP_COLOR_03",  # yellow
+    ScanRating.POOR: "STRIP_COLOR_01",  # red
+}
 MAX_CAUSES = 8  # causes without effect that the panel lists
 
 
@@ -68,9 +74,19 @@ def draw_check(
         row.alert = changed
         row.operator("patina.refit", icon="FILE_REFRESH" if changed else "CHECKMARK")
     if "scan_quality" in diagnosis:  # not in results of earlier versions
-        wrapped(layout, diagnosis["scan_quality"]["sentence"], "INFO")
+        _draw_scan_quality(layout, diagnosis["scan_quality"])
     if diagnosis["unexplained"]:
         wrapped(layout, with_lengths(diagnosis["left"]["sentence"]), "QUESTION")
+
+
+def _draw_scan_quality(layout: bpy.types.UILayout, quality: dict[str, Any]) -> None:
+    """Draw the figures of the scan, each with a colour; the tooltip of a figure says what to do."""
+    layout.label(text="Scan Quality")
+    for figure in rated_figures(quality):
+        row = layout.row()
+        row.label(text=figure.label, icon=RATING_ICONS[figure.rating])
+        shown = row.operator("patina.explain_scan_quality", text=figure.value, translate=False)
+        shown.figure = figure.label
 
 
 def _draw_cause(

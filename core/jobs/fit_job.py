@@ -151,8 +151,8 @@ class FitJob(Job):
     the embedded basis). prepare: called with the scan after it is read, to add face attributes
     that no file has. threads: number of threads that sample the photos (None: one per core); the
     result does not depend on it. keep: whether ``samples`` keeps the samples that each material
-    was fitted to, by material name. portable: whether to fit the portable forms and to propose
-    the next photo, too.
+    was fitted to, by material name, and ``limits`` the clipped ones. portable: whether to fit the
+    portable forms and to propose the next photo, too.
     """
 
     def __init__(
@@ -169,6 +169,7 @@ class FitJob(Job):
         self.keep = keep
         self.portable = portable
         self.samples: dict[str, SampleTable] = {}
+        self.limits: dict[str, SampleTable] = {}
         self.capture = capture
         self.basis = basis
         self.prepare = prepare
@@ -229,7 +230,7 @@ class FitJob(Job):
         for index, material in enumerate(capture.materials):
             table, limits = (multiplied(t.pop(0), unit[1]) for t in (tables, clipped))
             if self.keep:
-                self.samples[material.name] = table
+                self.samples[material.name], self.limits[material.name] = table, limits
             start, share = self._times.material(index)
             yield Step(f"fitting {material.name}", start)
             each = taken.counts[material.name]

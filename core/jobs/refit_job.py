@@ -182,9 +182,11 @@ class RefitJob(Job):
     def _refit_material(
         self, index: int, material: MaterialResult, model: Model, start: float, share: float
     ) -> Generator[Step, None, Refit]:
-        step = Step(STAGE, start)
-        pixels = yield from self._sample_pixels(index, material.name, model, step)
-        found = yield from self._corrected_samples(material.name, pixels, model, step)
+        step, fit = Step(STAGE, start), self.checked.fit
+        samples = fit.samples[material.name]
+        pixels = yield from self._sample_pixels(index, samples, model, step)
+        found = yield from self._corrected_samples(samples, pixels, model, step)
+        limits = yield from self._corrected_limits(index, fit.limits[material.name], model, step)
         count = np.count_nonzero(found.table.read)
         if count < MIN_SAMPLES:
             raise PatinaError(
@@ -195,18 +197,18 @@ class RefitJob(Job):
             # the joint fit has no prior for directions in which all samples are clipped, and may
             # invent a highlight there; the estimator has one
             share /= 2
-            fit, unclipped = self.checked.fit, found.table.select(found.table.read)
+            unclipped = found.table.select(found.table.read)
             known = yield from fit.fit_again(index, unclipped, material, start, share, None)
             model = with_brdf(model, index, known.fit.brdf)
             start += share
             step = Step(STAGE, start)
-            found = yield from self._corrected_samples(material.name, pixels, model, step)
+            found = yield from self._corrected_samples(samples, pixels, model, step)
 
         def fit_again(
             table: SampleTable, judge: Judge | None, start: float, share: float
         ) -> Generator[Step, None, MaterialResult]:
-            fit = self.checked.fit
-            return (yield from fit.fit_again(index, table, material, start, share, judge))
+            again = fit.fit_again(index, table, material, start, share, judge, limits)
+            return (yield from again)
 
         fitted, sharp = yield from fit_with_deconvolution(
             found, fit_again, start, share, self.exactly
@@ -216,22 +218,32 @@ class RefitJob(Job):
         return Refit(fitted, found.light, warnings, blurred)
 
     def _sample_pixels(
-        self, index: int, name: str, model: Model, step: Step
+        self, index: int, table: SampleTable, model: Model, step: Step
     ) -> Generator[Step, None, Pixels]:
         """The pixels of a material's samples; photos are read where an effect needs them."""
-        before, table = finished(self.checked.result), self.checked.fit.samples[name]
+        before = finished(self.checked.result)
         read = any(isinstance(effect, NeedsPhoto) for effect in model.effects)
         steps = pixels_of_samples(table, index, before.capture, before.scan, before.photos, read)
         return (yield from relayed(steps, lambda _: step))
 
     def _corrected_samples(
-        self, name: str, pixels: Pixels, model: Model, step: Step
+        self, table: SampleTable, pixels: Pixels, model: Model, step: Step
     ) -> Generator[Step, None, CorrectedSamples]:
         before, setting = finished(self.checked.result), finished(self.checked.context)
-        table = self.checked.fit.samples[name]
         tilt = float(np.radians(normal_deviation(before)))
         correcting = correct_samples(table, pixels, model, setting, tilt)
         return (yield from relayed(correcting, lambda _: step))
+
+    def _corrected_limits(
+        self, index: int, clipped: SampleTable, model: Model, step: Step
+    ) -> Generator[Step, None, SampleTable | None]:
+        """The clipped samples of a material, corrected; None where there are none, or where an
+        effect widens highlights: a limit then says nothing about the BRDF of a small lamp."""
+        wide = any(isinstance(effect, WidensHighlights) for effect in model.effects)
+        if wide or not len(clipped):
+            return None
+        pixels = yield from self._sample_pixels(index, clipped, model, step)
+        return (yield from self._corrected_samples(clipped, pixels, model, step)).table
 
 
 def _clipping_warnings(table: SampleTable) -> tuple[str, ...]:

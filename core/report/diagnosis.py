@@ -14,6 +14,8 @@ from ..diagnose.effects.labels import ORIGINS, cause_label, origin_of
 from ..diagnose.forward.diagnosis_context import DiagnosisContext
 from ..diagnose.selection.diagnosis import Diagnosis, Trial
 from ..diagnose.selection.residual_trends import Trend, coordinates, trend
+from ..diagnose.selection.scan_quality import ScanQuality
+from ..diagnose.selection.scan_rating import ScanRating, rated_figures
 from ..jobs import CaptureResult
 from ..photo import write_png
 from ..viewer.page import FILE_NAME, has_program
@@ -76,7 +78,7 @@ def _summary(found: Diagnosis, before: CaptureResult, after: CaptureResult) -> s
     parts = [
         (ERROR_HEADING, f"<ul>{rows}</ul>" if rows else "<p>unknown</p>"),
         ("Problems of the capture", f"<ul>{causes or nothing}</ul>"),
-        ("", f"<p>{escape(found.quality.sentence())}</p>"),
+        ("Quality of the scan", _scan_quality(found.quality)),
     ]
     if after.proposed_photo is not None:
         sentence = escape(after.proposed_photo.sentence)
@@ -86,6 +88,19 @@ def _summary(found: Diagnosis, before: CaptureResult, after: CaptureResult) -> s
         links += f"<a class='button' href='materials/{FILE_NAME}'>Open the Viewer</a>"
     parts.append(("", f"<p>{links}</p>"))
     return summary(pictures, parts)
+
+
+def _scan_quality(quality: ScanQuality) -> str:
+    """HTML: each figure with its rating, and what to do where that is not good."""
+    rows = ""
+    for figure in rated_figures(quality.figures()):
+        rating = figure.rating.value
+        advice = "" if figure.rating is ScanRating.GOOD else f"<br>{escape(figure.advice)}."
+        rows += (
+            f"<li class='{rating}' title='{escape(figure.advice)}'>{figure.label} "
+            f"{figure.value} ({rating}){advice}</li>"
+        )
+    return f"<ul class='ratings'>{rows}</ul>"
 
 
 def _advice(found: Diagnosis, trial: Trial) -> str:

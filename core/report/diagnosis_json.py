@@ -36,13 +36,7 @@ def describe(
         "baseline": _errors(found.error_before),
         "extended": _errors(found.error_after),
         "causes": [_cause(t, found) for t in found.ranked],
-        "scan_quality": {
-            "normals": found.quality.normals,
-            "poses": found.quality.poses,
-            "outside_basis": found.quality.outside,
-            "albedo_variation": found.quality.albedo,
-            "sentence": found.quality.sentence(),
-        },
+        "scan_quality": {**found.quality.figures(), "sentence": found.quality.sentence()},
         "assessment": _assessment(assessment),
         "unexplained": found.unexplained,
         "left": {

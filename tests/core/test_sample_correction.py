@@ -227,6 +227,34 @@ def test_unclipped_samples_keep_the_photo_value_below_the_plateau():
     np.testing.assert_allclose(found.radiance[beyond], own, rtol=0.02)
 
 
+@pytest.mark.parametrize("kind", [LightIntensity, CameraResponse], ids=lambda k: k.cause)
+def test_limits_of_clipped_pixels_are_corrected(kind):
+    """A clipped pixel that shows hardly more than the white level has a corrected limit of hardly
+    less than the truth; no limit exceeds the truth."""
+    context = lit_ball(3)
+    brdfs = MaterialBRDFs.of([_brdf_of(context)])
+    model = Model(context.pixels, brdfs).with_effect(kind.of(context), EXAMPLE_PARAMETERS[kind])
+    recorded = model.predicted()
+    white = np.float32(np.percentile(recorded[:, 0], 90))
+    limited = recorded > white
+    context = changed(context, np.minimum(recorded, white).astype(np.float32))
+    model = replace(model, pixels=context.pixels, footprint=None)
+    clipped = replace(table_of(context), response=(~limited).astype(np.float32))
+    some = np.flatnonzero(limited.any(axis=1))
+    clipped, pixels = clipped.select(some), context.pixels.select(some)
+    found = drained(correct_samples(clipped, pixels, model, context, 0.0)).table
+    rows = rows_of(found, context)
+    assert len(found) > 0.9 * len(clipped)
+    assert np.array_equal(found.response == 0, limited[rows])
+    truth = brdfs.evaluate(found.angles, np.zeros(len(found), np.int16))
+    limit = found.response == 0
+    assert np.all(found.rho[limit] < 1.001 * truth[limit])
+    slightly = limit & (recorded[rows] < 1.02 * white)
+    assert slightly.sum() > 5
+    np.testing.assert_allclose(found.rho[slightly], truth[slightly], rtol=0.03)
+    np.testing.assert_allclose(found.rho[~limit], truth[~limit], rtol=2e-3)
+
+
 def test_fitted_parameters_apply_to_other_pixels():
     """An effect fitted on half of the pixels predicts the rest as an effect of all pixels does."""
     context = lit_ball(5)

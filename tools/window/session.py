@@ -262,6 +262,7 @@ def fit_and_check() -> Iterator[float]:
     yield from until_done()
     yield 10.0
     photograph("12_checked")
+    assert bpy.ops.patina.explain_scan_quality(figure="Poses") == {"FINISHED"}
     yield from open_panel("material")
     press("patina.mark_assets")
     yield REDRAW_DELAY

@@ -58,7 +58,8 @@ def correct_samples(
     tilt: float = 0.0,
     shown: Model | None = None,
 ) -> Generator[float, None, CorrectedSamples]:
-    """Correct samples (n,), photo by photo; yields the fraction done.
+    """Correct samples (n,), photo by photo; yields the fraction done. Where a sample's response
+    is 0, its radiance is a lower limit, and so is the corrected one.
 
     pixels: of the samples (sample_pixels.py). model: with the effects, at its optimum. context: of
     the diagnosis. tilt: radians along each tangent, standard deviation of the scan's normals.
@@ -126,9 +127,12 @@ def _correct_chunk(
     predicted = model.entering(reflected, now)
     added = (model if shown is None else shown).entering(reflected, now) - reflected
     plateau = plateau_of(model, now, np.maximum(predicted, table.radiance))
-    clipped = table.radiance > (1 - AT_PLATEAU) * plateau
-    # where only the prediction is beyond the plateau, the photo determines how much light arrived
-    below = ~clipped & (predicted > (1 - AT_PLATEAU) * plateau)
+    limit = table.response == 0
+    clipped = (table.radiance > (1 - AT_PLATEAU) * plateau) & ~limit
+    # where only the prediction is beyond the plateau, the photo determines how much light arrived,
+    # and where the radiance is a lower limit, it determines how much arrived at least
+    beyond = (predicted > (1 - AT_PLATEAU) * plateau) | (limit & (predicted > table.radiance))
+    below = ~clipped & beyond
     entering = np.where(below, np.minimum(table.radiance, predicted), predicted)
     recorded, response = _response(model, now, entering)
     for _ in range(NEWTON_STEPS if below.any() else 0):

@@ -41,6 +41,15 @@ class ScanQuality:
                 albedo = float(np.hypot(by_way[ALBEDO[0]], known.std()))
         return cls(normals, _poses(fitted, variances), _outside_basis(fitted), albedo)
 
+    def figures(self) -> dict[str, float | None]:
+        """By their names in diagnosis.json."""
+        return {
+            "normals": self.normals,
+            "poses": self.poses,
+            "outside_basis": self.outside,
+            "albedo_variation": self.albedo,
+        }
+
     def sentence(self) -> str:
         """In words, for the user."""
         parts = [] if self.normals is None else [f"normals ± {self.normals:.1f}°"]

@@ -30,11 +30,9 @@ from .effect_trials import (
 )
 from .relative_change import relative_rms_change
 from .scan_quality import ScanQuality
+from .scan_rating import UNUSUAL_MATERIAL, UNUSUAL_NORMALS, UNUSUAL_POSES
 from .trial import Trial
 
-UNUSUAL_NORMALS = 2.5  # degrees, RMS over patches: stereo meshes have 1 to 1.7
-UNUSUAL_POSES = 1.5  # pixels along an axis: reconstructions have 0.3; errors of a mesh look like 1
-UNUSUAL_MATERIAL = 0.3  # RMS of ln of the factor by which a material differs from the basis
 MIN_APART, MIN_SEPARATION = 0.3, 5.0
 """Distance of two groups of patches in ln reflectance, and in their standard deviations: stains and
 paint of another shade reach 4.2 standard deviations."""

@@ -1,0 +1,77 @@
+"""How good a scan is: each figure of its quality, rated as good, fair or poor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+# up to the first a figure is good, above the second it is poor, and the check names it as a cause
+# degrees, RMS over patches: stereo meshes have 1 to 1.7
+GOOD_NORMALS, UNUSUAL_NORMALS = 1.7, 2.5
+# pixels along an axis: reconstructions have 0.3; errors of a mesh look like 1
+GOOD_POSES, UNUSUAL_POSES = 0.5, 1.5
+# RMS of ln of the factor by which a material differs from the basis: even materials have 0.15
+GOOD_MATERIAL, UNUSUAL_MATERIAL = 0.15, 0.3
+
+
+class ScanRating(Enum):
+    """A word for one figure."""
+
+    GOOD = "good"
+    FAIR = "fair"
+    POOR = "poor"
+
+
+@dataclass(frozen=True)
+class RatedFigure:
+    """One figure of the quality of a scan. label: its name. value: it with its unit. advice: what
+    it is, and what to do where it is not good."""
+
+    label: str
+    value: str
+    rating: ScanRating
+    advice: str
+
+
+def rated_figures(quality: Mapping[str, Any]) -> list[RatedFigure]:
+    """The figures of ``scan_quality`` in diagnosis.json. The variation of the albedo is left out:
+    it is a property of the object."""
+    found = []
+    if quality["normals"] is not None:
+        found.append(
+            RatedFigure(
+                "Normals",
+                f"± {quality['normals']:.1f}°",
+                _rated(quality["normals"], GOOD_NORMALS, UNUSUAL_NORMALS),
+                "Error of the mesh's normals. Where it is large, highlights come out too wide: "
+                "reconstruct the mesh with more detail or less smoothing",
+            )
+        )
+    found.append(
+        RatedFigure(
+            "Poses",
+            f"± {quality['poses']:.1f} px",
+            _rated(quality["poses"], GOOD_POSES, UNUSUAL_POSES),
+            "Displacement of the photos on the mesh. Where it is large, colours at edges are "
+            "mixed: align the photos again, with more points in common",
+        )
+    )
+    found.append(
+        RatedFigure(
+            "Material",
+            f"{100 * quality['outside_basis']:.0f} %",
+            _rated(quality["outside_basis"], GOOD_MATERIAL, UNUSUAL_MATERIAL),
+            "Difference from the measured materials that the fit knows. Where it is large, the fit "
+            "needs more photos, with lamps around the highlight and at grazing angles",
+        )
+    )
+    return found
+
+
+def _rated(value: float, good: float, unusual: float) -> ScanRating:
+    """The rating of a figure that is better the smaller it is."""
+    if value <= good:
+        return ScanRating.GOOD
+    return ScanRating.FAIR if value <= unusual else ScanRating.POOR
