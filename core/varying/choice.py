@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from ..concurrency.thread_pool import thread_count, thread_pool
 from ..statistics.student_t import robust_cost
-from .hierarchy import MIN_ERROR, NodeFields, edges_of_levels, near_black, robust_deviation, solve
+from .hierarchy import NodeFields, edges_of_levels, solve
 from .node_model import COUNT, TILT, NodeModel
 from .observations import Observations
+from .radiance_error import MIN_ERROR, near_black, robust_deviation
 from .varying_surface import EVEN, VARIATIONS, MaterialVariation
 
 FOLDS = 3  # groups of photos, each held out once

@@ -15,9 +15,11 @@ of the model too, and held-out photos are predicted worse the further they follo
 At each level one Gauss–Newton step is made for all cells at once, on the logarithm of the radiance,
 with Student-t errors. Their variance is that of the photos and the model, the same everywhere, and
 that of the mesh's normals: where light or view are grazing, or in a highlight, a small error of the
-normal changes the radiance much. The pixels of one cell in one photo have errors in common (of the
-normals, of the material, of the place in the photo), so that together they count as one. A clipped
-pixel says that the radiance is at least the photo's white (a censored observation, Tobin 1958).
+normal changes the radiance much. Errors are alike in all channels for the most part, so that in the
+second estimate of the colour the differences of the channels weigh more. The pixels of one cell in
+one photo have errors in common (of the normals, of the material, of the place in the photo), so
+that together they count as one. A clipped pixel says that the radiance is at least the photo's
+white (a censored observation, Tobin 1958).
 """
 
 from __future__ import annotations
@@ -35,6 +37,7 @@ from ..statistics.student_t import weights_of_squares
 from .cells import Cells
 from .node_model import COUNT, LIMITS, TILT, NodeModel
 from .observations import Observations
+from .radiance_error import MAX_ERROR, RadianceError, log_residuals, near_black, steepness
 
 Array = NDArray[np.floating]
 
@@ -47,9 +50,6 @@ predicted with 1 to 11 % smaller typical errors than with a weight of 0.5 of eac
 in a cell; a weight of 2 was worse for the bronze."""
 CHANNEL_SHARE = 0.7
 """The same in the variances: three channels count as two, because their errors are alike."""
-MIN_ERROR, MAX_ERROR = 0.01, 0.5  # of the logarithm of the radiance, that no parameter explains
-BLACK_SHARE = 0.03  # of the median radiance, added before the logarithm
-BISECTIONS = 12  # of the error of the logarithm: to 0.1 %
 EM_ROUNDS = 20
 EM_CELLS = 1_000  # that Σ is estimated from: its standard deviations are then known to 2 %
 FIRST_DEVIATION = np.array([0.4, 0.4, 0.4, 0.4, 0.3, 0.16, 0.16, 0.16, 0.2, 0.2])
@@ -113,7 +113,7 @@ def solve(
     theta = np.zeros((len(points), COUNT), np.float32)
     which = np.flatnonzero(free)
     black = near_black(seen)
-    noise = _Noise.of(model, seen, normal, theta, black, normal_error)
+    noise = RadianceError.of(model, seen, normal, theta, black, normal_error)
     levels = [
         _Level.of(points, edge, FIRST_DEVIATION[which] * LEVEL_RATIO**number, pool)
         for number, edge in enumerate(edges)
@@ -125,7 +125,8 @@ def solve(
     for done, (number, some) in enumerate(rounds, 1):
         level, own = levels[number], which[some]
         part = level.subset(seen)
-        equations = _Equations.of(model, part, normal, theta, level.cells, own, black, noise, pool)
+        used = noise if done > len(levels) else noise.without_hue()
+        equations = _Equations.of(model, part, normal, theta, level.cells, own, black, used, pool)
         tilt = MAX_TILT * min(1.0, mesh_edge / level.cells.edge)
         before = level.change[:, some]
         found, spread, sigma = equations.around(before).posterior(
@@ -135,7 +136,7 @@ def solve(
         theta[:, own] += level.at_nodes(found - before)
         np.clip(theta, -LIMITS, LIMITS, out=theta)
         levels[number] = level.with_estimate(some, found, spread, sigma, noise.error)
-        noise = _Noise.of(model, seen, normal, theta, black, normal_error)
+        noise = RadianceError.of(model, seen, normal, theta, black, normal_error)
         variance, deviation = np.zeros_like(theta), np.zeros((len(levels), COUNT))
         if done == len(rounds):
             variance[:, which] = _summed_variance(levels, noise.error)
@@ -225,7 +226,7 @@ class _Equations:
         cells: Cells,
         which: NDArray[np.intp],
         black: float,
-        noise: _Noise,
+        noise: RadianceError,
         pool: ThreadPoolExecutor | None,
     ) -> _Equations:
         k, free = len(which), np.isin(np.arange(COUNT), which)
@@ -239,12 +240,12 @@ class _Equations:
             """(cells, right-hand sides (c, k), matrices (c, k·k)) of a part of the observations."""
             rows = order[part]
             some, at = seen.select(rows), cell[rows]
-            residual, slope = _log_residuals(model, some, normal, theta, black, free)
-            variance = noise.variance(_steepness(slope))
-            slope = slope[:, :, which]
+            residual, slope = log_residuals(model, some, normal, theta, black, free)
+            variance = noise.variance(steepness(slope))
             alike = together[at.astype(np.int64) * photos + some.photo]
             weight = weights_of_squares(np.square(residual).mean(axis=1) / variance)
             weight *= PHOTO_WEIGHT / (alike * variance)
+            residual, slope = noise.scaled(residual, slope[:, :, which])
             weighted = (slope * weight[:, None, None].astype(np.float32)).transpose(0, 2, 1)
             each = np.matmul(weighted, residual[:, :, None])[:, :, 0]
             product = np.matmul(weighted, slope).reshape(len(rows), k * k)
@@ -305,87 +306,7 @@ class _Equations:
         return np.einsum("rij,rj->ri", covariance, self.right[rows]), covariance
 
 
-@dataclass(frozen=True)
-class _Noise:
-    """Errors of the logarithm of the radiance. error: standard deviation that is the same for all
-    observations; normal_error: of the normals, radians."""
-
-    error: float
-    normal_error: float
-
-    def variance(self, steep: Array) -> Array:
-        """(m,) variances of observations whose steepness is (m,)."""
-        return self.error**2 + self.normal_error**2 * steep
-
-    @classmethod
-    def of(
-        cls,
-        model: NodeModel,
-        seen: Observations,
-        normal: NDArray[np.float32],
-        theta: NDArray[np.float32],
-        black: float,
-        normal_error: float,
-    ) -> _Noise:
-        """The error that a part of the observations shows: the one for which the median of the
-        absolute normalised residuals is that of a normal distribution."""
-        some = seen.select(np.arange(0, len(seen), max(1, len(seen) // CHUNK))).measured()
-        if not len(some):
-            return cls(MAX_ERROR, normal_error)
-        free = np.zeros(COUNT, bool)
-        free[TILT] = True
-        residual, slope = _log_residuals(model, some, normal, theta, black, free)
-        steep = _steepness(slope)
-        low, high = MIN_ERROR, MAX_ERROR
-        for _ in range(BISECTIONS):
-            middle = cls(float(np.sqrt(low * high)), normal_error)
-            normalised = residual / np.sqrt(middle.variance(steep))[:, None]
-            if robust_deviation(normalised) > 1:
-                low = middle.error
-            else:
-                high = middle.error
-        return middle
-
-
-def _log_residuals(
-    model: NodeModel,
-    seen: Observations,
-    normal: NDArray[np.float32],
-    theta: NDArray[np.float32],
-    black: float,
-    free: NDArray[np.bool_],
-) -> tuple[Array, NDArray[np.float32]]:
-    """(measured minus predicted logarithm of the radiance (m, 3), derivatives (m, 3, 10) of the
-    prediction by the parameters), both 0 where a channel is clipped and predicted to be. free:
-    (10,) parameters whose derivatives are computed."""
-    node = seen.node
-    predicted, slope = model.derivatives(seen.shading, normal[node], theta[node], free)
-    predicted += np.float32(black)
-    residual = np.log(np.maximum(seen.radiance, 0) + black) - np.log(predicted)
-    slope /= predicted[:, :, None]
-    explained = seen.clipped & (residual < 0)
-    residual[explained], slope[explained] = 0, 0
-    return residual, slope
-
-
 def _sum_by_cell(cell: NDArray[np.int32], count: int) -> csc_array:
     """The matrix (count, m) that sums values of m observations over the cells (m,) they are in."""
     starts = np.arange(len(cell) + 1, dtype=np.int32)
     return csc_array((np.ones(len(cell), np.float32), cell, starts), shape=(count, len(cell)))
-
-
-def _steepness(slope: NDArray[np.float32]) -> Array:
-    """(m,) squared change of the logarithm for a tilt of the normal of one radian, the mean of the
-    channels. slope: (m, 3, 10) derivatives by the parameters."""
-    found: Array = np.square(slope[:, :, TILT]).sum(axis=2).mean(axis=1)
-    return found
-
-
-def near_black(seen: Observations) -> float:
-    """The radiance that is added before the logarithm."""
-    return BLACK_SHARE * float(np.median(seen.radiance.mean(axis=1))) if len(seen) else 1.0
-
-
-def robust_deviation(residual: Array) -> float:
-    """Standard deviation by the median of the absolute values: outliers do not matter."""
-    return float(np.median(np.abs(residual)) / 0.6745)

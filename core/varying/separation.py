@@ -25,9 +25,9 @@ from .choice import (
     folds_of,
     log_errors,
 )
-from .hierarchy import near_black
 from .node_model import DIFFUSE, GLOSS, SPECULAR, NodeModel
 from .observations import Observations
+from .radiance_error import near_black
 from .split import MIN_BODY_SHARE
 from .varying_surface import ALL_VARIATIONS
 

@@ -11,6 +11,7 @@ from patina.core.angles import Angles, light_view
 from patina.core.basis import default_basis
 from patina.core.concurrency.steps import drained
 from patina.core.fit.measured import fit_measured
+from patina.core.varying import radiance_error
 from patina.core.varying.choice import Nodes, choose
 from patina.core.varying.conversion import typical_parameters, typical_samples
 from patina.core.varying.hierarchy import NodeFields
@@ -93,6 +94,26 @@ def test_coloured_highlights_are_found(model):
     assert abs(np.median(colour[:, 0] - colour[:, 2])) < 0.05 * true
 
 
+def test_small_parts_keep_their_hue(model, monkeypatch):
+    """Dots of another hue, and errors of the brightness that are alike in all channels: the prior
+    makes them grey if the errors of the channels are taken for independent."""
+    made, rng = scene(4, 5, vary=False), np.random.default_rng(6)
+    dots = np.all(np.sin(12 * made.points[:, :2]) > 0.9, axis=1)
+    seen, hue = made.seen, np.where(dots[:, None], [1 / 1.6, 1.0, 1.6], 1.0)
+    grey = np.exp(0.25 * rng.normal(size=(len(seen), 1)))
+    radiance = (seen.radiance * hue[seen.node] * grey).astype(np.float32)
+    made = replace(made, seen=replace(seen, radiance=radiance))
+
+    def blue_to_red() -> float:
+        """In the dots, relative to the truth, logarithmic."""
+        parameters = solved(model, made).parameters[dots][:, DIFFUSE]
+        return float(np.median(parameters[:, 2] - parameters[:, 0]) / np.log(1.6**2))
+
+    assert 0.75 < blue_to_red() < 1.25
+    monkeypatch.setattr(radiance_error, "MAX_HUE_RATIO", 1.0)
+    assert blue_to_red() < 0.5
+
+
 def test_clipped_highlights_are_at_least_white(model):
     """Highlights of gold that are clipped in all photos but one, which is predicted."""
     made = scene(10, 4, vary=False, gold=True)
@@ -116,8 +137,9 @@ def test_clipped_highlights_are_at_least_white(model):
 
 @pytest.mark.slow
 def test_typical_material_keeps_highlights_that_are_clipped(model):
-    """Clipped observations become lower limits of the typical material, for its stripe or not."""
-    made = scene(6, 4)
+    """Clipped observations become lower limits of the typical material, for its stripe or not. The
+    normals of the scan are off: without the limits, dark pixels alone would show the highlight."""
+    made = scene(6, 5, tilt=4.0)
     white = np.float32(np.quantile(made.seen.radiance, 0.97))
     clipped = made.seen.radiance > white
     limited = replace(made.seen, radiance=np.minimum(made.seen.radiance, white), clipped=clipped)
