@@ -40,3 +40,6 @@ def _figure(context: bpy.types.Context, label: str) -> RatedFigure | None:
 
 def _text(figure: RatedFigure) -> str:
     return f"{figure.label} {figure.value}: {figure.rating.value}. {figure.advice}"
+
+
+register, unregister = bpy.utils.register_classes_factory((PATINA_OT_explain_scan_quality,))

@@ -33,7 +33,7 @@ def build() -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     with one_at_a_time("viewer"):
         say("building the viewer")
-        _install(folder)
+        _install(folder, WEB)
         out = folder / "viewer.js"
         _bundle(WEB / "src" / "main.js", out, folder)
         partial = PROGRAM.with_suffix(".part")
@@ -42,14 +42,17 @@ def build() -> Path:
     return PROGRAM
 
 
-def bundle(entry: Path, out: Path) -> None:
-    """Bundle another script with what it imports from the packages of the viewer. Raises
-    Failure."""
-    build()
-    folder = cache_dir() / "viewer"
-    with one_at_a_time("viewer"):
-        if not (folder / "node_modules").is_dir():
-            _install(folder)
+def bundle(entry: Path, out: Path, packages: Path = WEB) -> None:
+    """Bundle another script with what it imports from the packages that ``packages``, a folder with
+    a package.json, lists; by default those of the viewer. Raises Failure."""
+    digest = hashlib.sha256((packages / "package-lock.json").read_bytes()).hexdigest()[:16]
+    folder = cache_dir() / ("viewer" if packages == WEB else f"npm-{packages.name}")
+    folder.mkdir(parents=True, exist_ok=True)
+    with one_at_a_time(folder.name):
+        installed = folder / "installed"
+        if not installed.is_file() or installed.read_text("utf-8") != digest:
+            _install(folder, packages)
+            installed.write_text(digest, "utf-8")
         _bundle(entry, out, folder)
 
 
@@ -61,10 +64,10 @@ def build_if_possible() -> None:
         say(f"note: the viewer cannot be built ({error}); reports will have none")
 
 
-def _install(folder: Path) -> None:
-    """Install the packages into a folder."""
+def _install(folder: Path, packages: Path) -> None:
+    """Install the packages that the folder ``packages`` lists into another folder."""
     for name in ("package.json", "package-lock.json"):
-        shutil.copy(WEB / name, folder / name)
+        shutil.copy(packages / name, folder / name)
     # esbuild's own script only replaces a shim by the program that _bundle starts itself
     _run([*_npm(), "ci", "--ignore-scripts", "--no-audit", "--no-fund", "--silent"], folder)
 

@@ -1,4 +1,5 @@
-"""The exported GLB in a browser, drawn by three.js, against Cycles with the measured BRDF."""
+"""The exported GLB in a browser, drawn by three.js and by Babylon.js, against Cycles with the
+measured BRDF."""
 
 from __future__ import annotations
 
@@ -34,10 +35,13 @@ if material_nodes.osl_missing():
 MODEL = Principled(base_color=np.array([0.4, 0.1, 0.05]), roughness=0.3)
 FINER = 4  # pixels of the browser for each of Cycles, along each side
 MIN_PSNR = {"lamp": 35.0, "sky": 25.0}  # dB
+BABYLON = browser.FOLDER / "babylon"  # a game engine: its page and the packages that this needs
 
 
-@pytest.mark.parametrize("light", ["lamp", "sky"])
-def test_the_glb_looks_like_the_measured_material(light, tmp_path):
+@pytest.mark.parametrize(
+    ("engine", "light"), [("three", "lamp"), ("three", "sky"), ("babylon", "lamp")]
+)
+def test_the_glb_looks_like_the_measured_material(engine, light, tmp_path):
     browser.program()
     sky = computed_skies()[0] if light == "sky" else None
     sphere = new_scene(samples=64 if sky is None else 700)
@@ -49,10 +53,10 @@ def test_the_glb_looks_like_the_measured_material(light, tmp_path):
     assign_material(projected(MODEL.evaluate, 60), sphere)
     expected = cycles_sphere.render(tmp_path)
     write_glb(tmp_path / "sphere.glb", [sphere])
-    found = _drawn(tmp_path, sky)
+    found = _drawn(tmp_path, sky, engine)
     error = np.mean((_display(found) - _display(expected))[inside()] ** 2)
     psnr = -10 * np.log10(error)
-    print(f"GLB, {light}: PSNR {psnr:.1f} dB")
+    print(f"GLB, {engine}, {light}: PSNR {psnr:.1f} dB")
     assert psnr > MIN_PSNR[light]
 
 
@@ -60,9 +64,12 @@ def _display(radiance: np.ndarray) -> np.ndarray:
     return srgb(np.clip(radiance, 0, 1)) / 255.0
 
 
-def _drawn(folder, sky) -> np.ndarray:
+def _drawn(folder, sky, engine) -> np.ndarray:
     """(SIDE, SIDE, 3) linear radiance in the browser, row 0 on top."""
-    viewer_program.bundle(browser.FOLDER / "glb_page.js", folder / "glb_page.js")
+    if engine == "three":
+        viewer_program.bundle(browser.FOLDER / "glb_page.js", folder / "glb_page.js")
+    else:
+        viewer_program.bundle(BABYLON / "glb_page.js", folder / "glb_page.js", BABYLON)
     page_file = folder / "page.html"
     page_file.write_text(
         '<!DOCTYPE html><link rel="icon" href="data:,"><script src="glb_page.js"></script>'
