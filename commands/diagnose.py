@@ -15,6 +15,8 @@ from ..core.jobs.check_job import CheckJob
 from ..core.jobs.varying_second_fit import VaryingSecondFit
 from ..core.output_folder import check_out, staged_folder
 from ..core.report import diagnosis, diagnosis_json
+from ..core.report.diagnosis_json import CheckRecord
+from ..core.report.result_json import write_json
 from . import capture_arguments
 from .fit import FIT, add_varying, print_summary, write_results
 from .progress import Progress, print_note
@@ -66,8 +68,10 @@ def diagnose_to_folder(
         assessment = finished(checked.assessment)
         context = finished(checked.context)
         diagnosis.write_pages(report, found, assessment, context, before, after)
-        diagnosis_json.write(folder / "diagnosis.json", found, assessment, before, after)
-        write_results(folder, out, after, job.stages, progress, MATERIALS)
+        description = diagnosis_json.describe(found, assessment, before, after)
+        write_json(folder / "diagnosis.json", description)
+        shown = CheckRecord(description, found, context)
+        write_results(folder, out, after, job.stages, progress, MATERIALS, shown)
     _print_causes(found)
     _print_gain(before, after)
     print_summary(out, after)

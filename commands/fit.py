@@ -17,6 +17,7 @@ from ..core.jobs.varying.variation_estimator import MODES
 from ..core.jobs.varying.varying_job import VaryingJob
 from ..core.output_folder import check_out, staged_folder
 from ..core.report import result_json, write_report
+from ..core.report.diagnosis_json import CheckRecord
 from ..core.report.figures import reach
 from ..core.report.held_out import varied_quality
 from ..core.varying import storage
@@ -75,9 +76,10 @@ def write_results(
     stages: Sequence[Stage],
     progress: Progress,
     report: str = "report",
+    check: CheckRecord | None = None,
 ) -> None:
     """Write tables, report, result.json and, with Blender, scene.blend to a staged folder, whose
-    files move to ``out``."""
+    files move to ``out``. check: the diagnosis that the result is based on."""
     stages = [*stages]
     with timed(stages, "tables", progress, 0.9):
         for material in result.materials:
@@ -91,7 +93,7 @@ def write_results(
         with timed(stages, "scene.blend", progress, 0.97):
             from ..scene.export.blend_file import write_blend  # needs bpy
 
-            notes = write_blend(folder / "scene.blend", out / "scene.blend", result, stages)
+            notes = write_blend(folder / "scene.blend", out / "scene.blend", result, stages, check)
     if result.varying is not None:
         with timed(stages, storage.NAME, progress, 0.99):
             storage.write(folder / storage.NAME, result.varying)

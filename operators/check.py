@@ -15,6 +15,7 @@ from ..core.jobs.check_job import CheckJob
 from ..core.jobs.refit_job import RefitJob
 from ..core.jobs.varying_second_fit import VaryingSecondFit
 from ..core.report.diagnosis_json import describe
+from ..scene.scan.evidence_colours import paint_evidence
 from ..scene.session.last_diagnosis import keep_check, kept_check
 from ..scene.session.running_job import set_running
 from ..scene.session.scene_properties import (
@@ -23,7 +24,6 @@ from ..scene.session.scene_properties import (
     capture_path,
     store_result,
 )
-from ..scene.views.evidence import paint_evidence
 from ..scene.views.evidence_overlay import toggle_evidence
 from ..scene.views.outdated import inputs_now, record_inputs
 from .fit import can_fit, fit_job, prepared, show_result

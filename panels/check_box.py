@@ -8,16 +8,18 @@ import bpy
 
 from ..core.diagnose.effects.labels import ORIGINS, cause_label, origin_of
 from ..core.diagnose.selection.scan_rating import ScanRating, rated_figures
+from ..scene.scan.evidence_colours import RESIDUAL
 from ..scene.session.lengths import with_lengths
 from ..scene.session.overlay_shading import overlay_shown
-from ..scene.views.evidence import RESIDUAL
 from .wrapped import IN_BOX, wrapped
 
 HEADINGS = ("Held-out regions, RMS error:", "Held-out photos, median error:")
+# Blender 4.4 renamed the icons; green, yellow and red squares
+COLOUR_ICON = "STRIP_COLOR_0" if bpy.app.version >= (4, 4) else "SEQUENCE_COLOR_0"
 RATING_ICONS = {
-    ScanRating.GOOD: "STRIP_COLOR_04",  # green
-    ScanRating.FAIR: "STRIP_COLOR_03",  # yellow
-    ScanRating.POOR: "STRIP_COLOR_01",  # red
+    ScanRating.GOOD: f"{COLOUR_ICON}4",
+    ScanRating.FAIR: f"{COLOUR_ICON}3",
+    ScanRating.POOR: f"{COLOUR_ICON}1",
 }
 MAX_CAUSES = 8  # causes without effect that the panel lists
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,13 +11,23 @@ from numpy.typing import NDArray
 from ..diagnose.assessment.assessment import Assessment
 from ..diagnose.assessment.calibration import BINS, CONFIDENCE, INTERVAL
 from ..diagnose.effects.actions import ACTIONS
+from ..diagnose.forward.diagnosis_context import DiagnosisContext
 from ..diagnose.selection.diagnosis import Diagnosis, Trial
 from ..diagnose.selection.held_out_error import HeldOutErrors
 from ..jobs import CaptureResult
 from .diagnosis import evidence_file
-from .result_json import parameters, program_version, write_json
+from .result_json import parameters, program_version
 
 FORMAT = 3
+
+
+@dataclass(frozen=True)
+class CheckRecord:
+    """A diagnosis, to be stored with its result. description: the content of diagnosis.json."""
+
+    description: dict[str, Any]
+    found: Diagnosis
+    context: DiagnosisContext
 
 
 def describe(
@@ -60,17 +70,6 @@ def describe(
         ],
         "tried": sorted(tried),
     }
-
-
-def write(
-    path: Path,
-    found: Diagnosis,
-    assessment: Assessment,
-    before: CaptureResult,
-    after: CaptureResult,
-) -> None:
-    """Write the file atomically. The arguments are those of describe."""
-    write_json(path, describe(found, assessment, before, after))
 
 
 def _assessment(assessment: Assessment) -> dict[str, Any]:

@@ -12,12 +12,15 @@ from ...core.capture import Capture
 from ...core.errors import PatinaError
 from ...core.inputs.lights import Lights
 from ...core.jobs import CaptureResult, Stage
+from ...core.report.diagnosis_json import CheckRecord
 from ...core.scan import Reconstruction, Scan
 from ..material import material_nodes, osl_files
 from ..material.measured_materials import measured_materials
 from ..scan.apply_result import apply_result
+from ..scan.evidence_colours import paint_evidence
 from ..scan.orientation import set_upright
 from ..scan.scan_collection import ScanCollection, create_reconstruction, create_scan_collection
+from ..session.scene_properties import DIAGNOSIS, store_result
 
 RECTIFIED = "rectified"  # folder next to the .blend for resampled photos of distorted lenses
 
@@ -45,15 +48,23 @@ def write_reconstruction(
 
 
 def write_blend(
-    path: Path, final: Path, result: CaptureResult, stages: Sequence[Stage]
+    path: Path,
+    final: Path,
+    result: CaptureResult,
+    stages: Sequence[Stage],
+    check: CheckRecord | None = None,
 ) -> list[str]:
     """Write a .blend of a capture with the fitted materials on its mesh; returns notes for the
-    user."""
+    user. check: a diagnosis, which the Check panel then shows."""
     _imported(path, result.capture, result.scan, result.lights)
     save(path, final)  # the shader's EXRs are written next to a saved file
     notes = apply_result(bpy.context.scene, result, stages)
     for material in measured_materials():
         osl_files.redirect_files(material, final.parent)
+    if check is not None:
+        store_result(str(result.capture.file), check.description, DIAGNOSIS)
+        vertices, pixels = check.context.rays.mesh.vertices, check.context.pixels
+        paint_evidence(bpy.context.scene.patina.mesh, vertices, pixels, check.found)
     save(path, final)
     return notes
 

@@ -14,6 +14,7 @@ from gpu_extras.batch import batch_for_shader
 from ...core.diagnose.effects.labels import cause_label
 from ...core.views.surface_view import QUANTITIES
 from ..property_keys import EVIDENCE_COLOURS, VARIATION_COLOURS
+from ..scan.evidence_colours import FULL_SCALE, RESIDUAL
 from ..scan.vertex_colours import UNOBSERVED, colours_of
 from ..session.handlers import attach, detach
 from ..session.overlay_shading import (
@@ -23,7 +24,6 @@ from ..session.overlay_shading import (
     overlay_undone,
     shows_overlay,
 )
-from .evidence import FULL_SCALE, RESIDUAL
 
 LEFT, BOTTOM, WIDTH, HEIGHT, TEXT, GAP = 24, 40, 280, 14, 12, 6  # pixels at a display scale of 1
 STEPS = 24  # coloured rectangles of the scale

@@ -24,7 +24,7 @@ LOOKS = {  # name → (scale of the interface, light theme, language)
     "german": (1.0, True, "de_DE"),
     "japanese": (1.0, False, "ja_JP"),
 }
-PAGES = 2  # screenshots of each look, further down
+PAGES = 3  # screenshots of each look, further down
 SCROLLS = 22  # steps between them
 REDRAW = 1.5  # seconds after which a window has been redrawn
 
@@ -38,6 +38,14 @@ def area() -> bpy.types.Area:
 def sidebar() -> bpy.types.Region:
     """Its sidebar."""
     return next(r for r in area().regions if r.type == "UI")
+
+
+def open_check() -> None:
+    """Show the panel of the check open, before it is drawn for the first time."""
+    panel = bpy.types.PATINA_PT_check
+    bpy.utils.unregister_class(panel)
+    panel.bl_options = set()
+    bpy.utils.register_class(panel)
 
 
 def use(scale: float, light: bool, language: str) -> None:
@@ -70,6 +78,7 @@ def looks() -> Iterator[float]:
     blend = next(OUT.glob("*.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     yield 2 * REDRAW
+    open_check()
     area().spaces.active.show_region_ui = True
     yield REDRAW
     sidebar().active_panel_category = "Patina"

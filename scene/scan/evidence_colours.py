@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from ...core.diagnose.forward.pixels import Pixels
 from ...core.diagnose.selection.diagnosis import Diagnosis
 from ..property_keys import EVIDENCE_COLOURS
-from ..scan.vertex_colours import drop_vertex_colours, paint_vertices
+from .vertex_colours import drop_vertex_colours, paint_vertices
 
 Array = NDArray[np.floating]
 
