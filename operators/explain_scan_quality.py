@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..core.diagnose.selection.scan_rating import RatedFigure, rated_figures
+from ..core.diagnose.selection.scan_rating import RatedFigure, ScanRating, rated_figures
 from ..scene.session.scene_properties import DIAGNOSIS, capture_path, stored_result
 
 
@@ -39,7 +39,8 @@ def _figure(context: bpy.types.Context, label: str) -> RatedFigure | None:
 
 
 def _text(figure: RatedFigure) -> str:
-    return f"{figure.label} {figure.value}: {figure.rating.value}. {figure.advice}"
+    text = f"{figure.label} {figure.value} ({figure.rating.value}): {figure.meaning}"
+    return text if figure.rating is ScanRating.GOOD else f"{text}. {figure.remedy}"
 
 
 register, unregister = bpy.utils.register_classes_factory((PATINA_OT_explain_scan_quality,))

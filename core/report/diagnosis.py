@@ -95,10 +95,10 @@ def _scan_quality(quality: ScanQuality) -> str:
     rows = ""
     for figure in rated_figures(quality.figures()):
         rating = figure.rating.value
-        advice = "" if figure.rating is ScanRating.GOOD else f"<br>{escape(figure.advice)}."
+        remedy = "" if figure.rating is ScanRating.GOOD else f"<br>{escape(figure.remedy)}."
         rows += (
-            f"<li class='{rating}' title='{escape(figure.advice)}'>{figure.label} "
-            f"{figure.value} ({rating}){advice}</li>"
+            f"<li class='{rating}'>{figure.label} {figure.value} ({rating}): "
+            f"{escape(figure.meaning)}{remedy}</li>"
         )
     return f"<ul class='ratings'>{rows}</ul>"
 

@@ -26,13 +26,14 @@ class ScanRating(Enum):
 
 @dataclass(frozen=True)
 class RatedFigure:
-    """One figure of the quality of a scan. label: its name. value: it with its unit. advice: what
-    it is, and what to do where it is not good."""
+    """One figure of the quality of a scan. label: its name. value: it with its unit. meaning: what
+    it is. remedy: what a poor figure does, and what to do then."""
 
     label: str
     value: str
     rating: ScanRating
-    advice: str
+    meaning: str
+    remedy: str
 
 
 def rated_figures(quality: Mapping[str, Any]) -> list[RatedFigure]:
@@ -45,8 +46,9 @@ def rated_figures(quality: Mapping[str, Any]) -> list[RatedFigure]:
                 "Normals",
                 f"± {quality['normals']:.1f}°",
                 _rated(quality["normals"], GOOD_NORMALS, UNUSUAL_NORMALS),
-                "Error of the mesh's normals. Where it is large, highlights come out too wide: "
-                "reconstruct the mesh with more detail or less smoothing",
+                "error of the mesh's normals",
+                "Highlights come out too wide: reconstruct the mesh with more detail or less "
+                "smoothing",
             )
         )
     found.append(
@@ -54,8 +56,8 @@ def rated_figures(quality: Mapping[str, Any]) -> list[RatedFigure]:
             "Poses",
             f"± {quality['poses']:.1f} px",
             _rated(quality["poses"], GOOD_POSES, UNUSUAL_POSES),
-            "Displacement of the photos on the mesh. Where it is large, colours at edges are "
-            "mixed: align the photos again, with more points in common",
+            "displacement of the photos on the mesh",
+            "Colours at edges are mixed: align the photos again, with more points in common",
         )
     )
     found.append(
@@ -63,8 +65,8 @@ def rated_figures(quality: Mapping[str, Any]) -> list[RatedFigure]:
             "Material",
             f"{100 * quality['outside_basis']:.0f} %",
             _rated(quality["outside_basis"], GOOD_MATERIAL, UNUSUAL_MATERIAL),
-            "Difference from the measured materials that the fit knows. Where it is large, the fit "
-            "needs more photos, with lamps around the highlight and at grazing angles",
+            "difference from the measured materials that the fit knows",
+            "The fit needs more photos, with lamps around the highlight and at grazing angles",
         )
     )
     return found
