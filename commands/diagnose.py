@@ -84,7 +84,7 @@ def _print_causes(found: Diagnosis) -> None:
         if trial in found.named:
             print(f"  {ACTIONS[trial.effect.cause]}")
     if found.unexplained:
-        print(f"unknown: {found.residual.sentence()}")
+        print(f"unknown: {found.unexplained_sentence}")
     if not found.causes:
         print("none: No known cause found. Noise and errors of the scan explain the residuals.")
     print(found.quality.sentence())

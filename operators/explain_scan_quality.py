@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..core.diagnose.selection.scan_rating import RatedFigure, ScanRating, rated_figures
+from ..core.diagnose.assessment.scan_rating import RatedFigure, ScanRating, rated_figures
 from ..scene.session.scene_properties import DIAGNOSIS, capture_path, stored_result
 
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import bpy
 
+from ..core.diagnose.assessment.scan_rating import ScanRating, rated_figures
 from ..core.diagnose.effects.labels import ORIGINS, cause_label, origin_of
-from ..core.diagnose.selection.scan_rating import ScanRating, rated_figures
 from ..scene.scan.evidence_colours import RESIDUAL
 from ..scene.session.lengths import with_lengths
 from ..scene.session.overlay_shading import overlay_shown

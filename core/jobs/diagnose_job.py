@@ -105,7 +105,12 @@ class DiagnoseJob(Job):
     def _search(self, pool: ThreadPoolExecutor | None) -> Generator[float, None, Diagnosis]:
         result, context = finished(self.result), finished(self.context)
         tilt = float(np.radians(normal_deviation(result)))
-        return (yield from search(context, tilt, effects_for(context, pool), pool))
+        found = yield from search(context, tilt, effects_for(context, pool), pool)
+        capture = result.capture
+        names = tuple(photo.file.name for photo in capture.photos)
+        if len(set(names)) < len(names):
+            names = tuple(capture.photo_name(place) for place in range(len(names)))
+        return replace(found, photo_names=names)
 
 
 def context_of(

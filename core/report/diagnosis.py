@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from ..diagnose.assessment.assessment import Assessment
+from ..diagnose.assessment.scan_rating import ScanRating, rated_figures
 from ..diagnose.effects.actions import ACTIONS
 from ..diagnose.effects.labels import ORIGINS, cause_label, origin_of
 from ..diagnose.forward.diagnosis_context import DiagnosisContext
 from ..diagnose.selection.diagnosis import Diagnosis, Trial
 from ..diagnose.selection.residual_trends import Trend, coordinates, trend
 from ..diagnose.selection.scan_quality import ScanQuality
-from ..diagnose.selection.scan_rating import ScanRating, rated_figures
 from ..jobs import CaptureResult
 from ..photo import write_png
 from ..viewer.page import FILE_NAME, has_program
@@ -73,7 +73,7 @@ def _summary(found: Diagnosis, before: CaptureResult, after: CaptureResult) -> s
         for trial in found.reported
     )
     if found.unexplained:
-        causes += f"<li>{escape(found.residual.sentence())}</li>"
+        causes += f"<li>{escape(found.unexplained_sentence)}</li>"
     nothing = "<li>Nothing: noise and errors of the scan explain the differences.</li>"
     parts = [
         (ERROR_HEADING, f"<ul>{rows}</ul>" if rows else "<p>unknown</p>"),

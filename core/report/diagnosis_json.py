@@ -53,7 +53,7 @@ def describe(
             "gain": found.residual.gain,
             "standard_error": found.residual.error,
             "rms": found.residual.change,
-            "sentence": found.residual.sentence(),
+            "sentence": found.unexplained_sentence,
         },
         "applied": [effect.cause for effect in after.effects],
         "materials": [

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from patina.core.diagnose.assessment.scan_rating import ScanRating, rated_figures
 from patina.core.diagnose.selection import unusual_scan
 from patina.core.diagnose.selection.scan_quality import ScanQuality
-from patina.core.diagnose.selection.scan_rating import ScanRating, rated_figures
 
 
 @pytest.mark.parametrize(

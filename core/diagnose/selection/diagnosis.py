@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ...photo_names import with_photo_names
 from ..solver.model_fit import ModelFit
 from .cross_validation import HeldOutPrediction
 from .held_out_error import HeldOutErrors
@@ -35,7 +36,7 @@ class Diagnosis:
     do not explain. error_before, error_after: of held-out regions and photos. expected: (n, 3)
     standard deviation of the baseline. quality: of the scan. contradicted: causes that gain, each
     with a sentence that gives the evidence against it: a material that contradicts it, or a second
-    fit that does not confirm it.
+    fit that does not confirm it. photo_names: of all photos, for sentences.
     """
 
     accepted: tuple[Trial, ...]
@@ -50,6 +51,7 @@ class Diagnosis:
     expected: Array
     quality: ScanQuality
     contradicted: Mapping[str, str] = field(default_factory=dict)
+    photo_names: tuple[str, ...] = ()
 
     @property
     def ranked(self) -> list[Trial]:
@@ -80,12 +82,17 @@ class Diagnosis:
     def sentence(self, trial: Trial) -> str:
         """The description of an effect, and the evidence against it."""
         evidence = self.contradicted.get(trial.effect.cause)
-        meaning = trial.sentence()
+        meaning = with_photo_names(trial.sentence(), self.photo_names)
         return (
             meaning
             if evidence is None
             else f"{meaning} However, there is evidence against it. {evidence}"
         )
+
+    @property
+    def unexplained_sentence(self) -> str:
+        """The description of the structure that remains."""
+        return with_photo_names(self.residual.sentence(), self.photo_names)
 
     @property
     def unexplained(self) -> bool:

@@ -13,6 +13,13 @@ from ..nuisances.surface_variation import ALBEDO, TILTS, WAYS, SurfaceVariation
 from ..solver.model_fit import ModelFit
 from .cross_validation import parameter_variances
 
+# up to the first a figure is good, above the second it is poor, and the check names it as a cause
+# degrees, RMS over patches: stereo meshes have 1 to 1.7
+GOOD_NORMALS, UNUSUAL_NORMALS = 1.7, 2.5
+# pixels along an axis: reconstructions have 0.3; errors of a mesh look like 1
+GOOD_POSES, UNUSUAL_POSES = 0.5, 1.5
+# RMS of ln of the factor by which a material differs from the basis; good: half of what is named
+GOOD_MATERIAL, UNUSUAL_MATERIAL = 0.15, 0.3
 BRIGHT = 0.1  # of the 90th percentile of the prediction; darker pixels are not counted
 
 

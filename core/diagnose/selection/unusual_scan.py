@@ -29,8 +29,7 @@ from .effect_trials import (
     try_with_rays,
 )
 from .relative_change import relative_rms_change
-from .scan_quality import ScanQuality
-from .scan_rating import UNUSUAL_MATERIAL, UNUSUAL_NORMALS, UNUSUAL_POSES
+from .scan_quality import UNUSUAL_MATERIAL, UNUSUAL_NORMALS, UNUSUAL_POSES, ScanQuality
 from .trial import Trial
 
 MIN_APART, MIN_SEPARATION = 0.3, 5.0

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-# up to the first a figure is good, above the second it is poor, and the check names it as a cause
-# degrees, RMS over patches: stereo meshes have 1 to 1.7
-GOOD_NORMALS, UNUSUAL_NORMALS = 1.7, 2.5
-# pixels along an axis: reconstructions have 0.3; errors of a mesh look like 1
-GOOD_POSES, UNUSUAL_POSES = 0.5, 1.5
-# RMS of ln of the factor by which a material differs from the basis: even materials have 0.15
-GOOD_MATERIAL, UNUSUAL_MATERIAL = 0.15, 0.3
+from ..selection.scan_quality import (
+    GOOD_MATERIAL,
+    GOOD_NORMALS,
+    GOOD_POSES,
+    UNUSUAL_MATERIAL,
+    UNUSUAL_NORMALS,
+    UNUSUAL_POSES,
+)
 
 
 class ScanRating(Enum):
