@@ -193,9 +193,17 @@ class RefitJob(Job):
                 f"samples that can be corrected: {count}; expected at least {MIN_SAMPLES}"
             )
         start, share = start + CORRECTION_SHARE * share, (1 - CORRECTION_SHARE) * share
-        if not found.table.read.all():
-            # the joint fit has no prior for directions in which all samples are clipped, and may
-            # invent a highlight there; the estimator has one
+        wide = any(isinstance(effect, WidensHighlights) for effect in model.effects)
+        filled = _clipping_warnings(found.table)
+        if not wide and not found.table.read.all():
+            # the photos say how bright these are at least; the estimator does the rest
+            some = [found.table.select(~found.table.read), *([] if limits is None else [limits])]
+            limits = SampleTable.concatenate(some)
+            found = replace(found, table=found.table.select(found.table.read))
+        elif not found.table.read.all():
+            # highlights are wider in the samples than in the BRDF, so their limits are none of it,
+            # and the joint fit has no prior for directions in which all samples are clipped, and
+            # may invent a highlight there; the estimator has one
             share /= 2
             unclipped = found.table.select(found.table.read)
             known = yield from fit.fit_again(index, unclipped, material, start, share, None)
@@ -214,7 +222,7 @@ class RefitJob(Job):
             found, fit_again, start, share, self.exactly
         )
         blurred = found.blur is not None and not sharp
-        warnings = (*_clipping_warnings(found.table), *((STILL_BLURRED,) if blurred else ()))
+        warnings = (*filled, *((STILL_BLURRED,) if blurred else ()))
         return Refit(fitted, found.light, warnings, blurred)
 
     def _sample_pixels(
@@ -231,7 +239,8 @@ class RefitJob(Job):
     ) -> Generator[Step, None, CorrectedSamples]:
         before, setting = finished(self.checked.result), finished(self.checked.context)
         tilt = float(np.radians(normal_deviation(before)))
-        correcting = correct_samples(table, pixels, model, setting, tilt)
+        wide = any(isinstance(effect, WidensHighlights) for effect in model.effects)
+        correcting = correct_samples(table, pixels, model, setting, tilt, impute=wide)
         return (yield from relayed(correcting, lambda _: step))
 
     def _corrected_limits(
@@ -247,7 +256,7 @@ class RefitJob(Job):
 
 
 def _clipping_warnings(table: SampleTable) -> tuple[str, ...]:
-    """A warning if channels of samples are imputed (clipping_imputation.py)."""
+    """A warning if channels of samples are clipped."""
     filled = np.count_nonzero(~table.read)
     if not filled:
         return ()

@@ -57,6 +57,7 @@ def correct_samples(
     context: DiagnosisContext,
     tilt: float = 0.0,
     shown: Model | None = None,
+    impute: bool = True,
 ) -> Generator[float, None, CorrectedSamples]:
     """Correct samples (n,), photo by photo; yields the fraction done. Where a sample's response
     is 0, its radiance is a lower limit, and so is the corrected one.
@@ -65,7 +66,7 @@ def correct_samples(
     the diagnosis. tilt: radians along each tangent, standard deviation of the scan's normals.
     shown: the model whose normals and light the corrected samples get, and whose added light is
     subtracted (None: ``model``): without the variation of the surface where that is to be estimated
-    from them."""
+    from them. impute: whether clipped channels get a likely radiance; otherwise a lower limit."""
     parts, wide = [], list[BlurredPhoto]()
     model = with_scaled_brdfs(model)  # once: the BRDFs keep tables of their values
     blur = widens_highlights(model)
@@ -77,7 +78,7 @@ def correct_samples(
         here = replace(context, pixels=pixels.select(rows), brdfs=model.brdfs, ray_count=RAY_COUNT)
         local = model_at_pixels(model, here, near.select(rows))
         own = None if shown is None else model_at_pixels(shown, here, near.select(rows))
-        *part, good = _correct_chunk(table.select(rows), local, tilt, own)
+        *part, good = _correct_chunk(table.select(rows), local, tilt, own, impute)
         parts.append((*part, rows[good]))
         if blur:
             wide.append(blurred_photo(int(table.photo[rows[0]]), local, good))
@@ -116,7 +117,7 @@ def model_at_pixels(model: Model, context: DiagnosisContext, near: NearestPixels
 
 
 def _correct_chunk(
-    table: SampleTable, model: Model, tilt: float, shown: Model | None
+    table: SampleTable, model: Model, tilt: float, shown: Model | None, impute: bool
 ) -> tuple[SampleTable, Array, Array, NDArray[np.intp]]:
     """(samples, weighted squares of the recorded radiance of the lamp, 0 where it is clipped, the
     same of the whole recorded radiance, indices of the samples in ``table``). shown: the model of
@@ -144,8 +145,11 @@ def _correct_chunk(
     with np.errstate(divide="ignore", invalid="ignore"):  # not used where ``good`` is false
         arrived = entering + (table.radiance - recorded) / response
     at = np.where(clipped, plateau, np.inf)
-    drawn = impute_clipped(model, now, added, at, arrived, tilt)
-    if widens_highlights(model):  # the imputed radiance is of a point lamp and isotropic
+    if impute:
+        drawn = impute_clipped(model, now, added, at, arrived, tilt)
+    else:
+        drawn = np.where(clipped, np.maximum(at - added, 0), 0)
+    if impute and widens_highlights(model):  # the imputed radiance is of a point lamp and isotropic
         point = model.brdfs.reflected(replace(now, stretch=None))
         drawn *= reflected / np.maximum(point, 1e-30)
     radiance = np.where(clipped, drawn, arrived - added)
