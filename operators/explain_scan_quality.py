@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..core.diagnose.assessment.scan_rating import RatedFigure, ScanRating, rated_figures
+from ..core.diagnose.assessment.scan_rating import RatedFigure, rated_figures
+from ..core.fit.fit_quality import Rating
 from ..scene.session.scene_properties import DIAGNOSIS, capture_path, stored_result
 
 
@@ -40,7 +41,7 @@ def _figure(context: bpy.types.Context, label: str) -> RatedFigure | None:
 
 def _text(figure: RatedFigure) -> str:
     text = f"{figure.label} {figure.value} ({figure.rating.value}): {figure.meaning}"
-    return text if figure.rating is ScanRating.GOOD else f"{text}. {figure.remedy}"
+    return text if figure.rating is Rating.GOOD else f"{text}. {figure.remedy}"
 
 
 register, unregister = bpy.utils.register_classes_factory((PATINA_OT_explain_scan_quality,))

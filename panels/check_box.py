@@ -6,8 +6,9 @@ from typing import Any
 
 import bpy
 
-from ..core.diagnose.assessment.scan_rating import ScanRating, rated_figures
+from ..core.diagnose.assessment.scan_rating import rated_figures
 from ..core.diagnose.effects.labels import ORIGINS, cause_label, origin_of
+from ..core.fit.fit_quality import Rating
 from ..scene.scan.evidence_colours import RESIDUAL
 from ..scene.session.lengths import with_lengths
 from ..scene.session.overlay_shading import overlay_shown
@@ -17,9 +18,9 @@ HEADINGS = ("Held-out regions, RMS error:", "Held-out photos, median error:")
 # Blender 4.4 renamed the icons; green, yellow and red squares
 COLOUR_ICON = "STRIP_COLOR_0" if bpy.app.version >= (4, 4) else "SEQUENCE_COLOR_0"
 RATING_ICONS = {
-    ScanRating.GOOD: f"{COLOUR_ICON}4",
-    ScanRating.FAIR: f"{COLOUR_ICON}3",
-    ScanRating.POOR: f"{COLOUR_ICON}1",
+    Rating.GOOD: f"{COLOUR_ICON}4",
+    Rating.FAIR: f"{COLOUR_ICON}3",
+    Rating.POOR: f"{COLOUR_ICON}1",
 }
 MAX_CAUSES = 8  # causes without effect that the panel lists
 

@@ -29,11 +29,9 @@ def build() -> Path:
         with PROGRAM.open(encoding="utf-8") as built:
             if built.read(len(mark)) == mark:
                 return PROGRAM
-    folder = cache_dir() / "viewer"
-    folder.mkdir(parents=True, exist_ok=True)
     with one_at_a_time("viewer"):
         say("building the viewer")
-        _install(folder, WEB)
+        folder = _installed(WEB)
         out = folder / "viewer.js"
         _bundle(WEB / "src" / "main.js", out, folder)
         partial = PROGRAM.with_suffix(".part")
@@ -45,15 +43,8 @@ def build() -> Path:
 def bundle(entry: Path, out: Path, packages: Path = WEB) -> None:
     """Bundle another script with what it imports from the packages that ``packages``, a folder with
     a package.json, lists; by default those of the viewer. Raises Failure."""
-    digest = hashlib.sha256((packages / "package-lock.json").read_bytes()).hexdigest()[:16]
-    folder = cache_dir() / ("viewer" if packages == WEB else f"npm-{packages.name}")
-    folder.mkdir(parents=True, exist_ok=True)
-    with one_at_a_time(folder.name):
-        installed = folder / "installed"
-        if not installed.is_file() or installed.read_text("utf-8") != digest:
-            _install(folder, packages)
-            installed.write_text(digest, "utf-8")
-        _bundle(entry, out, folder)
+    with one_at_a_time("viewer"):
+        _bundle(entry, out, _installed(packages))
 
 
 def build_if_possible() -> None:
@@ -64,12 +55,21 @@ def build_if_possible() -> None:
         say(f"note: the viewer cannot be built ({error}); reports will have none")
 
 
-def _install(folder: Path, packages: Path) -> None:
-    """Install the packages that the folder ``packages`` lists into another folder."""
+def _installed(packages: Path) -> Path:
+    """The folder of the cache in which the packages are installed that ``packages`` lists."""
+    folder = cache_dir() / ("viewer" if packages == WEB else f"npm-{packages.name}")
+    folder.mkdir(parents=True, exist_ok=True)
+    digest = hashlib.sha256((packages / "package-lock.json").read_bytes()).hexdigest()
+    mark = folder / "installed"
+    there = (folder / "node_modules").is_dir() and mark.is_file()
+    if there and mark.read_text("utf-8") == digest:
+        return folder
     for name in ("package.json", "package-lock.json"):
         shutil.copy(packages / name, folder / name)
     # esbuild's own script only replaces a shim by the program that _bundle starts itself
     _run([*_npm(), "ci", "--ignore-scripts", "--no-audit", "--no-fund", "--silent"], folder)
+    mark.write_text(digest, "utf-8")
+    return folder
 
 
 def _bundle(entry: Path, out: Path, folder: Path) -> None:

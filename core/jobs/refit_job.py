@@ -10,6 +10,7 @@ import numpy as np
 from ..concurrency.background import in_background
 from ..concurrency.job import Job, Step, finished
 from ..concurrency.steps import relayed
+from ..diagnose.correction.highlight_deconvolution import widens_highlights
 from ..diagnose.correction.sample_correction import CorrectedSamples, correct_samples
 from ..diagnose.correction.sample_pixels import pixels_of_samples
 from ..diagnose.effects.base.capabilities import NeedsPhoto, WidensHighlights
@@ -193,7 +194,7 @@ class RefitJob(Job):
                 f"samples that can be corrected: {count}; expected at least {MIN_SAMPLES}"
             )
         start, share = start + CORRECTION_SHARE * share, (1 - CORRECTION_SHARE) * share
-        wide = any(isinstance(effect, WidensHighlights) for effect in model.effects)
+        wide = widens_highlights(model)
         filled = _clipping_warnings(found.table)
         if not wide and not found.table.read.all():
             # the photos say how bright these are at least; the estimator does the rest
@@ -239,8 +240,8 @@ class RefitJob(Job):
     ) -> Generator[Step, None, CorrectedSamples]:
         before, setting = finished(self.checked.result), finished(self.checked.context)
         tilt = float(np.radians(normal_deviation(before)))
-        wide = any(isinstance(effect, WidensHighlights) for effect in model.effects)
-        correcting = correct_samples(table, pixels, model, setting, tilt, impute=wide)
+        impute = widens_highlights(model)
+        correcting = correct_samples(table, pixels, model, setting, tilt, impute=impute)
         return (yield from relayed(correcting, lambda _: step))
 
     def _corrected_limits(
@@ -248,8 +249,7 @@ class RefitJob(Job):
     ) -> Generator[Step, None, SampleTable | None]:
         """The clipped samples of a material, corrected; None where there are none, or where an
         effect widens highlights: a limit then says nothing about the BRDF of a small lamp."""
-        wide = any(isinstance(effect, WidensHighlights) for effect in model.effects)
-        if wide or not len(clipped):
+        if widens_highlights(model) or not len(clipped):
             return None
         pixels = yield from self._sample_pixels(index, clipped, model, step)
         return (yield from self._corrected_samples(clipped, pixels, model, step)).table

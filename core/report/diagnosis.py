@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from ..diagnose.assessment.assessment import Assessment
-from ..diagnose.assessment.scan_rating import ScanRating, rated_figures
+from ..diagnose.assessment.scan_rating import rated_figures
 from ..diagnose.effects.actions import ACTIONS
 from ..diagnose.effects.labels import ORIGINS, cause_label, origin_of
 from ..diagnose.forward.diagnosis_context import DiagnosisContext
 from ..diagnose.selection.diagnosis import Diagnosis, Trial
 from ..diagnose.selection.residual_trends import Trend, coordinates, trend
 from ..diagnose.selection.scan_quality import ScanQuality
+from ..fit.fit_quality import Rating
 from ..jobs import CaptureResult
 from ..photo import write_png
 from ..viewer.page import FILE_NAME, has_program
@@ -95,7 +96,7 @@ def _scan_quality(quality: ScanQuality) -> str:
     rows = ""
     for figure in rated_figures(quality.figures()):
         rating = figure.rating.value
-        remedy = "" if figure.rating is ScanRating.GOOD else f"<br>{escape(figure.remedy)}."
+        remedy = "" if figure.rating is Rating.GOOD else f"<br>{escape(figure.remedy)}."
         rows += (
             f"<li class='{rating}'>{figure.label} {figure.value} ({rating}): "
             f"{escape(figure.meaning)}{remedy}</li>"

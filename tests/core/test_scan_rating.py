@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from patina.core.diagnose.assessment.scan_rating import ScanRating, rated_figures
+from patina.core.diagnose.assessment.scan_rating import rated_figures
 from patina.core.diagnose.selection import unusual_scan
 from patina.core.diagnose.selection.scan_quality import ScanQuality
+from patina.core.fit.fit_quality import Rating
 
 
 @pytest.mark.parametrize(
@@ -30,4 +31,4 @@ def test_poor_is_what_the_check_names() -> None:
     )
     for factor, poor in ((0.999, False), (1.001, True)):
         figures = rated_figures(ScanQuality(*(factor * limit for limit in limits), None).figures())
-        assert [figure.rating is ScanRating.POOR for figure in figures] == [poor] * 3
+        assert [figure.rating is Rating.POOR for figure in figures] == [poor] * 3

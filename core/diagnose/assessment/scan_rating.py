@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum
 from typing import Any
 
+from ...fit.fit_quality import Rating
 from ..selection.scan_quality import (
     GOOD_MATERIAL,
     GOOD_NORMALS,
@@ -17,14 +17,6 @@ from ..selection.scan_quality import (
 )
 
 
-class ScanRating(Enum):
-    """A word for one figure."""
-
-    GOOD = "good"
-    FAIR = "fair"
-    POOR = "poor"
-
-
 @dataclass(frozen=True)
 class RatedFigure:
     """One figure of the quality of a scan. label: its name. value: it with its unit. meaning: what
@@ -32,7 +24,7 @@ class RatedFigure:
 
     label: str
     value: str
-    rating: ScanRating
+    rating: Rating
     meaning: str
     remedy: str
 
@@ -73,8 +65,8 @@ def rated_figures(quality: Mapping[str, Any]) -> list[RatedFigure]:
     return found
 
 
-def _rated(value: float, good: float, unusual: float) -> ScanRating:
+def _rated(value: float, good: float, unusual: float) -> Rating:
     """The rating of a figure that is better the smaller it is."""
     if value <= good:
-        return ScanRating.GOOD
-    return ScanRating.FAIR if value <= unusual else ScanRating.POOR
+        return Rating.GOOD
+    return Rating.FAIR if value <= unusual else Rating.POOR

@@ -145,14 +145,14 @@ def _correct_chunk(
     with np.errstate(divide="ignore", invalid="ignore"):  # not used where ``good`` is false
         arrived = entering + (table.radiance - recorded) / response
     at = np.where(clipped, plateau, np.inf)
-    if impute:
-        drawn = impute_clipped(model, now, added, at, arrived, tilt)
+    if not impute:
+        beyond_plateau = np.maximum(at - added, 0)
     else:
-        drawn = np.where(clipped, np.maximum(at - added, 0), 0)
-    if impute and widens_highlights(model):  # the imputed radiance is of a point lamp and isotropic
-        point = model.brdfs.reflected(replace(now, stretch=None))
-        drawn *= reflected / np.maximum(point, 1e-30)
-    radiance = np.where(clipped, drawn, arrived - added)
+        beyond_plateau = impute_clipped(model, now, added, at, arrived, tilt)
+        if widens_highlights(model):  # the imputed radiance is of a point lamp and isotropic
+            point = model.brdfs.reflected(replace(now, stretch=None))
+            beyond_plateau *= reflected / np.maximum(point, 1e-30)
+    radiance = np.where(clipped, beyond_plateau, arrived - added)
     # radiance is the recorded value divided by the response; an imputed value keeps its variance
     divisor = np.where(clipped | (response <= 0), 1.0, response)
     response = np.where(clipped, 0, response)
