@@ -210,8 +210,7 @@ class FitJob(Job):
         known = lights.known and capture.fit.absolute
         taken = yield from self._take_samples(scan, rays, photos, lights)
         counts = [int(taken.counts[material.name].sum()) for material in capture.materials]
-        tables = [taken.kept.pop(material.name).table() for material in capture.materials]
-        clipped = [taken.clipped.pop(material.name).table() for material in capture.materials]
+        tables, clipped = taken.tables([material.name for material in capture.materials])
         comparing = Step("comparing the axes of the mesh", self._times.sampled)
         try:
             check_light(capture, taken)

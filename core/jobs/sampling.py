@@ -48,10 +48,10 @@ class PhotoSamples:
     """The samples of all photos.
 
     kept: a uniform random subset of each material's samples. clipped: the same of its clipped
-    samples (clipped.clipped_rows). counts: {material: (photos,) number
-    of samples}. marked: {material: number of surface pixels that its masks mark}. votes: material
-    votes of the faces, empty where there is one material. notes: {sentence: number of photos it
-    applies to}. seen, lit: (photos,) pixels that see the surface, and those of them in the light.
+    samples (clipped.clipped_rows). counts: {material: (photos,) number of samples}. marked:
+    {material: number of surface pixels that its masks mark}. votes: material votes of the faces,
+    empty where there is one material. notes: {sentence: number of photos it applies to}. seen, lit:
+    (photos,) pixels that see the surface, and those of them in the light.
     """
 
     kept: dict[str, SampleReservoir]
@@ -62,6 +62,16 @@ class PhotoSamples:
     seen: NDArray[np.int64]
     lit: NDArray[np.int64]
     notes: Counter[str] = field(default_factory=Counter)
+
+    def tables(self, names: Sequence[str]) -> tuple[list[SampleTable], list[SampleTable]]:
+        """(the samples of each named material, its clipped samples, thinned as these are). They are
+        taken out of the reservoirs, to free memory."""
+        measured, clipped = [], []
+        for name in names:
+            kept = self.kept.pop(name)
+            measured.append(kept.table())
+            clipped.append(self.clipped.pop(name).table(like=kept))
+        return measured, clipped
 
 
 @dataclass(frozen=True)

@@ -104,12 +104,20 @@ class SampleReservoir:
         if self._pending > self.size:
             self._prune()
 
-    def table(self) -> SampleTable:
-        """The samples that were kept, in the order of photo and pixel."""
+    def table(self, like: SampleReservoir | None = None) -> SampleTable:
+        """The samples that were kept, in the order of photo and pixel.
+
+        like: a reservoir of other samples of the same photos, whose own table was made before; only
+        those that it would keep too are returned. So both are thinned alike, and a small region of
+        angles has both kinds of samples in the proportion of its pixels.
+        """
         if not self._parts:
             return SampleTable.empty()
         self._prune()
         found = SampleTable.concatenate(self._parts)
+        if like is not None:
+            number = np.concatenate(self._hashes)
+            found = found.select(np.flatnonzero(number <= like._limits.take(found.photo)))
         kept = np.bincount(found.photo, minlength=len(self._counts))
         each = (self._counts / np.maximum(kept, 1)).astype(np.float32)
         found = replace(found, weight=found.weight * each.take(found.photo))

@@ -27,6 +27,13 @@ def typical_parameters(seen: Observations, parameters: NDArray[np.float32]) -> N
     return np.asarray(np.median(parameters[np.unique(seen.node)], axis=0), np.float32)
 
 
+def sampling_step(count: int) -> int:
+    """The step of a regular subset of ``count`` observations with at most MAX_SAMPLES. Measured and
+    clipped observations of a fit need one step: their numbers in a cell say how much of it is
+    clipped."""
+    return max(-(-count // MAX_SAMPLES), 1)
+
+
 def typical_samples(
     model: NodeModel,
     seen: Observations,
@@ -34,12 +41,12 @@ def typical_samples(
     normals: NDArray[np.float32],
     parameters: NDArray[np.float32],
     typical: NDArray[np.float32],
+    step: int = 1,
 ) -> SampleTable:
     """Samples of the typical material, in the scale of ``model``. Clipped channels have response 0:
     their radiance is a lower limit. points, normals: (n, 3) of the nodes; parameters: (n, 10);
-    typical: (10,)."""
-    step = -(-len(seen) // MAX_SAMPLES)
-    some = seen.select(np.arange(0, len(seen), max(step, 1)))
+    typical: (10,); step: every so many of the observations are converted."""
+    some = seen.select(np.arange(0, len(seen), step))
     own = parameters[some.node]
     typical = np.tile(typical, (len(own), 1))
     typical[:, TILT] = own[:, TILT]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,10 +21,11 @@ from patina.core.geometry import RayScene
 from patina.core.inputs import capture_data
 from patina.core.inputs.lights import find_lights
 from patina.core.inputs.photos import LitPhotos
-from patina.core.jobs import FitJob
+from patina.core.jobs import FitJob, sampling
 from patina.core.jobs.sampling import take_samples
 from patina.core.samples import SampleTable
 from patina.core.samples.clipped import WHITE_MARGIN, White
+from patina.core.samples.reservoir import SampleReservoir
 from tests import make_capture as made
 
 WHITE = 1.2  # radiance at which the photos are clipped; the highlights reach 2.5
@@ -53,6 +55,28 @@ def tables(path: Path) -> tuple[SampleTable, SampleTable]:
     taken = drained(take_samples(capture, scan, RayScene.build(scan.mesh), photos, lights))
     (name,) = taken.kept
     return taken.kept[name].table(), taken.clipped[name].table()
+
+
+def test_clipped_samples_are_thinned_as_the_measured_ones_are(path, tables, monkeypatch) -> None:
+    """A capture of more samples than are kept: the fraction of clipped ones in each photo stays,
+    and every kept clipped sample represents as many pixels as a measured one."""
+    measured, clipped = tables
+    few = partial(SampleReservoir, size=len(measured) // 10)
+    monkeypatch.setattr(
+        sampling,
+        "SampleReservoir",
+        lambda count, size=None: few(count) if size is None else SampleReservoir(count, size),
+    )
+    capture = read_capture(path)
+    scan = capture_data.open_scan(capture)
+    photos = LitPhotos.open(capture)
+    lights = find_lights(capture, scan, photos)
+    taken = drained(take_samples(capture, scan, RayScene.build(scan.mesh), photos, lights))
+    (kept,), (limits,) = taken.tables(list(taken.kept))
+    assert len(kept) < 0.11 * len(measured)
+    assert len(limits) / len(clipped) == pytest.approx(len(kept) / len(measured), rel=0.3)
+    assert limits.weight.sum() == pytest.approx(clipped.weight.sum(), rel=0.01)
+    assert np.median(limits.weight) == pytest.approx(np.median(kept.weight), rel=0.3)
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from ...concurrency.background import in_background
 from ...concurrency.job import Step
 from ...samples import SampleTable
 from ...varying.choice import Nodes
-from ...varying.conversion import typical_parameters, typical_samples
+from ...varying.conversion import sampling_step, typical_parameters, typical_samples
 from ...varying.corrected_observations import ObservationCorrection
 from ...varying.labels import PackedLabels
 from ...varying.node_model import COUNT
@@ -127,9 +127,10 @@ class VariationEstimator:
 
         def converted() -> tuple[SampleTable, SampleTable | None]:
             typical = typical_parameters(exact, fields.parameters)
+            step = sampling_step(len(seen))
             tables = [
                 typical_samples(
-                    model, some, nodes.points, nodes.normals, fields.parameters, typical
+                    model, some, nodes.points, nodes.normals, fields.parameters, typical, step
                 )
                 for some in (exact, clipped)
                 if len(some)
