@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from patina.core.basis import default_basis
+from patina.core.export.subject import Subject
+from patina.core.result import read_result
 
 BRONZE, FABRIC, ACRYLIC = 0, 4, 10  # indices in the training set of the embedded basis
 PRINCIPLED = {
@@ -76,3 +78,8 @@ def two_materials(folder: Path) -> Path:
             material("old rug", FABRIC),
         ),
     )
+
+
+def subjects(folder: Path) -> list[Subject]:
+    """The materials of a result folder, to be exported."""
+    return [Subject(material) for material in read_result(folder).materials]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cube_root import NODES, Evaluate, Target
-from .principled import Configuration
+from .layered_model import Configuration
 from .random_light import Pictures
 
 Array = NDArray[np.floating]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..angles import Angles, cosines, light_view
 from ..errors import FitError
-from .principled import Configuration
+from .layered_model import Configuration
 
 Array = NDArray[np.floating]
 Evaluate = Callable[[Angles], Array]

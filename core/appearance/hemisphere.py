@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..angles import Angles, half_difference
 from ..angles.vectors import dot
-from .principled import Configuration
+from .layered_model import Configuration
 
 Array = NDArray[np.floating]
 

@@ -11,9 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .layered_model import Configuration
 from .lobe_stack import Lobe, LobeStack, albedo_fit, blending
 from .oren_nayar import oren_nayar
-from .principled import MIN_ROUGHNESS, Configuration
+from .principled import MIN_ROUGHNESS
 
 Array = NDArray[np.floating]
 

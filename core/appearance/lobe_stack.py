@@ -22,8 +22,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from .layered_model import Configuration, LayeredModel
 from .oren_nayar import oren_nayar
-from .principled import Configuration, LayeredModel
 
 Array = NDArray[np.floating]
 

@@ -2,8 +2,9 @@
 
 Single scattering: Fujii 2012, "Improved Oren-Nayar" (A and B, no trigonometric functions). Multiple
 scattering: OpenPBR's energy-preserving term, separable and reciprocal. Cycles 4.3 and later compute
-this model (4.2 has no multiple scattering; EEVEE renders every diffuse surface as Lambertian).
-Tests in tests/wheel compare it with renders.
+this model (4.2 has no multiple scattering; EEVEE renders every diffuse surface as Lambertian), but
+multiply the second term by the colour once more than MaterialX's shaders do. Tests in tests/wheel
+compare it with renders, tests/browser/test_materialx.py with MaterialX.
 """
 
 from __future__ import annotations
@@ -15,8 +16,15 @@ Array = NDArray[np.floating]
 SMOOTH = 1e-5  # roughness below which Cycles renders a Lambertian surface
 
 
-def oren_nayar(color: Array, roughness: float, cos_i: Array, cos_o: Array, cos_io: Array) -> Array:
-    """f (..., 3) in 1/sr.
+def oren_nayar(
+    color: Array,
+    roughness: float,
+    cos_i: Array,
+    cos_o: Array,
+    cos_io: Array,
+    as_materialx: bool = False,
+) -> Array:
+    """f (..., 3) in 1/sr, as Cycles or MaterialX computes it.
 
     color: (3,) or (..., 3) linear RGB; roughness in [0, 1]; cos_i, cos_o: light and view against
     the normal; cos_io: light against view, all of one shape (...). Undefined below the horizon.
@@ -34,7 +42,8 @@ def oren_nayar(color: Array, roughness: float, cos_i: Array, cos_o: Array, cos_i
     albedo = np.clip(color, 0, 1)
     many = albedo**2 / np.pi * (mean / (1 - mean)) / (1 - albedo * (1 - mean))
     lost = (1 - _albedo(a, b, cos_i)) * (1 - _albedo(a, b, cos_o))
-    return color * ((a + b * t)[..., None] + lost[..., None] * many)
+    single, multiple = (a + b * t)[..., None] * color, lost[..., None] * many
+    return np.asarray(single + (multiple if as_materialx else multiple * color))
 
 
 def _albedo(a: float, b: float, cos: Array) -> Array:

@@ -9,14 +9,11 @@ scattering (distribution 'MULTI_GGX').
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..angles import Angles, light_view
 from .layer_albedo import (
     f0_from_ior,
     fresnel_dielectric,
@@ -24,28 +21,12 @@ from .layer_albedo import (
     rescaled_albedo,
     rescaled_fresnel,
 )
+from .layered_model import Configuration, LayeredModel
 from .oren_nayar import oren_nayar
 
 Array = NDArray[np.floating]
 # below it Cycles 4.2 treats the lobe as a mirror and does not evaluate it (its test: α² > 5e-7)
 MIN_ROUGHNESS = 0.03
-
-
-class LayeredModel(ABC):
-    """A BRDF of layers; not reciprocal, so light and view are not interchangeable."""
-
-    def evaluate(self, angles: Angles) -> Array:
-        """f (..., 3) in 1/sr at half/difference angles (radians) of any shape."""
-        light, view = light_view(*angles)
-        return self.reflectance(light, view)
-
-    def reflectance(self, light: Array, view: Array) -> Array:
-        """f (..., 3) in 1/sr for unit vectors (..., 3) in a frame whose z is the normal."""
-        return self.at(Configuration.of(light, view))
-
-    @abstractmethod
-    def at(self, where: Configuration) -> Array:
-        """f (..., 3) in 1/sr."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +65,9 @@ class Principled(LayeredModel):
         lobe = where.ggx(self.roughness)
         tint = np.asarray(self.specular_tint, float)
         if self.metallic > 0:
-            fresnel_f82 = _f82(where.cos_d, np.clip(self.base_color, 0, 1), np.minimum(tint, 1.0))
+            fresnel_f82 = f82_fresnel(
+                where.cos_d, np.clip(self.base_color, 0, 1), np.minimum(tint, 1.0)
+            )
             total += self.metallic * below * lobe[..., None] * fresnel_f82
             below = below * (1.0 - self.metallic)
         if self.metallic < 1:
@@ -118,72 +101,7 @@ class Principled(LayeredModel):
         return specular + np.clip(1.0 - brightest, 0.0, 1.0)[..., None] * diffuse
 
 
-@dataclass(frozen=True)
-class Configuration:
-    """Pairs of directions, reduced to cosines of one shape: light, view and half vector against the
-    normal (i, o, h), and light against half vector (d)."""
-
-    cos_i: Array
-    cos_o: Array
-    cos_h: Array
-    cos_d: Array
-
-    @classmethod
-    def around(cls, normal: Array, light: Array, view: Array) -> Configuration:
-        """From unit vectors (..., 3) in any common frame."""
-        half = light + view
-        half = half / np.maximum(np.linalg.norm(half, axis=-1, keepdims=True), 1e-12)
-        cosines = [np.sum(a * b, axis=-1) for a, b in
-                   ((normal, light), (normal, view), (normal, half), (light, half))]  # fmt: skip
-        return cls(*np.broadcast_arrays(*cosines))
-
-    @classmethod
-    def of(cls, light: Array, view: Array) -> Configuration:
-        """From unit vectors (..., 3) in a frame whose z is the normal."""
-        light, view = np.broadcast_arrays(light, view)
-        half = light + view
-        half = half / np.maximum(np.linalg.norm(half, axis=-1, keepdims=True), 1e-12)
-        cos_d = np.einsum("...i,...i->...", light, half)
-        # copies: the last bits of some functions of a strided array depend on where in memory NumPy
-        # puts the result (a part beyond the array's end counts as overlap with it)
-        cos_i, cos_o, cos_h = (np.ascontiguousarray(v[..., 2]) for v in (light, view, half))
-        return cls(cos_i, cos_o, cos_h, cos_d)
-
-    def followed_by(self, other: Configuration) -> Configuration:
-        """Both sets of directions, one after the other."""
-        return Configuration(
-            *(
-                np.concatenate([getattr(part, name) for part in (self, other)])
-                for name in ("cos_i", "cos_o", "cos_h", "cos_d")
-            )
-        )
-
-    @property
-    def cos_io(self) -> Array:
-        """Light against view."""
-        return 2.0 * self.cos_d**2 - 1.0
-
-    @cached_property
-    def seen(self) -> NDArray[np.bool_]:
-        """Whether light and view are both above the horizon."""
-        return (self.cos_i > 0) & (self.cos_o > 0)
-
-    def ggx(self, roughness: float) -> Array:
-        """D·G₂/(4 cosθi cosθo) of the GGX distribution with α = roughness²."""
-        alpha2 = roughness**4
-        h2 = np.minimum(self.cos_h**2, 1.0)
-        d = alpha2 / (np.pi * (1.0 - h2 + alpha2 * h2) ** 2)
-        i, o = np.maximum(self.cos_i, 1e-6), np.maximum(self.cos_o, 1e-6)
-        smith = 1.0 + _lambda(alpha2, i) + _lambda(alpha2, o)
-        return d / (4.0 * i * o * smith)
-
-
-def _lambda(alpha2: float, cos: Array) -> Array:
-    """Smith's Λ for GGX (Heitz 2014, equation 72)."""
-    return 0.5 * (np.sqrt(1.0 + alpha2 * np.maximum(1.0 / cos**2 - 1.0, 0.0)) - 1.0)
-
-
-def _f82(cos_d: Array, f0: Array, tint: Array) -> Array:
+def f82_fresnel(cos_d: Array, f0: Array, tint: Array) -> Array:
     """F82-tint Fresnel (..., 3) of a metal (Kutz, Hašan, Edmondson 2021)."""
     s = np.clip(1.0 - cos_d, 0.0, 1.0)[..., None]
     f = 6.0 / 7.0  # cos 82° is 1/7, where the tint acts fully

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..angles import Angles, half_difference
 from ..errors import FitError
 from .cube_root import Evaluate
-from .principled import Configuration
+from .layered_model import Configuration
 
 Array = NDArray[np.floating]
 

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from ..angles import Angles, light_view
 from ..appearance.layer_albedo import f0_from_ior
-from ..appearance.principled import Configuration, Principled
+from ..appearance.layered_model import Configuration
+from ..appearance.principled import Principled
+from ..appearance.principled_fit import Interpretation
 
 Array = NDArray[np.floating]
 
@@ -27,9 +29,12 @@ COAT_F0 = 0.04  # KHR_materials_clearcoat fixes the index of refraction at 1.5
 
 
 def evaluate(principled: Principled, angles: Angles) -> Array:
-    """f (..., 3) in 1/sr of the exported file at half/difference angles, by the formulas of the
-    specification."""
-    where = Configuration.of(*light_view(*angles))
+    """f (..., 3) in 1/sr of the exported file at half/difference angles in radians."""
+    return at(principled, Configuration.of(*light_view(*angles)))
+
+
+def at(principled: Principled, where: Configuration) -> Array:
+    """f (..., 3) in 1/sr of the exported file, by the formulas of the specification."""
     color = np.clip(np.asarray(principled.base_color, float), 0, 1)
     s5 = np.clip(1.0 - where.cos_d, 0.0, 1.0)[..., None] ** 5
     lobe = where.ggx(principled.roughness)[..., None]
@@ -50,3 +55,6 @@ def evaluate(principled: Principled, angles: Angles) -> Array:
         base = base * (1.0 - principled.coat_weight * at_view)
         base = base + principled.coat_weight * coated * coat
     return np.where(where.seen[..., None], base, 0.0)
+
+
+GLTF = Interpretation(at, diffuse_roughness=False)

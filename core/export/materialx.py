@@ -1,7 +1,7 @@
-"""MaterialX 1.39 documents of a lobe stack and of a Principled BSDF, written as plain XML.
+"""MaterialX 1.39 documents of a lobe stack and of an OpenPBR surface, written as plain XML.
 
 Lobe stack: `oren_nayar_diffuse_bsdf` below `generalized_schlick_bsdf` lobes, combined by `layer`;
-colours that change towards grazing view are mixed by `facingratio`. Principled BSDF:
+colours that change towards grazing view are mixed by `facingratio`. OpenPBR:
 `open_pbr_surface`. Node definitions: the standard nodes, the physically based shading nodes and
 OpenPBR 1.1 of MaterialX 1.39. Writing needs no MaterialX package.
 """
@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET  # written, never read
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..appearance.lobe_stack import Lobe, LobeStack
-from ..appearance.principled import Principled
+from ..appearance.open_pbr.model import OpenPBR
 from ..files import atomic_path
 
 VERSION = "1.39"
@@ -112,25 +113,12 @@ def _add_lobe(root: ET.Element, stack: str, part: str, lobe: Lobe) -> str:
     return name
 
 
-def add_open_pbr(root: ET.Element, name: str, principled: Principled) -> str:
-    """Add the Principled BSDF as OpenPBR and a surfacematerial of this name; returns the name.
-
-    The inputs are mapped as by Blender's exporter: specular_weight is twice the Specular IOR Level.
-    """
+def add_open_pbr(root: ET.Element, name: str, surface: OpenPBR) -> str:
+    """Add an OpenPBR surface and a surfacematerial of this name; returns the name."""
     node = _node(root, "open_pbr_surface", f"{name}_surface", "surfaceshader")
-    _input(node, "base_weight", "float", 1.0)
-    _input(node, "base_color", "color3", np.clip(principled.base_color, 0, 1))
-    _input(node, "base_diffuse_roughness", "float", principled.diffuse_roughness)
-    _input(node, "base_metalness", "float", principled.metallic)
-    _input(node, "specular_weight", "float", 2.0 * principled.specular_ior_level)
-    _input(node, "specular_color", "color3", principled.specular_tint)
-    _input(node, "specular_roughness", "float", principled.roughness)
-    _input(node, "specular_ior", "float", principled.ior)
-    _input(node, "coat_weight", "float", principled.coat_weight)
-    _input(node, "coat_color", "color3", principled.coat_tint)
-    _input(node, "coat_roughness", "float", principled.coat_roughness)
-    _input(node, "coat_ior", "float", principled.coat_ior)
-    _input(node, "coat_darkening", "float", 0.0)  # Blender's coat does not darken the layers below
+    for field in fields(surface):
+        value = getattr(surface, field.name)
+        _input(node, field.name, "color3" if np.ndim(value) else "float", value)
     return _add_material(root, name, f"{name}_surface")
 
 

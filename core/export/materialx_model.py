@@ -13,16 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import Angles, light_view
+from ..appearance.layered_model import Configuration
 from ..appearance.lobe_stack import LobeStack, albedo_fit, blended
 from ..appearance.oren_nayar import oren_nayar
-from ..appearance.principled import Configuration
 
 Array = NDArray[np.floating]
 
 
 def evaluate(stack: LobeStack, angles: Angles) -> Array:
     """f (..., 3) in 1/sr at half/difference angles (radians) of any shape."""
-    where = Configuration.of(*light_view(*angles))
+    return at(stack, Configuration.of(*light_view(*angles)))
+
+
+def at(stack: LobeStack, where: Configuration) -> Array:
+    """f (..., 3) in 1/sr."""
     total = np.zeros((*where.cos_i.shape, 3))
     below = np.ones((*where.cos_i.shape, 1))
     for lobe in stack.lobes:
@@ -34,5 +38,12 @@ def evaluate(stack: LobeStack, angles: Angles) -> Array:
         reflected = (lobe.albedo(where.cos_o) * more).mean(axis=-1, keepdims=True)
         below = below * (1.0 - reflected)
     color = blended(where.cos_o, stack.diffuse, stack.diffuse_mid, stack.diffuse_edge)
-    base = oren_nayar(color, stack.diffuse_roughness, where.cos_i, where.cos_o, where.cos_io)
+    base = oren_nayar(
+        color,
+        stack.diffuse_roughness,
+        where.cos_i,
+        where.cos_o,
+        where.cos_io,
+        as_materialx=True,
+    )
     return np.where(where.seen[..., None], total + below * base, 0.0)

@@ -19,7 +19,7 @@ SPECTRAL = (
 
 def write_mtlx(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
     """Write NAME.mtlx with the surfacematerials NAME (lobe stack), NAME_plain (only if the colours
-    of the stack change towards grazing view) and NAME_openpbr (the Principled BSDF)."""
+    of the stack change towards grazing view) and NAME_openpbr (OpenPBR)."""
     losses = []
     for subject in subjects:
         root = materialx.document()
@@ -35,10 +35,9 @@ def write_mtlx(folder: Path, subjects: Sequence[Subject]) -> list[Loss]:
             errors[f"{what}, by MaterialX's own shaders"] = subject.error(shown)
             errors[f"{what}, as Blender has it"] = subject.error(stack.evaluate)
         name = f"{subject.id}_openpbr"
-        materialx.add_open_pbr(root, name, subject.material.principled)
-        errors[f"{name}, taken for Blender's Principled"] = subject.error(
-            subject.material.principled.evaluate
-        )
+        surface = subject.open_pbr.surface
+        materialx.add_open_pbr(root, name, surface)
+        errors[f"{name}, by MaterialX's own shaders"] = subject.error(surface.evaluate)
         file = f"{subject.id}.mtlx"
         materialx.write(folder / file, root)
         losses.append(

@@ -6,11 +6,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ..appearance.lobe_fit import LobeStackFit, fit_lobe_stack
+from ..appearance.open_pbr.fit import OpenPBRFit, fit_open_pbr
+from ..appearance.principled_fit import PrincipledFit, fit_principled
 from ..brdf import TabulatedBRDF
 from ..result import FittedMaterial
 from .file_names import identifier
+from .gltf_model import GLTF
 from .losses import Evaluate, cube_root_error
 from .measured_bsdf import MeasuredPictures, pictures
+from .preview_surface import PREVIEW_SURFACE
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,21 @@ class Subject:
     def lobes(self) -> LobeStackFit:
         """The best-fitting lobe stacks."""
         return fit_lobe_stack(self.material.brdf.evaluate)
+
+    @cached_property
+    def open_pbr(self) -> OpenPBRFit:
+        """The closest OpenPBR surface."""
+        return fit_open_pbr(self.material.brdf.evaluate, self.material.principled)
+
+    @cached_property
+    def gltf(self) -> PrincipledFit:
+        """The inputs of the Principled BSDF that are closest in glTF viewers."""
+        return fit_principled(self.material.brdf.evaluate, shown=GLTF)
+
+    @cached_property
+    def preview_surface(self) -> PrincipledFit:
+        """The inputs of the Principled BSDF that are closest as a UsdPreviewSurface."""
+        return fit_principled(self.material.brdf.evaluate, shown=PREVIEW_SURFACE)
 
     @cached_property
     def pictures(self) -> MeasuredPictures:

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..angles import Angles, half_difference
+from ..appearance.layered_model import Configuration
 from ..appearance.lobe_stack import LobeStack
-from ..appearance.principled import Configuration, Principled
+from ..appearance.principled import Principled
 from ..photo import write_png
 from . import display
 

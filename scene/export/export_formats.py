@@ -13,13 +13,15 @@ from ...core.export import Loss, gltf_model, preview_surface
 from ...core.export.dropped import dropped_inputs
 from ...core.export.subject import Subject
 from ...core.result import FittedResult
-from ..material.material_nodes import osl_missing
+from ..material.map_nodes import principled_nodes
+from ..material.material_nodes import fill_principled, osl_missing
 from . import export_scene
 from .export_blend import write_blend
 from .export_gltf import write_glb
+from .export_scene import as_fitted, materials_by_name
 from .export_usd import check_usd, write_usd
+from .usd_surfaces import UsdSurfaces, replace_surfaces
 
-OPEN_PBR_SINCE = (5, 0, 0)
 SCAN, PREVIEW = "scan", "materials"  # stems of the file names
 BEYOND_PRINCIPLED = "everything of the fitted BRDF that one Principled BSDF cannot represent"
 
@@ -58,19 +60,25 @@ def to_gltf(
 ) -> list[Loss]:
     """Write scan.glb with the scan's mesh, or materials.glb with a preview sphere per material."""
     objects, stem = _objects(result, subjects)
+    fitted = fitted_materials(objects, subjects)
+    for subject in subjects:
+        for node in principled_nodes(fitted[subject.name]) if subject.name in fitted else ():
+            fill_principled(node, subject.gltf.principled)
     write_glb(folder / f"{stem}.glb", objects)
     losses = []
     for subject in subjects:
-        principled = subject.material.principled
-        held = partial(gltf_model.evaluate, principled)
+        own = subject.material.principled
+        principled = subject.gltf.principled if subject.name in fitted else own
         losses.append(
             Loss(
                 "gltf",
                 subject.name,
                 (f"{stem}.glb",),
                 {
-                    "metallic-roughness with KHR extensions": subject.error(held),
-                    "the Principled BSDF it was made of": subject.error(principled.evaluate),
+                    "metallic-roughness with KHR extensions": subject.error(
+                        partial(gltf_model.evaluate, principled)
+                    ),
+                    "the Principled BSDF in Blender": subject.error(own.evaluate),
                 },
                 dropped=(*dropped_inputs(principled, gltf_model.DROPPED), BEYOND_PRINCIPLED),
                 notes=subject.scale_note,
@@ -86,17 +94,31 @@ def to_usd(
     material."""
     check_usd()
     objects, stem = _objects(result, subjects)
-    with_materialx = write_usd(folder / f"{stem}.usdc", objects)
+    file = folder / f"{stem}.usdc"
+    with_materialx = write_usd(file, objects)
+    fitted = fitted_materials(objects, subjects)
+    replaced = replace_surfaces(
+        file,
+        {
+            fitted[s.name].name: UsdSurfaces(s.preview_surface.principled, s.open_pbr.surface)
+            for s in subjects
+            if s.name in fitted
+        },
+    )
     losses = []
     for subject in subjects:
-        principled = subject.material.principled
-        preview = subject.error(partial(preview_surface.evaluate, principled))
-        whole = subject.error(principled.evaluate)
-        lost = dropped_inputs(principled, preview_surface.DROPPED)
-        errors = {"UsdPreviewSurface": preview}
-        if with_materialx:
-            surface = "OpenPBR" if bpy.app.version >= OPEN_PBR_SINCE else "its surface"
-            errors = {f"MaterialX ({surface}, taken for the Principled)": whole, **errors}
+        name = fitted[subject.name].name if subject.name in fitted else None
+        own = subject.material.principled
+        shown = subject.preview_surface.principled if name in replaced.preview else own
+        errors = {}
+        if name in replaced.open_pbr:
+            errors["MaterialX (OpenPBR)"] = subject.error(subject.open_pbr.surface.evaluate)
+        elif with_materialx:
+            errors["MaterialX (its surface, taken for the Principled)"] = subject.error(
+                own.evaluate
+            )
+        errors["UsdPreviewSurface"] = subject.error(partial(preview_surface.evaluate, shown))
+        lost = dropped_inputs(shown, preview_surface.DROPPED)
         notes = () if with_materialx else ("this version of Blender writes no MaterialX into USD",)
         losses.append(
             Loss(
@@ -109,6 +131,15 @@ def to_usd(
             )
         )
     return losses
+
+
+def fitted_materials(
+    objects: Sequence[bpy.types.Object], subjects: Sequence[Subject]
+) -> dict[str, bpy.types.Material]:
+    """The materials of the objects that still have the fitted values, by name."""
+    found = materials_by_name(objects, [subject.name for subject in subjects])
+    fitted = {subject.name: subject.material.principled for subject in subjects}
+    return {name: m for name, m in found.items() if as_fitted(m, fitted[name])}
 
 
 def _objects(result: FittedResult, subjects: Sequence[Subject]) -> tuple[list, str]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from pathlib import Path
 
 import bpy
 
+from ...core.appearance.principled import Principled
 from ...core.appearance.principled_fit import PrincipledFit
 from ...core.export.subject import Subject
 from ..material import material_nodes, osl_files
+from ..material.map_nodes import NORMAL, principled_nodes
 from ..material.preview import show_sphere
 from ..paint.mesh_paint import COLOUR_ATTRIBUTE
 from ..property_keys import EVIDENCE_COLOURS, MEASURED_NAME, VARIATION_COLOURS
@@ -105,6 +107,31 @@ def create_materials(
             show_sphere(material, item.brdf)
         made.append(material)
     return made
+
+
+def materials_by_name(
+    objects: Sequence[bpy.types.Object], names: Container[str]
+) -> dict[str, bpy.types.Material]:
+    """The objects' measured materials by their names in the export, those of ``names`` only."""
+    found = {}
+    for material in {s.material for thing in objects for s in thing.material_slots if s.material}:
+        if MEASURED_NAME in material:
+            for name in (export_name(material), str(material[MEASURED_NAME])):
+                if name in names:
+                    found[name] = material
+                    break
+    return found
+
+
+def as_fitted(material: bpy.types.Material, fitted: Principled) -> bool:
+    """Whether a material's Principled nodes have the fitted values: no maps on their inputs, and no
+    values changed by hand, which an export has to keep."""
+    for node in principled_nodes(material):
+        if any(socket.is_linked for socket in node.inputs if socket.name != NORMAL):
+            return False
+        if not material_nodes.has_values(node, fitted):
+            return False
+    return True
 
 
 def preview_spheres(made: Sequence[bpy.types.Material]) -> list[bpy.types.Object]:

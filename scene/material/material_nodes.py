@@ -217,6 +217,18 @@ def fill_principled(node: bpy.types.Node, principled: Principled) -> None:
             node.inputs[socket].default_value = float(value)
 
 
+def has_values(node: bpy.types.Node, principled: Principled) -> bool:
+    """Whether the inputs of a Principled node are those of the fitted model, to the precision that
+    Blender stores."""
+    for field, socket in PRINCIPLED_SOCKETS.items():
+        expected = np.atleast_1d(getattr(principled, field))
+        if socket in node.inputs:
+            found = np.atleast_1d(node.inputs[socket].default_value)[: len(expected)]
+            if not np.allclose(found, expected, rtol=1e-5, atol=1e-6):
+                return False
+    return True
+
+
 def _osl_branch(
     tree: bpy.types.NodeTree,
     compiled: CompiledText,

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from patina.core.appearance.lobe_stack import Lobe, LobeStack, blended
-from patina.core.appearance.principled import Principled
+from patina.core.appearance.open_pbr.model import OpenPBR
 from patina.core.export import materialx
 
 PLAIN_STACK = LobeStack(
@@ -65,7 +65,7 @@ print(json.dumps([valid, message, undefined, unknown, graph]))
 def document(tmp_path: Path, stack: LobeStack = PLAIN_STACK) -> Path:
     root = materialx.document()
     materialx.add_lobe_stack(root, "gold", stack)
-    materialx.add_open_pbr(root, "gold_openpbr", Principled(coat_weight=0.3, metallic=0.2))
+    materialx.add_open_pbr(root, "gold_openpbr", OpenPBR(coat_weight=0.3, base_metalness=0.2))
     materialx.write(tmp_path / "gold.mtlx", root)
     return tmp_path / "gold.mtlx"
 

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from patina.core.angles import light_view
 from patina.core.appearance import lobe_model
 from patina.core.appearance.cube_root import COARSE, quadrature
+from patina.core.appearance.layered_model import Configuration
 from patina.core.appearance.lobe_fit import fit_lobe_stack
 from patina.core.appearance.lobe_stack import Lobe, LobeStack, albedo_fit
 from patina.core.appearance.oren_nayar import oren_nayar
-from patina.core.appearance.principled import Configuration
 
 GREY = np.full(3, 0.5)
 GLASS = Lobe(np.full(3, 0.04), np.ones(3), 0.3)

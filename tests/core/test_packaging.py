@@ -43,6 +43,7 @@ BLENDER = {
     "gpu_extras",
     "blf",
     "addon_utils",
+    "pxr",
 }
 # The tag list of the Blender extensions platform.
 TAGS = {

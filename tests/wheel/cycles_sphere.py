@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from patina.core.appearance.principled import Configuration
+from patina.core.appearance.layered_model import Configuration
 
 HALF_WIDTH = 1.05  # half width of the image, in radii
 

@@ -69,18 +69,37 @@ def test_glb_contains_fitted_parameters(glb: Path) -> None:
     document = read_glb(glb)
     materials = {m["name"]: m for m in document["materials"]}
     assert set(materials) == {"bronze", "old rug"}
-    bronze = materials["bronze"]["pbrMetallicRoughness"]
-    assert bronze["baseColorFactor"][:3] == pytest.approx([0.7, 0.5, 0.3], abs=1e-5)
-    assert bronze.get("metallicFactor", 1) == 1
-    assert bronze["roughnessFactor"] == pytest.approx(0.3, abs=1e-5)
-    rug = materials["old rug"]
-    assert rug["pbrMetallicRoughness"]["metallicFactor"] == 0
-    coat = rug["extensions"]["KHR_materials_clearcoat"]
-    assert coat["clearcoatFactor"] == pytest.approx(0.2, abs=1e-5)
-    assert coat["clearcoatRoughnessFactor"] == pytest.approx(0.1, abs=1e-5)
-    specular = rug["extensions"]["KHR_materials_specular"]
-    assert specular["specularFactor"] == pytest.approx(0.8, abs=1e-5)
+    for subject in made.subjects(glb.parents[1] / "result"):
+        expected, material = subject.gltf.principled, materials[subject.name]
+        shown = material["pbrMetallicRoughness"]
+        assert shown["baseColorFactor"][:3] == pytest.approx(expected.base_color, abs=1e-5)
+        assert shown.get("metallicFactor", 1) == pytest.approx(expected.metallic, abs=1e-5)
+        assert shown["roughnessFactor"] == pytest.approx(expected.roughness, abs=1e-5)
+        coat = material["extensions"].get("KHR_materials_clearcoat", {})
+        assert coat.get("clearcoatFactor", 0) == pytest.approx(expected.coat_weight, abs=1e-5)
     assert len(document["meshes"]) == 2 and not document.get("cameras")
     worn = {p["material"] for mesh in document["meshes"] for p in mesh["primitives"]}
     assert worn == {0, 1}
     assert "TEXCOORD_0" in document["meshes"][0]["primitives"][0]["attributes"]
+
+
+def test_values_changed_by_hand_are_kept(tmp_path: Path) -> None:
+    import bpy
+
+    from patina.scene.export.export_formats import fitted_materials
+    from patina.scene.export.export_scene import create_materials, new_scene, preview_spheres
+    from patina.scene.material.map_nodes import principled_nodes
+
+    subjects = made.subjects(made.two_materials(tmp_path / "result"))
+    new_scene()
+    materials = create_materials(subjects, whole=False)
+    objects = preview_spheres(materials)
+    assert set(fitted_materials(objects, subjects)) == {"bronze", "old rug"}
+    (node,) = principled_nodes(materials[0])
+    node.inputs["Roughness"].default_value += 0.01
+    assert set(fitted_materials(objects, subjects)) == {"old rug"}
+    image = materials[1].node_tree.nodes.new("ShaderNodeTexImage")
+    (node,) = principled_nodes(materials[1])
+    materials[1].node_tree.links.new(image.outputs["Color"], node.inputs["Base Color"])
+    assert not fitted_materials(objects, subjects)
+    bpy.ops.wm.read_homefile(use_empty=True)

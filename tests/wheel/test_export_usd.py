@@ -6,10 +6,12 @@ import importlib.util
 import json
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
+from patina.core.appearance.open_pbr.model import OpenPBR
 from tests import make_result as made
 
 pytestmark = pytest.mark.blender
@@ -81,28 +83,34 @@ def checker_output(root: Path, tmp_path_factory: pytest.TempPathFactory) -> list
         [sys.executable, "-c", CHECK, file], capture_output=True, text=True, timeout=120
     )
     assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1])
+    return [*json.loads(done.stdout.splitlines()[-1]), made.subjects(result)]
 
 
 def test_usdchecker_reports_no_issues(checker_output: list) -> None:
-    checked, issues, undefined, _, default = checker_output
+    checked, issues, undefined, _, default, _ = checker_output
     assert checked > 0 and default == "/root"
     ours = [x for x in issues if not (x[0] == "MissingShaderIdInRegistry" and "'ND_" in x[1])]
     assert ours == []
     assert not undefined  # None if the MaterialX package is not installed
 
 
-def test_usd_contains_both_materials(checker_output: list) -> None:
-    found = checker_output[3]
+def test_usd_contains_surfaces_fitted_for_it(checker_output: list) -> None:
+    found, subjects = checker_output[3], checker_output[5]
     assert set(found) == {"bronze", "old_rug"}
-    kind, inputs = found["old_rug"][""]
-    assert kind == "UsdPreviewSurface"
-    assert inputs["diffuseColor"] == pytest.approx([0.5, 0.25, 0.1], abs=1e-5)
-    assert inputs["clearcoat"] == pytest.approx(0.2, abs=1e-5)
     import bpy
 
-    if "generate_materialx_network" not in bpy.ops.wm.usd_export.get_rna_type().properties:
-        return
-    kind, inputs = found["old_rug"]["mtlx"]
-    assert kind in ("ND_open_pbr_surface_surfaceshader", "ND_standard_surface_surfaceshader")
-    assert inputs["coat_weight" if "open" in kind else "coat"] == pytest.approx(0.2, abs=1e-5)
+    for subject in subjects:
+        shown = found[subject.name.replace(" ", "_")]
+        kind, inputs = shown[""]
+        assert kind == "UsdPreviewSurface"
+        preview = subject.preview_surface.principled
+        assert inputs["diffuseColor"] == pytest.approx(preview.base_color, abs=1e-5)
+        assert inputs["clearcoat"] == pytest.approx(preview.coat_weight, abs=1e-5)
+        if "generate_materialx_network" not in bpy.ops.wm.usd_export.get_rna_type().properties:
+            continue
+        kind, inputs = shown["mtlx"]
+        assert kind in ("ND_open_pbr_surface_surfaceshader", "ND_standard_surface_surfaceshader")
+        if "open" in kind:
+            for field in fields(OpenPBR):
+                fitted = getattr(subject.open_pbr.surface, field.name)
+                assert inputs[field.name] == pytest.approx(fitted, abs=1e-5), field.name

@@ -1,4 +1,5 @@
-"""Errors of the portable models (Principled and lobe stack), compared with the table on spheres.
+"""Errors of the portable models (Principled, lobe stack, OpenPBR, glTF and UsdPreviewSurface),
+compared with the table on spheres.
 
 Every material is fitted like the result of a capture, but from its true BRDF, so that the errors
 are those of the model alone. Pictures are rendered under Blender's HDR worlds (sphere_light.py).
@@ -9,21 +10,24 @@ percentile of the true picture; a material has the median over the worlds.
 from __future__ import annotations
 
 import time
+from functools import partial
 
 import numpy as np
 
 from patina.core.appearance.lobe_fit import fit_lobe_stack
+from patina.core.appearance.open_pbr.fit import fit_open_pbr, from_principled
 from patina.core.appearance.principled import Principled
 from patina.core.appearance.principled_fit import fit_principled
+from patina.core.export.gltf_model import GLTF
+from patina.core.export.preview_surface import PREVIEW_SURFACE
 from patina.core.photo import write_png
 from patina.core.views.display import srgb
 
 from ..common import ROOT
-from . import materials, spheres
-from .free_sum import best_pictures
+from . import free_principled, free_sum, materials, spheres
 from .records import Record, table
 from .runs import Records
-from .sphere_light import lit
+from .sphere_light import At, lit
 
 IMAGES = "images/appearance"
 LARGE = 64  # diameter in pixels, in the pictures of the worst materials
@@ -32,12 +36,20 @@ WORST = 5
 BACKGROUND = 246  # 8-bit grey level behind the spheres
 MODELS = {
     "principled": "Principled",
+    "free_principled": "Principled, every input (bound)",
     "plain": "lobe stack, plain",
     "lobes": "lobe stack",
     "free": "any sum of closures (bound)",
+    "open_pbr": "OpenPBR",
+    "gltf": "glTF",
+    "preview": "UsdPreviewSurface",
     "lambertian": "best Lambertian",
 }
-METRIC = tuple(key for key in MODELS if key != "free")  # "free" has pictures only
+BY_MATERIAL = ("principled", "lobes", "free", "open_pbr", "gltf", "preview", "lambertian")
+METRIC = ("principled", "plain", "lobes", "open_pbr", "gltf", "preview", "lambertian")
+"""The models with a cube-root error; the bounds have pictures only."""
+TRANSLATED = {"open_pbr": "open_pbr_values", "gltf": "gltf_values", "preview": "preview_values"}
+"""Model → the same with the values of the Principled."""
 GOALS = {"principled": 38.0, "lobes": 42.0}  # dB, median over the materials
 
 
@@ -55,20 +67,35 @@ def work(name: str) -> Records:
     between = time.process_time()
     lobes = fit_lobe_stack(material.evaluate)
     ended = time.process_time()
+    fitted = principled.principled
+    open_pbr = fit_open_pbr(material.evaluate, fitted)
+    gltf, preview = (
+        fit_principled(material.evaluate, shown=shown) for shown in (GLTF, PREVIEW_SURFACE)
+    )
     grey = Principled(base_color=principled.lambertian, specular_ior_level=0.0)
-    models = {
-        "principled": (principled.principled, principled.error),
-        "plain": (lobes.plain, lobes.plain_error),
-        "lobes": (lobes.stack, lobes.error),
-        "lambertian": (grey, principled.diffuse_error),
+    models: dict[str, tuple[At, float | None]] = {
+        "principled": (fitted.at, principled.error),
+        "plain": (lobes.plain.at, lobes.plain_error),
+        "lobes": (lobes.stack.at, lobes.error),
+        "open_pbr": (open_pbr.surface.at, open_pbr.error),
+        "open_pbr_values": (from_principled(fitted).at, None),
+        "gltf": (partial(GLTF.at, gltf.principled), gltf.error),
+        "gltf_values": (partial(GLTF.at, fitted), None),
+        "preview": (partial(PREVIEW_SURFACE.at, preview.principled), preview.error),
+        "preview_values": (partial(PREVIEW_SURFACE.at, fitted), None),
+        "lambertian": (grey.at, principled.diffuse_error),
     }
     truth = lit().table(material.evaluate)
     found = {
-        key: {"error": error, "psnr": spheres.psnr(lit().model(model.at), truth).tolist()}
-        for key, (model, error) in models.items()
+        key: {"error": error, "psnr": spheres.psnr(lit().model(at), truth).tolist()}
+        for key, (at, error) in models.items()
     }
-    bound = spheres.psnr(best_pictures(truth), truth).tolist()
-    found["free"] = {"error": None, "psnr": bound}
+    bounds = {
+        "free": free_sum.best_pictures(truth),
+        "free_principled": free_principled.best_pictures(truth, fitted),
+    }
+    for key, pictures in bounds.items():
+        found[key] = {"error": None, "psnr": spheres.psnr(pictures, truth).tolist()}
     return [
         {
             "material": name,
@@ -98,6 +125,18 @@ def summary(records: list[Record]) -> str:
                 f"{100 * np.median(errors):.1f} %" if key in METRIC else "–",
             ]
         )
+        if key in TRANSLATED:
+            values = [_level(r, TRANSLATED[key]) for r in records]
+            rows.append(
+                [
+                    f"{label}, values of the Principled",
+                    f"{np.median(values):.1f} dB",
+                    "–",
+                    "–",
+                    f"{min(values):.1f} … {max(values):.1f} dB",
+                    "–",
+                ]
+            )
     head = ["model", "median PSNR", "goal", "materials that reach the goal", "range"]
     seconds = [np.median([r["seconds"][key] for r in records]) for key in ("principled", "lobes")]
     return (
@@ -113,12 +152,13 @@ def by_material(records: list[Record]) -> str:
     for r in sorted(records, key=lambda r: -_level(r, "lobes")):
         rows.append(
             [r["material"]]
-            + [f"{_level(r, key):.1f}" for key in MODELS]
-            + [f"{100 * r[key]['error']:.1f}" for key in METRIC]
+            + [f"{_level(r, key):.1f}" for key in BY_MATERIAL]
+            + [f"{100 * r[key]['error']:.1f}" for key in BY_MATERIAL if key in METRIC]
             + [str(r["lobe_count"])]
         )
-    head = ["material", *(f"{label}, dB" for label in MODELS.values())]
-    return table([*head, *(f"{MODELS[key]}, %" for key in METRIC), "lobes"], rows)
+    head = ["material", *(f"{MODELS[key]}, dB" for key in BY_MATERIAL)]
+    errors = (f"{MODELS[key]}, %" for key in BY_MATERIAL if key in METRIC)
+    return table([*head, *errors, "lobes"], rows)
 
 
 def worst(records: list[Record]) -> str:

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, nnls
 
+from patina.core.appearance.layered_model import Configuration
 from patina.core.appearance.lobe_stack import Lobe
 from patina.core.appearance.oren_nayar import oren_nayar
-from patina.core.appearance.principled import Configuration
 from patina.core.appearance.random_light import encoded
 
 from .sphere_light import lit

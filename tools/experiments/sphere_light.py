@@ -17,7 +17,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from patina.core.angles import Angles, half_difference
-from patina.core.appearance.principled import Configuration
+from patina.core.appearance.layered_model import Configuration
 
 from .spheres import Evaluate, worlds
 
@@ -50,6 +50,16 @@ class Lit:
         """Return the radiance (worlds, p, 3) of a model that is a function of a Configuration."""
 
         return self._sum(lambda rows: at(self._where(rows)))
+
+    def subset(self, pixels: NDArray[np.intp]) -> Lit:
+        """Return the pairs of some of the p pixels; ``inside`` stays that of all."""
+        return Lit(
+            self.inside,
+            Angles(*(a[pixels] for a in self.angles)),
+            self.cos_i[pixels],
+            self.cos_o[pixels],
+            self.light[:, pixels],
+        )
 
     def columns(self, terms: At) -> Floats:
         """Return the radiance (worlds, p, k, 3) of k reflectances; ``terms`` returns them as (n, k)
