@@ -62,6 +62,7 @@ __all__ = [
 # Every module that has something to register, in this order; unregistered in reverse order
 MODULES: tuple[str, ...] = (
     "panels.translations",
+    "panels.manual",
     "panels.preferences",
     "scene.session.scene_properties",
     "scene.session.session_state",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from . import viewer_program
+from . import manual, viewer_program
 from .blender import find_blender
 from .common import ROOT, Failure, megabytes, say
 from .environment import bpy_python
@@ -42,7 +42,8 @@ def main(arguments: Sequence[str]) -> int:
         "--raw", action="store_true", help="include camera RAW support (rawpy); write to dist/raw"
     )
     options = parser.parse_args(arguments)
-    viewer_program.build()  # a zip without the viewer must not be published
+    viewer_program.build()  # a zip without the viewer or the manual must not be published
+    manual.build()
     platforms, out = options.platform or PLATFORMS, DIST / "raw" if options.raw else DIST
     for archive in pack(extension_tool(), platforms, PYTHONS, out, options.raw):
         say(f"{archive.name}: {megabytes([archive])}, validated")
