@@ -17,6 +17,7 @@ from ..core.jobs.varying.variation_estimator import MODES
 from ..core.jobs.varying.varying_job import VaryingJob
 from ..core.output_folder import check_out, staged_folder
 from ..core.report import result_json, write_report
+from ..core.report.check_layers import check_layers
 from ..core.report.diagnosis_json import CheckRecord
 from ..core.report.figures import reach
 from ..core.report.held_out import varied_quality
@@ -86,7 +87,12 @@ def write_results(
             merl_file.write(folder / f"{material.name}.binary", material.fit.brdf.table())
     with timed(stages, "report", progress, 0.92):
         back = "" if report == "report" else "../index.html"
-        for _ in write_report(folder / report, result, back=back):
+        layers = (
+            check_layers(check.found, check.context, result.capture)
+            if check is not None and result.effects
+            else ()
+        )
+        for _ in write_report(folder / report, result, back=back, layers=layers):
             pass
     notes: Sequence[str] = ()
     if has_blender():

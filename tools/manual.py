@@ -1,7 +1,7 @@
 """Build the documentation site into assets/manual, where Blender's Online Manual finds it.
 
-The site is made for local files, and loads nothing from the network. It is not part of the repository; the zips
-of the extension contain it. Its packages are installed into the cache.
+The site is made for local files, and loads nothing from the network. It is not part of the
+repository; the zips of the extension contain it. Its packages are installed into the cache.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 from .bracket import Merged, merge_bracket
 from .clipping import black, clipped
 from .exif import Exif, read_exif
-from .image import image_size, read_encoded, read_mask, write_exr, write_png
+from .image import image_size, read_encoded, read_mask, write_exr, write_jpeg, write_png
 from .noise_estimate import estimate_noise
 from .photo import Photo, PhotoInfo, read_photo, read_radiance
 from .transfer import Transfer
@@ -25,5 +25,6 @@ __all__ = [
     "read_photo",
     "read_radiance",
     "write_exr",
+    "write_jpeg",
     "write_png",
 ]

@@ -24,6 +24,7 @@ from .per_file import once_per_file
 
 # fixed, so that the same pixels give the same bytes (by default the present time is written)
 FIXED_DATE = "2000:01:01 00:00:00"
+JPEG_QUALITY = 88  # of pictures in pages: no blocks are visible at the size of the picture
 ROWS = 256  # read at a time: whole chunks of every EXR compression
 MAX_CHANNELS = 256
 
@@ -206,6 +207,11 @@ def write_png(path: Path, pixels: NDArray[np.uint8]) -> None:
     _write(path, pixels, "uint8")
 
 
+def write_jpeg(path: Path, pixels: NDArray[np.uint8]) -> None:
+    """Write (h, w, 3) 8-bit display-encoded pixels with JPEG_QUALITY. Raises PatinaError."""
+    _write(path, pixels, "uint8")
+
+
 def _reason(source: Any) -> str:
     """The error message of OpenImageIO or one of its files, in one line; clears it."""
     try:
@@ -236,6 +242,8 @@ def _write(
     if path.suffix == ".exr":
         spec.attribute("compression", "zip")
         spec.attribute("DateTime", FIXED_DATE)
+    if path.suffix == ".jpg":
+        spec.attribute("compression", f"jpeg:{JPEG_QUALITY}")
     output = oiio.ImageOutput.create(str(path))
     if output is None:
         raise PatinaError(f"{path}: cannot write images of this kind ({oiio.geterror()})")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from html import escape
 from pathlib import Path
@@ -16,6 +16,8 @@ from ..fit.fit_quality import FitQuality
 from ..jobs import CaptureResult, MaterialResult
 from ..photo import write_png
 from ..samples import Criterion
+from ..viewer.page import FILE_NAME, has_program
+from ..viewer.photo_layers import DIFFERENCE, PHOTO, PREDICTION, PhotoLayers
 from ..views import photo_pictures, photo_view
 from ..views.criteria import LOOKS, Look
 from .held_out import varied_quality
@@ -33,11 +35,16 @@ PHOTOS_AT_ONCE = 2  # limits memory: each has a photo in its full size for a mom
 
 
 def write_report(
-    folder: Path, result: CaptureResult, threads: int | None = None, back: str = ""
+    folder: Path,
+    result: CaptureResult,
+    threads: int | None = None,
+    back: str = "",
+    layers: Sequence[PhotoLayers] = (),
 ) -> Iterator[float]:
     """Write index.html and its pictures into ``folder``; yields the fraction done. threads: None
     for one per core. back: the page of the check that this report is a part of, relative to the
-    folder."""
+    folder. layers: the photos of the viewer where the result takes causes into account; else they
+    are those of the report."""
     folder.mkdir(parents=True, exist_ok=True)
     photos = [result.capture.photo_name(place) for place in range(len(result.capture.photos))]
     sections: list[Callable[[], str | photo_view.PhotoView]] = [
@@ -48,7 +55,7 @@ def write_report(
     # the predictions use the light and camera of the capture, without the causes of a diagnosis
     if not result.effects:
         sections += [partial(_looked_at, result, place) for place in range(len(photos))]
-    body = [_summary(result, write_viewer_of(folder, result))]
+    body = [_summary(result, FILE_NAME if has_program() else None)]
     rows, found_criteria, factors = [], set[Criterion](), set[int]()
     with thread_pool(min(thread_count(threads), PHOTOS_AT_ONCE)) as pool:
         made = ordered_map(pool, lambda section: section(), sections, PHOTOS_AT_ONCE - 1)
@@ -59,7 +66,10 @@ def write_report(
                 continue
             found_criteria.update(section.shares)
             factors.add(section.factor)
-            rows.append(_photo_row(folder, section))
+            row, photo = _photo_row(folder, section)
+            rows.append(row)
+            layers = [*layers, photo]
+    write_viewer_of(folder, result, layers)
     if rows:
         paper = any(isinstance(m.fit, PaperFit) for m in result.materials)
         body += [_head_of_photos(found_criteria, paper, max(factors)), *rows]
@@ -148,10 +158,13 @@ def _head_of_photos(found_criteria: set[Criterion], ringed: bool, factor: int) -
     )
 
 
-def _photo_row(folder: Path, view: photo_view.PhotoView) -> str:
-    """HTML of the four pictures of a photo; writes them into ``folder``."""
+def _photo_row(folder: Path, view: photo_view.PhotoView) -> tuple[str, PhotoLayers]:
+    """(HTML of the four pictures of a photo, three of them for the viewer); writes them into
+    ``folder``."""
+    found = photo_pictures.compared(view, MAX_SIDE)
+    layers = {PHOTO: found.photo, PREDICTION: found.prediction, DIFFERENCE: found.difference}
     pictures = {
-        **photo_pictures.compared(view, MAX_SIDE)._asdict(),
+        **found._asdict(),
         "samples": photo_pictures.criteria_picture(view, MAX_SIDE),
     }
     name = escape(view.name)
@@ -170,7 +183,7 @@ def _photo_row(folder: Path, view: photo_view.PhotoView) -> str:
             f"<figure><img src='{file}' alt='{label}' loading='lazy'><figcaption>{label}{counts}"
             "</figcaption></figure>"
         )
-    return f"<div class='quadruple'>{cells}</div>"
+    return f"<div class='quadruple'>{cells}</div>", PhotoLayers(view.name, layers, {})
 
 
 def _counts(view: photo_view.PhotoView) -> str:

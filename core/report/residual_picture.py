@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from ..diagnose.forward.pixels import Pixels
 from ..views import display
 
-LONGEST = 260  # pixels, of the longer side
+LONGEST = 260  # pixels, of the longer side in a report
 MAX_DISTANCE = 3.0  # of a shown place to the nearest selected pixel, in their typical spacing
 NEIGHBOURS = 5  # pixels that are averaged at a place
 SOFTNESS = (
@@ -28,24 +28,30 @@ def photo_most_changed(pixels: Pixels, changed: NDArray[np.floating]) -> int | N
 
 
 def residual_picture(
-    pixels: Pixels, residual: NDArray[np.floating], photo: int
+    pixels: Pixels, residual: NDArray[np.floating], photo: int, longest: int = LONGEST
 ) -> NDArray[np.uint8]:
     """(h, w, 3) picture of the part of a photo that shows the object: blue where the prediction is
     too dark, red where it is too bright, full colour at FULL. residual: (n, 3) photo − prediction
-    in standard deviations."""
-    image = _interpolated(pixels, residual.mean(axis=1, keepdims=True), photo)
+    in standard deviations; longest: pixels of the longer side."""
+    image = _interpolated(pixels, residual.mean(axis=1, keepdims=True), photo, longest)
     return display.difference_picture(-image, np.zeros_like(image), FULL)
 
 
 def radiance_picture(
-    pixels: Pixels, radiance: NDArray[np.floating], photo: int, white: float
+    pixels: Pixels,
+    radiance: NDArray[np.floating],
+    photo: int,
+    white: float,
+    longest: int = LONGEST,
 ) -> NDArray[np.uint8]:
     """(h, w, 3) picture of the same part of a photo, or of its prediction. radiance: (n, 3); white:
-    the radiance shown as white."""
-    return display.photo_picture(_interpolated(pixels, radiance, photo), white)
+    the radiance shown as white; longest: pixels of the longer side."""
+    return display.photo_picture(_interpolated(pixels, radiance, photo, longest), white)
 
 
-def _interpolated(pixels: Pixels, values: NDArray[np.floating], photo: int) -> NDArray[np.float64]:
+def _interpolated(
+    pixels: Pixels, values: NDArray[np.floating], photo: int, longest: int
+) -> NDArray[np.float64]:
     """(h, w, c) for each place of the picture the mean of the values (n, c) of the nearest pixels
     of the photo, weighted by their distance; NaN where none is near."""
     mine = pixels.photo == photo
@@ -54,9 +60,9 @@ def _interpolated(pixels: Pixels, values: NDArray[np.floating], photo: int) -> N
         return np.full((1, 1, values.shape[1]), np.nan)
     low, high = at.min(axis=0), at.max(axis=0)
     size = float((high - low).max()) or 1.0
-    width, height = np.maximum(1, np.ceil(LONGEST * (high - low) / size)).astype(int)
-    columns = low[0] + (np.arange(width) + 0.5) * size / LONGEST
-    lines = low[1] + (np.arange(height) + 0.5) * size / LONGEST
+    width, height = np.maximum(1, np.ceil(longest * (high - low) / size)).astype(int)
+    columns = low[0] + (np.arange(width) + 0.5) * size / longest
+    lines = low[1] + (np.arange(height) + 0.5) * size / longest
     grid = np.stack(np.meshgrid(columns, lines), axis=-1).reshape(-1, 2)
     rows = np.flatnonzero(mine & np.isfinite(values).all(axis=1))
     shown = np.full((len(grid), values.shape[1]), np.nan)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from ..varying.node_model import GLOSS, TILT, NodeModel, diffuse_factor, specula
 from ..varying.varying_surface import VaryingSurface
 from ..viewer.model_tables import ViewerMaterial
 from ..viewer.page import FILE_NAME, has_program, write_viewer
+from ..viewer.photo_layers import PhotoLayers
 from ..viewer.skies import computed_skies
 from ..viewer.viewer_object import ViewerObject
 
@@ -26,9 +28,11 @@ VARIES = (
 )
 
 
-def write_viewer_of(folder: Path, result: CaptureResult) -> str | None:
+def write_viewer_of(
+    folder: Path, result: CaptureResult, photos: Sequence[PhotoLayers] = ()
+) -> str | None:
     """Write viewer.html into a folder; returns its name. None where the viewer's program was not
-    built."""
+    built. photos: to be compared with their predictions."""
     if not has_program():
         return None
     mesh, up = result.scan.mesh, find_up(result.scan.cameras, result.scan.mesh)
@@ -49,6 +53,7 @@ def write_viewer_of(folder: Path, result: CaptureResult) -> str | None:
         computed_skies(),
         thing,
         [] if varying is None else [VARIES],
+        photos,
     )
     return FILE_NAME
 

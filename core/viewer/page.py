@@ -21,6 +21,7 @@ from ..basis import AngleGrid, mapping
 from ..errors import InputError
 from ..files import write_text_atomic
 from .model_tables import INTERVAL_STEP, ViewerMaterial
+from .photo_layers import PhotoLayers, page_data
 from .skies import Sky
 from .viewer_object import ViewerObject
 
@@ -41,15 +42,17 @@ def write_viewer(
     skies: Sequence[Sky],
     thing: ViewerObject | None = None,
     notes: Sequence[str] = (),
+    photos: Sequence[PhotoLayers] = (),
 ) -> None:
     """Write the page. thing: the object that wears the materials; without it a sphere does. notes:
-    sentences below the controls. Raises InputError where the program was not built."""
+    sentences below the controls. photos: to be compared with their predictions. Raises InputError
+    where the program was not built."""
     if not has_program():
         raise InputError(
             "The program of the viewer is missing; expected it in assets/viewer/viewer.js; "
             "`python3 run.py build` makes it"
         )
-    data = _data(materials, skies, thing)
+    data = _data(materials, skies, thing) | page_data(photos)
     words = {
         "TITLE": escape(title),
         "STYLE": (ASSETS / "style.css").read_text("utf-8"),

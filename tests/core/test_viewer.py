@@ -15,6 +15,7 @@ from patina.core.basis import mapping
 from patina.core.errors import InputError
 from patina.core.viewer import page
 from patina.core.viewer.model_tables import INTERVAL_STEP, ViewerMaterial
+from patina.core.viewer.photo_layers import PhotoLayers, page_data
 from patina.core.viewer.skies import Sky, computed_skies
 from patina.core.viewer.viewer_object import ViewerObject, simplified
 from tests.projected import projected
@@ -134,3 +135,11 @@ def test_a_stray_triangle_does_not_coarsen_an_object():
     points, faces = np.concatenate([points, stray]), np.concatenate([faces, more])
     _, kept, _ = simplified(points, faces, most=9000)
     assert 3000 < len(kept) <= 9000
+
+
+def test_photos_of_a_large_capture_are_thinned_evenly():
+    picture = np.zeros((8, 8, 3), np.uint8)
+    photos = [PhotoLayers(f"{k}", {"Photo": picture}, {}) for k in range(100)]
+    names = [photo["name"] for photo in page_data(photos)["photos"]]
+    assert names == [f"{k}" for k in range(0, 100, 3)]
+    assert page_data([])["photos"] == []

@@ -3,6 +3,7 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { readData } from "./data.js";
+import { connectPhotos } from "./photos.js";
 import { halfDifference, intervalFactor, reflectance } from "./evaluate.js";
 import { PICTURES, Renderer } from "./renderer.js";
 
@@ -25,6 +26,8 @@ function start() {
     irradiance: Math.PI,
     exposure: 0,
     background: true,
+    photo: 0,
+    layer: data.photos.length ? Object.keys(data.photos[0].layers)[1] : "",
     paper: [0.5, 0.5, 0.5],
   };
   const orbit = new OrbitControls(renderer.camera, canvas);
@@ -70,9 +73,9 @@ function start() {
       speed.moving = Math.min(1, Math.max(MIN_RESOLUTION, 0.7 * speed.moving + 0.3 * wanted));
     }
     if (performance.now() - speed.moved > REST) useResolution(1);
-    if (renderer.step(state)) renderer.show(state);
+    if (state.shown !== "photos" && renderer.step(state)) renderer.show(state);
     bar.value = renderer.count / PICTURES;
-    bar.hidden = renderer.count >= PICTURES;
+    bar.hidden = renderer.count >= PICTURES || state.shown === "photos";
     speed.frames += 1;
     requestAnimationFrame(frame);
   };
@@ -97,13 +100,14 @@ function start() {
 
 // The controls of the panel.
 function connect(data, state, renderer) {
+  const inPhotos = connectPhotos(data, state, () => describe(data, state, inPhotos));
   const change = (name, value) => {
     state[name] = value;
     renderer.restart();
-    describe(data, state);
+    describe(data, state, inPhotos);
   };
-  choice("shown", data.object ? { object: "Object", sphere: "Sphere" } : { sphere: "Sphere" }, state.shown,
-    (value) => change("shown", value));
+  const shapes = { ...(data.object && { object: "Object" }), sphere: "Sphere", ...(data.photos.length && { photos: "Photos" }) };
+  choice("shown", shapes, state.shown, (value) => change("shown", value));
   choice("material", Object.fromEntries(data.materials.map((m, i) => [i, m.name])), state.material,
     (value) => change("material", Number(value)));
   const known = Object.keys(MODELS).filter((name) => data.materials.every((m) => m.models[name]));
@@ -128,7 +132,7 @@ function connect(data, state, renderer) {
   };
   dark.addEventListener("change", paper);
   paper();
-  describe(data, state);
+  describe(data, state, inPhotos);
 }
 
 function choice(id, options, value, changed) {
@@ -148,8 +152,14 @@ function choice(id, options, value, changed) {
   }
 }
 
-// A sentence on what is shown.
-function describe(data, state) {
+// A sentence on what is shown, and the controls that belong to it. inPhotos: returns that of the photos.
+function describe(data, state, inPhotos) {
+  const photos = state.shown === "photos";
+  document.getElementById("photos").hidden = !photos;
+  document.querySelector("canvas").hidden = photos;
+  for (const id of ["photo", "sides"]) document.getElementById(id).hidden = !photos;
+  for (const id of ["model", "light"]) document.getElementById(id).parentElement.hidden = photos;
+  document.getElementById("exposures").hidden = photos;
   const model = {
     measured: "the BRDF fitted to the photos; in directions that no photo shows, it is extrapolated",
     lobes: "the lobe stack, which approximates the BRDF in EEVEE and other programs",
@@ -158,15 +168,19 @@ function describe(data, state) {
   const what = state.difference ? `Shown: ${model}, minus the BRDF fitted to the photos` : `Shown: ${model}`;
   const colours = state.difference ? " Red is too bright, blue too dark." : "";
   const shadows = state.light !== "lamp" && state.shown === "object" ? " Interreflection is not shown." : "";
-  document.getElementById("what").textContent = `${what}.${colours}${shadows}`;
-  document.getElementById("material").parentElement.hidden = state.shown === "object" || data.materials.length < 2;
+  document.getElementById("what").textContent = photos ? inPhotos() : `${what}.${colours}${shadows}`;
+  document.getElementById("material").parentElement.hidden = state.shown !== "sphere" || data.materials.length < 2;
   const difference = document.getElementById("difference");
   difference.disabled = state.model === "measured";
   difference.parentElement.title = difference.disabled ? "Select another model first" : "";
   const lamp = state.light === "lamp";
-  document.getElementById("lamp").hidden = !lamp;
+  document.getElementById("lamp").hidden = !lamp || photos;
   const turn = window.matchMedia("(pointer: coarse)").matches ? "Drag to turn, pinch to zoom." : "Drag to turn, scroll to zoom.";
   const values = "Point at the surface for its reflectance and interval.";
+  if (photos) {
+    document.getElementById("hint").textContent = "Scroll to enlarge, drag to move, double click to see everything.";
+    return;
+  }
   document.getElementById("hint").textContent = lamp ? `${turn} Shift and drag moves the lamp. ${values}` : turn;
 }
 

@@ -1,0 +1,58 @@
+"""The photos of a check in the viewer: predictions, residuals, and what each cause changes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..capture import Capture
+from ..diagnose.effects.labels import cause_label
+from ..diagnose.forward.diagnosis_context import DiagnosisContext
+from ..diagnose.selection.diagnosis import Diagnosis
+from ..viewer.photo_layers import DIFFERENCE, PHOTO, PREDICTION, PhotoLayers
+from .diagnosis import WHITE_PERCENTILE
+from .residual_picture import radiance_picture, residual_picture
+
+SIDE = 420  # pixels of the longer side
+BEFORE = "Difference Before Correction"
+DIFFERENCE_TEXT = (
+    "prediction minus photo, full colour at three times the standard deviation of the pixel's "
+    "residual; red is too bright, blue too dark"
+)
+
+
+def check_layers(
+    found: Diagnosis, context: DiagnosisContext, capture: Capture
+) -> list[PhotoLayers]:
+    """The photos that the check uses, at the pixels that it uses. Predictions and differences are
+    those after correction."""
+    pixels, layers = context.pixels, []
+    with np.errstate(invalid="ignore"):  # pixels that do not count have none: inf / inf
+        scale = found.after.deviation / found.before.deviation
+        after = found.after.residual * scale
+    changes = {
+        cause_label(trial.effect.cause): -trial.changed() / found.before.deviation
+        for trial in found.named
+    }
+    texts = {
+        PHOTO: "the photo, interpolated between the pixels that the check uses",
+        PREDICTION: "its prediction at the same pixels, with the causes found",
+        DIFFERENCE: DIFFERENCE_TEXT,
+        BEFORE: f"without correction: {DIFFERENCE_TEXT}",
+    }
+    texts |= {
+        label: f"what the cause '{label}' changes: red is brighter because of it, blue darker"
+        for label in changes
+    }
+    for photo in np.unique(pixels.photo).tolist():
+        white = float(np.percentile(pixels.observed[pixels.photo == photo], WHITE_PERCENTILE))
+        pictures = {
+            PHOTO: radiance_picture(pixels, pixels.observed, photo, white, SIDE),
+            PREDICTION: radiance_picture(pixels, found.after.predicted, photo, white, SIDE),
+            DIFFERENCE: residual_picture(pixels, after, photo, SIDE),
+        }
+        if found.named:
+            pictures[BEFORE] = residual_picture(pixels, found.before.residual, photo, SIDE)
+        for label, changed in changes.items():
+            pictures[label] = residual_picture(pixels, changed, photo, SIDE)
+        layers.append(PhotoLayers(capture.photo_name(photo), pictures, texts))
+    return layers
