@@ -163,7 +163,7 @@ def section(found: Diagnosis, context: DiagnosisContext) -> str:
         "the model with this cause, in standard errors.</p>"
         f"{_errors(found)}{_causes(found)}<div class='charts'>{_charts(found, context)}</div>"
         "<p class='sub'>Residual (photo minus prediction) relative to the prediction. Red: before "
-        "correction, blue: after. Bars: two standard errors.</p>"
+        "correction, blue: after. Bars: two standard errors. Point at a chart for its values.</p>"
     )
 
 

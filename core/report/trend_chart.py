@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from html import escape
+from itertools import pairwise
 
 import numpy as np
 
@@ -62,8 +64,28 @@ def trend_chart(name: str, unit: str, before: Trend, after: Trend | None, most: 
     return svg_element(
         WIDTH, HEIGHT, label,
         f"<text x='{LEFT}' y='12' font-weight='bold'>{label}</text>"
-        f"{levels}{ticks}{''.join(lines)}",
+        f"{levels}{ticks}{''.join(lines)}{_values(drawn, unit, x)}",
     )  # fmt: skip
+
+
+def _values(drawn: Sequence[Trend], unit: str, x: Callable[[float], float]) -> str:
+    """SVG: strips that show their values under the pointer, one for each place with a bin. x: from
+    the coordinate to pixels."""
+    places: dict[float, list[str]] = {}
+    for trend, kind in zip(drawn, ("before", "after") if len(drawn) > 1 else ("",), strict=True):
+        for a, m, e in zip(trend.at, trend.mean, trend.error, strict=True):
+            value = f"{100 * m:+.1f} ± {200 * e:.1f} %"
+            places.setdefault(round(float(a), 6), []).append(f"{kind} {value}".strip())
+    if not places:
+        return ""
+    at = sorted(places)
+    edges = [LEFT, *((x(a) + x(b)) / 2 for a, b in pairwise(at)), WIDTH - RIGHT]
+    return "".join(
+        f"<rect class='strip' x='{left:.1f}' y='{TOP}' width='{max(right - left, 1):.1f}' "
+        f"height='{HEIGHT - TOP - BOTTOM}'><title>{a:.3g}{escape(f' {unit}' if unit else '')}: "
+        f"{'; '.join(places[a])}</title></rect>"
+        for a, left, right in zip(at, edges[:-1], edges[1:], strict=True)
+    )
 
 
 def _round_values(low: float, high: float) -> list[float]:
