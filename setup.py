@@ -38,5 +38,6 @@ setup(
     package_data={
         "patina": ["blender_manifest.toml", "py.typed", "assets/**/*"],
     },
+    exclude_package_data={"patina": ["assets/manual/**/*", "assets/manual.part/**/*"]},
     cmdclass={"build_py": BuildPackage},
 )

@@ -88,9 +88,7 @@ def write_results(
     with timed(stages, "report", progress, 0.92):
         back = "" if report == "report" else "../index.html"
         layers = (
-            check_layers(check.found, check.context, result.capture)
-            if check is not None and result.effects
-            else ()
+            check_layers(check.found, check.context) if check is not None and result.effects else ()
         )
         for _ in write_report(folder / report, result, back=back, layers=layers):
             pass

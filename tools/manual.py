@@ -27,9 +27,9 @@ def build() -> Path:
     """Return the folder of the site, built if it is missing or its sources have changed. Broken
     links and anchors are errors. Raises Failure."""
     current = _source_hash()
-    if (MANUAL / MARK).is_file() and (MANUAL / MARK).read_text("utf-8") == current:
-        return MANUAL
     with one_at_a_time("manual"):
+        if (MANUAL / MARK).is_file() and (MANUAL / MARK).read_text("utf-8") == current:
+            return MANUAL
         say("building the documentation site")
         partial = MANUAL.with_name("manual.part")
         shutil.rmtree(partial, ignore_errors=True)

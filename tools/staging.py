@@ -16,7 +16,7 @@ from .smaller_wheels import shipped_wheel
 from .wheels import FOLDER, checksums, manifest_list, wheel_names
 
 MANIFEST = "blender_manifest.toml"
-IGNORED = shutil.ignore_patterns("__pycache__", "*.py[co]", ".*", "*~", "*.blend1")
+IGNORED = shutil.ignore_patterns("__pycache__", "*.py[co]", ".*", "*~", "*.blend1", "*.part")
 
 
 def manifest() -> dict:

@@ -54,8 +54,8 @@ def percent(error: float) -> str:
 
 
 def cube_root_error(evaluate: Evaluate, truth: Evaluate) -> float:
-    """Relative cube-root error of ``evaluate(angles) -> (n, 3)`` against ``truth``, both in 1/sr:
-    the measure that the fit of the Principled BSDF minimises. Negative values count as 0."""
+    """Relative cube-root error of ``evaluate(angles) -> (n, 3)`` against ``truth``, both in 1/sr.
+    Negative values count as 0."""
     angles, weight = quadrature()
     cos_i, _ = cosines(*angles)
     root = [

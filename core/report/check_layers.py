@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..capture import Capture
 from ..diagnose.effects.labels import cause_label
 from ..diagnose.forward.diagnosis_context import DiagnosisContext
 from ..diagnose.selection.diagnosis import Diagnosis
 from ..viewer.photo_layers import DIFFERENCE, PHOTO, PREDICTION, PhotoLayers
-from .diagnosis import WHITE_PERCENTILE
-from .residual_picture import radiance_picture, residual_picture
+from .residual_picture import (
+    change_by,
+    radiance_picture,
+    residual_picture,
+    scaled_residual,
+    white_of,
+)
 
 SIDE = 420  # pixels of the longer side
 BEFORE = "Difference Before Correction"
@@ -20,19 +24,12 @@ DIFFERENCE_TEXT = (
 )
 
 
-def check_layers(
-    found: Diagnosis, context: DiagnosisContext, capture: Capture
-) -> list[PhotoLayers]:
+def check_layers(found: Diagnosis, context: DiagnosisContext) -> list[PhotoLayers]:
     """The photos that the check uses, at the pixels that it uses. Predictions and differences are
     those after correction."""
     pixels, layers = context.pixels, []
-    with np.errstate(invalid="ignore"):  # pixels that do not count have none: inf / inf
-        scale = found.after.deviation / found.before.deviation
-        after = found.after.residual * scale
-    changes = {
-        cause_label(trial.effect.cause): -trial.changed() / found.before.deviation
-        for trial in found.named
-    }
+    after = scaled_residual(found, found.after)
+    changes = {cause_label(t.effect.cause): -change_by(found, t) for t in found.named}
     texts = {
         PHOTO: "the photo, interpolated between the pixels that the check uses",
         PREDICTION: "its prediction at the same pixels, with the causes found",
@@ -44,7 +41,8 @@ def check_layers(
         for label in changes
     }
     for photo in np.unique(pixels.photo).tolist():
-        white = float(np.percentile(pixels.observed[pixels.photo == photo], WHITE_PERCENTILE))
+        white, names = white_of(pixels, photo), found.photo_names
+        name = names[photo] if photo < len(names) else f"photo {photo + 1}"
         pictures = {
             PHOTO: radiance_picture(pixels, pixels.observed, photo, white, SIDE),
             PREDICTION: radiance_picture(pixels, found.after.predicted, photo, white, SIDE),
@@ -54,5 +52,5 @@ def check_layers(
             pictures[BEFORE] = residual_picture(pixels, found.before.residual, photo, SIDE)
         for label, changed in changes.items():
             pictures[label] = residual_picture(pixels, changed, photo, SIDE)
-        layers.append(PhotoLayers(capture.photo_name(photo), pictures, texts))
+        layers.append(PhotoLayers(name, pictures, texts))
     return layers

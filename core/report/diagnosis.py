@@ -23,11 +23,17 @@ from ..viewer.page import FILE_NAME, has_program
 from ..views.sphere import write_sphere
 from .assessment_section import assessment_section
 from .html_parts import ERROR_HEADING, PHOTO_HEADING, compared, page, summary
-from .residual_picture import photo_most_changed, radiance_picture, residual_picture
+from .residual_picture import (
+    change_by,
+    photo_most_changed,
+    radiance_picture,
+    residual_picture,
+    scaled_residual,
+    white_of,
+)
 from .trend_chart import trend_chart
 
 MAX_CHARTS = 6  # those of the coordinates along which the residual varies most
-WHITE_PERCENTILE = 99.0  # of the radiance of a photo, shown as white
 STEPS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # possible limits of a chart's vertical axis, relative
 
 
@@ -115,14 +121,9 @@ def _pictures(folder: Path, found: Diagnosis, context: DiagnosisContext) -> str:
     pixels, rows = context.pixels, []
     corrected = bool(found.named)
     fits = {"before": found.before, "after": found.after} if corrected else {"before": found.before}
-    # in the standard deviations of the first fit, so that the colours compare
-    with np.errstate(invalid="ignore"):  # pixels that do not count have none: inf / inf
-        residuals = {
-            kind: fitted.residual * (fitted.deviation / found.before.deviation)
-            for kind, fitted in fits.items()
-        }
+    residuals = {kind: scaled_residual(found, fitted) for kind, fitted in fits.items()}
     for photo in np.unique(pixels.photo).tolist():
-        white = float(np.percentile(pixels.observed[pixels.photo == photo], WHITE_PERCENTILE))
+        white = white_of(pixels, photo)
         shown = {"photo": pixels.observed, "prediction": found.after.predicted}
         for kind, radiance in shown.items():
             picture = radiance_picture(pixels, radiance, photo, white)
@@ -221,7 +222,7 @@ def _evidence(folder: Path, found: Diagnosis, context: DiagnosisContext) -> str:
     """HTML: the change by each named cause, in the photo that it changes most."""
     cells, pixels = "", context.pixels
     for trial in found.named:
-        changed = trial.changed() / found.before.deviation
+        changed = change_by(found, trial)
         photo = photo_most_changed(pixels, changed)
         if photo is None:
             continue

@@ -17,7 +17,7 @@ from ..jobs import CaptureResult, MaterialResult
 from ..photo import write_png
 from ..samples import Criterion
 from ..viewer.page import FILE_NAME, has_program
-from ..viewer.photo_layers import DIFFERENCE, PHOTO, PREDICTION, PhotoLayers
+from ..viewer.photo_layers import DIFFERENCE, PHOTO, PREDICTION, PhotoLayers, shown_places
 from ..views import photo_pictures, photo_view
 from ..views.criteria import LOOKS, Look
 from .held_out import varied_quality
@@ -56,6 +56,7 @@ def write_report(
     if not result.effects:
         sections += [partial(_looked_at, result, place) for place in range(len(photos))]
     body = [_summary(result, FILE_NAME if has_program() else None)]
+    shown = shown_places(len(photos))
     rows, found_criteria, factors = [], set[Criterion](), set[int]()
     with thread_pool(min(thread_count(threads), PHOTOS_AT_ONCE)) as pool:
         made = ordered_map(pool, lambda section: section(), sections, PHOTOS_AT_ONCE - 1)
@@ -68,7 +69,8 @@ def write_report(
             factors.add(section.factor)
             row, photo = _photo_row(folder, section)
             rows.append(row)
-            layers = [*layers, photo]
+            if has_program() and section.place in shown:
+                layers = [*layers, photo]
     write_viewer_of(folder, result, layers)
     if rows:
         paper = any(isinstance(m.fit, PaperFit) for m in result.materials)

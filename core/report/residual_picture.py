@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..diagnose.forward.pixels import Pixels
+from ..diagnose.selection.diagnosis import Diagnosis, Trial
+from ..diagnose.solver.model_fit import ModelFit
 from ..views import display
 
 LONGEST = 260  # pixels, of the longer side in a report
@@ -15,7 +17,25 @@ NEIGHBOURS = 5  # pixels that are averaged at a place
 SOFTNESS = (
     0.3  # of the weights, in the typical spacing: at the pixel itself it outweighs the others
 )
+WHITE_PERCENTILE = 99.0  # of the radiance of a photo, shown as white
 FULL = 3.0  # standard deviations, for full colour
+
+
+def scaled_residual(found: Diagnosis, fitted: ModelFit) -> NDArray[np.floating]:
+    """(n, 3) photo minus the prediction of one of the diagnosis's fits, in the standard deviations
+    of the first fit, so that colours compare."""
+    with np.errstate(invalid="ignore"):  # pixels that do not count have none: inf / inf
+        return np.asarray(fitted.residual * (fitted.deviation / found.before.deviation))
+
+
+def change_by(found: Diagnosis, trial: Trial) -> NDArray[np.floating]:
+    """(n, 3) the change of the photos by a cause, in the same standard deviations."""
+    return np.asarray(trial.changed() / found.before.deviation)
+
+
+def white_of(pixels: Pixels, photo: int) -> float:
+    """The radiance of a photo that is shown as white."""
+    return float(np.percentile(pixels.observed[pixels.photo == photo], WHITE_PERCENTILE))
 
 
 def photo_most_changed(pixels: Pixels, changed: NDArray[np.floating]) -> int | None:

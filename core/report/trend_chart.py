@@ -13,6 +13,7 @@ from .svg_element import svg_element
 
 WIDTH, HEIGHT = 280, 150
 LEFT, RIGHT, TOP, BOTTOM = 40, 8, 20, 24
+MIN_STRIP = 2.0  # pixels: values closer than this are shown together
 MAX_TICKS = 5  # steps between marks of the horizontal axis
 COLOURS = ("#b4443c", "#2f6fb0")  # before, after
 
@@ -74,18 +75,25 @@ def _values(drawn: Sequence[Trend], unit: str, x: Callable[[float], float]) -> s
     places: dict[float, list[str]] = {}
     for trend, kind in zip(drawn, ("before", "after") if len(drawn) > 1 else ("",), strict=True):
         for a, m, e in zip(trend.at, trend.mean, trend.error, strict=True):
-            value = f"{100 * m:+.1f} ± {200 * e:.1f} %"
-            places.setdefault(round(float(a), 6), []).append(f"{kind} {value}".strip())
+            value = f"{round(100 * m, 1) + 0.0:+.1f} ± {200 * e:.1f} %"
+            near = [p for p in places if abs(x(p) - x(a)) < MIN_STRIP]
+            place = near[0] if near else float(a)
+            places.setdefault(place, []).append(f"{kind} {value}".strip())
     if not places:
         return ""
-    at = sorted(places)
+    at, of = sorted(places), escape(f" {unit}" if unit else "")
     edges = [LEFT, *((x(a) + x(b)) / 2 for a, b in pairwise(at)), WIDTH - RIGHT]
     return "".join(
         f"<rect class='strip' x='{left:.1f}' y='{TOP}' width='{max(right - left, 1):.1f}' "
-        f"height='{HEIGHT - TOP - BOTTOM}'><title>{a:.3g}{escape(f' {unit}' if unit else '')}: "
+        f"height='{HEIGHT - TOP - BOTTOM}'><title>{_number(a)}{of}: "
         f"{'; '.join(places[a])}</title></rect>"
         for a, left, right in zip(at, edges[:-1], edges[1:], strict=True)
     )
+
+
+def _number(value: float) -> str:
+    """Three digits or more, without an exponent."""
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
 def _round_values(low: float, high: float) -> list[float]:

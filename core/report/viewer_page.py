@@ -30,11 +30,11 @@ VARIES = (
 
 def write_viewer_of(
     folder: Path, result: CaptureResult, photos: Sequence[PhotoLayers] = ()
-) -> str | None:
-    """Write viewer.html into a folder; returns its name. None where the viewer's program was not
-    built. photos: to be compared with their predictions."""
+) -> None:
+    """Write viewer.html into a folder where the viewer's program was built. photos: to be compared
+    with their predictions."""
     if not has_program():
-        return None
+        return
     mesh, up = result.scan.mesh, find_up(result.scan.cameras, result.scan.mesh)
     varying = result.varying if result.varying is not None and result.varying.varies else None
     first = result.scan.camera(result.capture.photos[0].camera)
@@ -55,7 +55,6 @@ def write_viewer_of(
         [] if varying is None else [VARIES],
         photos,
     )
-    return FILE_NAME
 
 
 def _factors(

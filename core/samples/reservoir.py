@@ -107,19 +107,24 @@ class SampleReservoir:
     def table(self, like: SampleReservoir | None = None) -> SampleTable:
         """The samples that were kept, in the order of photo and pixel.
 
-        like: a reservoir of other samples of the same photos, whose own table was made before; only
-        those that it would keep too are returned. So both are thinned alike, and a small region of
-        angles has both kinds of samples in the proportion of its pixels.
+        like: a reservoir of other samples of the same photos; only those that it would keep too are
+        returned, and each stands for as many as its samples do. So both are thinned alike, and a
+        small region of angles has both kinds of samples in the proportion of its pixels.
         """
         if not self._parts:
             return SampleTable.empty()
         self._prune()
         found = SampleTable.concatenate(self._parts)
-        if like is not None:
-            number = np.concatenate(self._hashes)
-            found = found.select(np.flatnonzero(number <= like._limits.take(found.photo)))
         kept = np.bincount(found.photo, minlength=len(self._counts))
         each = (self._counts / np.maximum(kept, 1)).astype(np.float32)
+        if like is not None:
+            like._prune()
+            number = np.concatenate(self._hashes)
+            found = found.select(np.flatnonzero(number <= like._limits.take(found.photo)))
+            both = np.minimum(self._limits, like._limits)
+            # the inverse of the probability to be kept: of few samples a count would say little
+            each = np.where(both < ALL, 2.0**64 / (both.astype(np.float64) + 1), 1.0)
+            each = each.astype(np.float32)
         found = replace(found, weight=found.weight * each.take(found.photo))
         place = _place(found)
         if self._brightest is not None:

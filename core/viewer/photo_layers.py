@@ -26,17 +26,21 @@ TEXTS = {
 @dataclass(frozen=True)
 class PhotoLayers:
     """name: of the photo; pictures: label → (h, w, 3) 8-bit display-encoded pixels, all of one
-    size, the photo first; texts: label → what the layer shows, for those that are not in TEXTS."""
+    size, the photo first; texts: label → what the layer shows, where that is not as in TEXTS."""
 
     name: str
     pictures: Mapping[str, NDArray[np.uint8]]
     texts: Mapping[str, str]
 
 
+def shown_places(count: int) -> set[int]:
+    """The places of the photos of a page with ``count`` photos: MAX_PHOTOS at most."""
+    return set(np.linspace(0, count - 1, min(count, MAX_PHOTOS)).round().astype(int).tolist())
+
+
 def page_data(photos: Sequence[PhotoLayers]) -> dict[str, Any]:
     """The photos as web/src/photos.js reads them."""
-    step = -(-len(photos) // MAX_PHOTOS) if photos else 1
-    shown = photos[::step]
+    shown = [photos[place] for place in sorted(shown_places(len(photos)))]
     texts = {label: text for photo in shown for label, text in photo.texts.items()}
     return {
         "photos": [

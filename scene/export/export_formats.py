@@ -9,6 +9,7 @@ from pathlib import Path
 
 import bpy
 
+from ...core.appearance.open_pbr.fit import from_principled
 from ...core.export import Loss, gltf_model, preview_surface
 from ...core.export.dropped import dropped_inputs
 from ...core.export.subject import Subject
@@ -20,10 +21,16 @@ from .export_blend import write_blend
 from .export_gltf import write_glb
 from .export_scene import as_fitted, materials_by_name
 from .export_usd import check_usd, write_usd
-from .usd_surfaces import UsdSurfaces, replace_surfaces
+from .usd_surfaces import Replaced, UsdSurfaces, can_replace, replace_surfaces
 
 SCAN, PREVIEW = "scan", "materials"  # stems of the file names
 BEYOND_PRINCIPLED = "everything of the fitted BRDF that one Principled BSDF cannot represent"
+OPEN_PBR_SINCE = (5, 0, 0)
+KEPT = (
+    "the material has maps or was changed in the scene, so the file has its own values; the errors "
+    "are those of the fitted values"
+)
+TRANSLATED = "the file has the values that Blender translates from its Principled BSDF"
 
 
 def to_blend(
@@ -62,8 +69,9 @@ def to_gltf(
     objects, stem = _objects(result, subjects)
     fitted = fitted_materials(objects, subjects)
     for subject in subjects:
-        for node in principled_nodes(fitted[subject.name]) if subject.name in fitted else ():
-            fill_principled(node, subject.gltf.principled)
+        for material in fitted.get(subject.name, ()):
+            for node in principled_nodes(material):
+                fill_principled(node, subject.gltf.principled)
     write_glb(folder / f"{stem}.glb", objects)
     losses = []
     for subject in subjects:
@@ -81,7 +89,7 @@ def to_gltf(
                     "the Principled BSDF in Blender": subject.error(own.evaluate),
                 },
                 dropped=(*dropped_inputs(principled, gltf_model.DROPPED), BEYOND_PRINCIPLED),
-                notes=subject.scale_note,
+                notes=(*(() if subject.name in fitted else (KEPT,)), *subject.scale_note),
             )
         )
     return losses
@@ -97,22 +105,28 @@ def to_usd(
     file = folder / f"{stem}.usdc"
     with_materialx = write_usd(file, objects)
     fitted = fitted_materials(objects, subjects)
-    replaced = replace_surfaces(
-        file,
-        {
-            fitted[s.name].name: UsdSurfaces(s.preview_surface.principled, s.open_pbr.surface)
+    replaced = Replaced(frozenset(), frozenset())
+    if can_replace():
+        exported = {s.material.name for o in objects for s in o.material_slots if s.material}
+        surfaces = {
+            material.name: UsdSurfaces(s.preview_surface.principled, s.open_pbr.surface)
             for s in subjects
-            if s.name in fitted
-        },
-    )
+            for material in fitted.get(s.name, ())
+        }
+        replaced = replace_surfaces(file, surfaces, exported)
     losses = []
     for subject in subjects:
-        name = fitted[subject.name].name if subject.name in fitted else None
+        names = {material.name for material in fitted.get(subject.name, ())}
         own = subject.material.principled
-        shown = subject.preview_surface.principled if name in replaced.preview else own
+        new_preview = bool(names) and names <= replaced.preview
+        shown = subject.preview_surface.principled if new_preview else own
         errors = {}
-        if name in replaced.open_pbr:
+        if names and names <= replaced.open_pbr:
             errors["MaterialX (OpenPBR)"] = subject.error(subject.open_pbr.surface.evaluate)
+        elif with_materialx and bpy.app.version >= OPEN_PBR_SINCE:
+            errors["MaterialX (OpenPBR, values of the Principled)"] = subject.error(
+                from_principled(own).evaluate
+            )
         elif with_materialx:
             errors["MaterialX (its surface, taken for the Principled)"] = subject.error(
                 own.evaluate
@@ -120,6 +134,8 @@ def to_usd(
         errors["UsdPreviewSurface"] = subject.error(partial(preview_surface.evaluate, shown))
         lost = dropped_inputs(shown, preview_surface.DROPPED)
         notes = () if with_materialx else ("this version of Blender writes no MaterialX into USD",)
+        if not new_preview:
+            notes = (*notes, KEPT if not names else TRANSLATED)
         losses.append(
             Loss(
                 "usd",
@@ -135,11 +151,16 @@ def to_usd(
 
 def fitted_materials(
     objects: Sequence[bpy.types.Object], subjects: Sequence[Subject]
-) -> dict[str, bpy.types.Material]:
-    """The materials of the objects that still have the fitted values, by name."""
+) -> dict[str, list[bpy.types.Material]]:
+    """The materials of the objects that still have the fitted values, with their copies, by
+    name."""
     found = materials_by_name(objects, [subject.name for subject in subjects])
     fitted = {subject.name: subject.material.principled for subject in subjects}
-    return {name: m for name, m in found.items() if as_fitted(m, fitted[name])}
+    return {
+        name: materials
+        for name, materials in found.items()
+        if all(as_fitted(material, fitted[name]) for material in materials)
+    }
 
 
 def _objects(result: FittedResult, subjects: Sequence[Subject]) -> tuple[list, str]:

@@ -111,22 +111,28 @@ def create_materials(
 
 def materials_by_name(
     objects: Sequence[bpy.types.Object], names: Container[str]
-) -> dict[str, bpy.types.Material]:
-    """The objects' measured materials by their names in the export, those of ``names`` only."""
-    found = {}
+) -> dict[str, list[bpy.types.Material]]:
+    """The objects' measured materials by their names in the export, those of ``names`` only. A
+    material and its copies have one name."""
+    found: dict[str, list[bpy.types.Material]] = {}
     for material in {s.material for thing in objects for s in thing.material_slots if s.material}:
         if MEASURED_NAME in material:
             for name in (export_name(material), str(material[MEASURED_NAME])):
                 if name in names:
-                    found[name] = material
+                    found.setdefault(name, []).append(material)
                     break
     return found
 
 
 def as_fitted(material: bpy.types.Material, fitted: Principled) -> bool:
-    """Whether a material's Principled nodes have the fitted values: no maps on their inputs, and no
-    values changed by hand, which an export has to keep."""
-    for node in principled_nodes(material):
+    """Whether a material's Principled nodes have the fitted values, and one of them is what is
+    exported: no maps on their inputs but normals, and no values or links changed by hand, which an
+    export has to keep."""
+    nodes = principled_nodes(material)
+    shown = material.node_tree.get_output_node("ALL")
+    if shown is None or not any(link.from_node in nodes for link in shown.inputs["Surface"].links):
+        return False
+    for node in nodes:
         if any(socket.is_linked for socket in node.inputs if socket.name != NORMAL):
             return False
         if not material_nodes.has_values(node, fitted):

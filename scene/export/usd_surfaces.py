@@ -6,19 +6,19 @@ compute other BRDFs from them.
 
 from __future__ import annotations
 
-import logging
+import importlib.util
 import re
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+import bpy
 import numpy as np
 
 from ...core.appearance.open_pbr.model import OpenPBR
 from ...core.appearance.principled import Principled
-
-log = logging.getLogger(__name__)
 
 PREVIEW_SHADER = "UsdPreviewSurface"
 OPEN_PBR_SHADER = "ND_open_pbr_surface_surfaceshader"
@@ -41,17 +41,26 @@ class Replaced:
     open_pbr: frozenset[str]
 
 
-def replace_surfaces(path: Path, surfaces: Mapping[str, UsdSurfaces]) -> Replaced:
+def can_replace() -> bool:
+    """Whether this build of Blender has USD's Python module (some have not)."""
+    if hasattr(bpy.utils, "expose_bundled_modules"):  # the bpy module hides it until then
+        bpy.utils.expose_bundled_modules()
+    return importlib.util.find_spec("pxr") is not None
+
+
+def replace_surfaces(
+    path: Path, surfaces: Mapping[str, UsdSurfaces], exported: Collection[str]
+) -> Replaced:
     """Write fitted inputs into the shaders of a USD file, by the materials' names in Blender.
-    Shaders with textures keep their inputs. Without USD's Python module, which some builds of
-    Blender lack, nothing is replaced."""
-    try:
-        from pxr import Usd, UsdShade
-    except ImportError as error:
-        log.warning("the surfaces of %s are as Blender exported them: %s", path.name, error)
-        return Replaced(frozenset(), frozenset())
+
+    exported: names of all materials in the file. Shaders with textures keep their inputs, and so do
+    materials whose identifier in USD could be that of another one. Needs ``can_replace``.
+    """
+    from pxr import Usd, UsdShade
+
     stage = Usd.Stage.Open(str(path))
-    by_prim = {prim_name: name for name in surfaces for prim_name in _prim_names(name)}
+    claims = Counter(prim for name in {*exported, *surfaces} for prim in prim_names(name))
+    by_prim = {prim: name for name in surfaces for prim in prim_names(name) if claims[prim] == 1}
     done: tuple[set[str], set[str]] = (set(), set())
     for prim in stage.Traverse():
         name = by_prim.get(prim.GetName())
@@ -70,11 +79,15 @@ def replace_surfaces(path: Path, surfaces: Mapping[str, UsdSurfaces]) -> Replace
     return Replaced(frozenset(done[0]), frozenset(done[1]))
 
 
-def _prim_names(name: str) -> set[str]:
-    """Names that Blender may give to the prim of a material: characters that no identifier can hold
-    become "_", in some versions also letters beyond ASCII."""
-    plain = {re.sub(r"\W", "_", name), re.sub(r"\W", "_", name, flags=re.ASCII)}
-    return {f"_{n}" if n[:1].isdigit() else n for n in plain}
+def prim_names(name: str) -> set[str]:
+    """Identifiers that Blender may give to a material: what none can hold becomes "_". Blender 4.2
+    replaces every byte beyond ASCII, later versions keep letters of all languages."""
+    of_bytes = re.sub(rb"[^A-Za-z0-9_]", b"_", name.encode()).decode()
+    of_letters = "".join(c if f"a{c}".isidentifier() else "_" for c in name)
+    found = set()
+    for plain in (of_bytes, of_letters):
+        found |= {f"_{plain}", f"_{plain[1:]}"} if plain[:1].isdigit() else {plain}
+    return found
 
 
 def _set_inputs(shader: Any, values: Mapping[str, Any]) -> bool:

@@ -219,14 +219,22 @@ def fill_principled(node: bpy.types.Node, principled: Principled) -> None:
 
 def has_values(node: bpy.types.Node, principled: Principled) -> bool:
     """Whether the inputs of a Principled node are those of the fitted model, to the precision that
-    Blender stores."""
-    for field, socket in PRINCIPLED_SOCKETS.items():
-        expected = np.atleast_1d(getattr(principled, field))
-        if socket in node.inputs:
-            found = np.atleast_1d(node.inputs[socket].default_value)[: len(expected)]
-            if not np.allclose(found, expected, rtol=1e-5, atol=1e-6):
-                return False
-    return True
+    Blender stores, and all others those of a new node."""
+    fresh = bpy.data.node_groups.new("Patina Defaults", "ShaderNodeTree")
+    try:
+        plain = fresh.nodes.new("ShaderNodeBsdfPrincipled")
+        fill_principled(plain, principled)
+        return all(
+            np.allclose(_value(own), _value(expected), rtol=1e-5, atol=1e-6)
+            for own, expected in zip(node.inputs, plain.inputs, strict=True)
+            if hasattr(own, "default_value") and own.type != "VECTOR"
+        )
+    finally:
+        bpy.data.node_groups.remove(fresh)
+
+
+def _value(socket: bpy.types.NodeSocket) -> np.ndarray:
+    return np.atleast_1d(np.asarray(socket.default_value, float))
 
 
 def _osl_branch(

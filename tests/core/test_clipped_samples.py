@@ -58,8 +58,8 @@ def tables(path: Path) -> tuple[SampleTable, SampleTable]:
 
 
 def test_clipped_samples_are_thinned_as_the_measured_ones_are(path, tables, monkeypatch) -> None:
-    """A capture of more samples than are kept: the fraction of clipped ones in each photo stays,
-    and every kept clipped sample represents as many pixels as a measured one."""
+    """A capture of more samples than are kept: of each photo about as large a fraction of the
+    clipped ones is kept, and each represents as many pixels as a measured one of its photo."""
     measured, clipped = tables
     few = partial(SampleReservoir, size=len(measured) // 10)
     monkeypatch.setattr(
@@ -75,8 +75,10 @@ def test_clipped_samples_are_thinned_as_the_measured_ones_are(path, tables, monk
     (kept,), (limits,) = taken.tables(list(taken.kept))
     assert len(kept) < 0.11 * len(measured)
     assert len(limits) / len(clipped) == pytest.approx(len(kept) / len(measured), rel=0.3)
-    assert limits.weight.sum() == pytest.approx(clipped.weight.sum(), rel=0.01)
-    assert np.median(limits.weight) == pytest.approx(np.median(kept.weight), rel=0.3)
+    assert limits.weight.sum() == pytest.approx(clipped.weight.sum(), rel=0.3)
+    for photo in np.unique(limits.photo):
+        own, other = (float(t.weight[t.photo == photo].mean()) for t in (limits, kept))
+        assert own == pytest.approx(other, rel=0.25)  # estimates from a hundred samples
 
 
 @pytest.fixture(scope="module")

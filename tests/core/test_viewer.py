@@ -141,5 +141,7 @@ def test_photos_of_a_large_capture_are_thinned_evenly():
     picture = np.zeros((8, 8, 3), np.uint8)
     photos = [PhotoLayers(f"{k}", {"Photo": picture}, {}) for k in range(100)]
     names = [photo["name"] for photo in page_data(photos)["photos"]]
-    assert names == [f"{k}" for k in range(0, 100, 3)]
+    assert len(names) == 40 and names[0] == "0" and names[-1] == "99"
+    steps = np.diff([int(name) for name in names])
+    assert set(steps) <= {2, 3}
     assert page_data([])["photos"] == []

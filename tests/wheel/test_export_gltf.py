@@ -96,7 +96,17 @@ def test_values_changed_by_hand_are_kept(tmp_path: Path) -> None:
     objects = preview_spheres(materials)
     assert set(fitted_materials(objects, subjects)) == {"bronze", "old rug"}
     (node,) = principled_nodes(materials[0])
-    node.inputs["Roughness"].default_value += 0.01
+    for name, change in (("Roughness", 0.01), ("Sheen Weight", 0.2), ("Alpha", -0.5)):
+        before = node.inputs[name].default_value
+        node.inputs[name].default_value += change
+        assert set(fitted_materials(objects, subjects)) == {"old rug"}, name
+        node.inputs[name].default_value = before
+    copy = materials[0].copy()
+    objects[0].data.materials.append(copy)
+    assert fitted_materials(objects, subjects)["bronze"] == [materials[0], copy]
+    emission = copy.node_tree.nodes.new("ShaderNodeEmission")
+    output = copy.node_tree.get_output_node("ALL")
+    copy.node_tree.links.new(emission.outputs["Emission"], output.inputs["Surface"])
     assert set(fitted_materials(objects, subjects)) == {"old rug"}
     image = materials[1].node_tree.nodes.new("ShaderNodeTexImage")
     (node,) = principled_nodes(materials[1])

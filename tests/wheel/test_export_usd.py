@@ -114,3 +114,34 @@ def test_usd_contains_surfaces_fitted_for_it(checker_output: list) -> None:
             for field in fields(OpenPBR):
                 fitted = getattr(subject.open_pbr.surface, field.name)
                 assert inputs[field.name] == pytest.approx(fitted, abs=1e-5), field.name
+
+
+def test_identifiers_of_usd_are_those_that_blender_writes(tmp_path: Path) -> None:
+    """Every name is found among the guesses, and names that share an identifier are."""
+    pytest.importorskip("pxr")
+    import bpy
+    from pxr import Usd, UsdShade
+
+    from patina.scene.export.export_scene import new_scene
+    from patina.scene.export.export_usd import write_usd
+    from patina.scene.export.usd_surfaces import prim_names
+
+    names = ["1st", "Émail", "é tail", "a·b", "old rug", "漆", "_x", "a-b.001"]
+    new_scene()
+    objects = []
+    for name in names:
+        material = bpy.data.materials.new(name)
+        mesh = bpy.data.meshes.new(name)
+        mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+        mesh.materials.append(material)
+        thing = bpy.data.objects.new(name, mesh)
+        bpy.context.scene.collection.objects.link(thing)
+        objects.append(thing)
+    bpy.context.view_layer.update()
+    write_usd(tmp_path / "names.usdc", objects)
+    stage = Usd.Stage.Open(str(tmp_path / "names.usdc"))
+    found = {p.GetName() for p in stage.Traverse() if p.IsA(UsdShade.Material)}
+    for name in names:
+        assert prim_names(name) & found, (name, found)
+    assert prim_names("old rug") & prim_names("old_rug")
+    bpy.ops.wm.read_homefile(use_empty=True)

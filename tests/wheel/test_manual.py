@@ -43,6 +43,16 @@ def test_every_operator_has_a_page(root: Path) -> None:
         assert any(name.startswith(known) for name in names), pattern
 
 
+def test_patterns_of_settings_are_classes(root: Path) -> None:
+    text = "".join(f.read_text("utf-8") for f in (root / "scene").rglob("*.py"))
+    text += "".join(f.read_text("utf-8") for f in (root / "panels").rglob("*.py"))
+    classes = {name.lower() for name in re.findall(r"class (Patina\w+)\(", text)}
+    patterns = [p for p, _ in manual.pages()[1] if p.startswith("bpy.types.") and p.endswith(".*")]
+    assert len(patterns) > 8
+    for pattern in patterns:
+        assert pattern.removeprefix("bpy.types.").removesuffix(".*") in classes, pattern
+
+
 def test_settings_have_a_page() -> None:
     assert page_of("bpy.types.PatinaViews.exposure") == "guide/views.html"
     assert page_of("bpy.types.PatinaScene.anything") == "guide/sidebar.html"

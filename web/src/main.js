@@ -178,7 +178,9 @@ function describe(data, state, inPhotos) {
   const turn = window.matchMedia("(pointer: coarse)").matches ? "Drag to turn, pinch to zoom." : "Drag to turn, scroll to zoom.";
   const values = "Point at the surface for its reflectance and interval.";
   if (photos) {
-    document.getElementById("hint").textContent = "Scroll to enlarge, drag to move, double click to see everything.";
+    const fingers = window.matchMedia("(pointer: coarse)").matches;
+    document.getElementById("hint").textContent = fingers ? "Pinch to enlarge, drag to move."
+      : "Scroll to enlarge, drag to move, double click to see everything.";
     return;
   }
   document.getElementById("hint").textContent = lamp ? `${turn} Shift and drag moves the lamp. ${values}` : turn;

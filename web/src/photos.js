@@ -54,11 +54,11 @@ export function connectPhotos(data, state, changed) {
   };
 }
 
-// The wheel enlarges at the pointer, dragging moves, a double click shows everything again.
+// The wheel or two fingers enlarge, dragging moves, a double click shows everything again.
 function connectZoom(box, stack, divider, right) {
   const view = { scale: 1, x: 0, y: 0 };
   const place = () => {
-    const { width, height } = stack.parentElement.getBoundingClientRect();
+    const { offsetWidth: width, offsetHeight: height } = stack; // without the enlargement
     view.x = Math.min(0, Math.max(view.x, width * (1 - view.scale)));
     view.y = Math.min(0, Math.max(view.y, height * (1 - view.scale)));
     stack.style.transform = `translate(${view.x}px, ${view.y}px) scale(${view.scale})`;
@@ -67,23 +67,43 @@ function connectZoom(box, stack, divider, right) {
     const at = ((Number(divider.value) / 100) * width - view.x) / view.scale;
     right.style.clipPath = `inset(0 0 0 ${at}px)`;
   };
-  box.addEventListener("wheel", (event) => {
-    event.preventDefault();
+  const enlarge = (factor, x, y) => {
     const at = box.getBoundingClientRect();
-    const scale = Math.min(MAX_ZOOM, Math.max(1, view.scale * Math.exp(-event.deltaY / 400)));
-    for (const [axis, pointer] of [["x", event.clientX - at.left], ["y", event.clientY - at.top]]) {
+    const scale = Math.min(MAX_ZOOM, Math.max(1, view.scale * factor));
+    for (const [axis, pointer] of [["x", x - at.left], ["y", y - at.top]]) {
       view[axis] = pointer - ((pointer - view[axis]) * scale) / view.scale;
     }
     view.scale = scale;
     place();
+  };
+  box.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    enlarge(Math.exp(-event.deltaY / 400), event.clientX, event.clientY);
   }, { passive: false });
+  const held = new Map(); // pointers that are down: their places
+  box.addEventListener("pointerdown", (event) => {
+    if (event.target !== divider) held.set(event.pointerId, event);
+  });
+  for (const kind of ["pointerup", "pointercancel", "pointerleave"]) {
+    box.addEventListener(kind, (event) => held.delete(event.pointerId));
+  }
   box.addEventListener("pointermove", (event) => {
-    if (!event.buttons || event.target === divider) return;
-    view.x += event.movementX;
-    view.y += event.movementY;
+    const before = held.get(event.pointerId);
+    if (!before) return;
+    held.set(event.pointerId, event);
+    const [other] = [...held.values()].filter((one) => one.pointerId !== event.pointerId);
+    if (other) {
+      const apart = (one) => Math.hypot(one.clientX - other.clientX, one.clientY - other.clientY);
+      const middle = ["clientX", "clientY"].map((axis) => (event[axis] + other[axis]) / 2);
+      enlarge(apart(event) / Math.max(apart(before), 1), ...middle);
+      return;
+    }
+    view.x += event.clientX - before.clientX;
+    view.y += event.clientY - before.clientY;
     place();
   });
-  box.addEventListener("dblclick", () => {
+  box.addEventListener("dblclick", (event) => {
+    if (event.target === divider) return;
     Object.assign(view, { scale: 1, x: 0, y: 0 });
     place();
   });

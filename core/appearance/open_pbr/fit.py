@@ -162,7 +162,7 @@ def _purest(goal: FitObjective, mixed: Array, free: Sequence[int]) -> Array:
         start = mixed.copy()
         start[METALNESS] = pure
         x = _descend(goal, start, others)
-        if _error(goal, x) < PURE_TOLERANCE * _error(goal, mixed):
+        if _error(goal, x) < PURE_TOLERANCE * _error(goal, mixed) + 1e-4:
             return x
     return mixed
 
