@@ -9,6 +9,7 @@ from ..appearance.lobe_fit import LobeStackFit, fit_lobe_stack
 from ..appearance.open_pbr.fit import OpenPBRFit, fit_open_pbr
 from ..appearance.principled_fit import PrincipledFit, fit_principled
 from ..brdf import TabulatedBRDF
+from ..concurrency.thread_pool import single_threaded_blas
 from ..result import FittedMaterial
 from .file_names import identifier
 from .gltf_model import GLTF
@@ -19,7 +20,8 @@ from .preview_surface import PREVIEW_SURFACE
 
 @dataclass(frozen=True)
 class Subject:
-    """A fitted material with derived representations, computed on first use."""
+    """A fitted material with derived representations, computed on first use. Their fits run with
+    one thread of BLAS: the last digits of its sums depend on the number, and so would the files."""
 
     material: FittedMaterial
 
@@ -46,17 +48,20 @@ class Subject:
     @cached_property
     def open_pbr(self) -> OpenPBRFit:
         """The closest OpenPBR surface."""
-        return fit_open_pbr(self.material.brdf.evaluate, self.material.principled)
+        with single_threaded_blas():
+            return fit_open_pbr(self.material.brdf.evaluate, self.material.principled)
 
     @cached_property
     def gltf(self) -> PrincipledFit:
         """The inputs of the Principled BSDF that are closest in glTF viewers."""
-        return fit_principled(self.material.brdf.evaluate, shown=GLTF)
+        with single_threaded_blas():
+            return fit_principled(self.material.brdf.evaluate, shown=GLTF)
 
     @cached_property
     def preview_surface(self) -> PrincipledFit:
         """The inputs of the Principled BSDF that are closest as a UsdPreviewSurface."""
-        return fit_principled(self.material.brdf.evaluate, shown=PREVIEW_SURFACE)
+        with single_threaded_blas():
+            return fit_principled(self.material.brdf.evaluate, shown=PREVIEW_SURFACE)
 
     @cached_property
     def pictures(self) -> MeasuredPictures:

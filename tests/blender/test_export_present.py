@@ -38,7 +38,7 @@ def test_all_formats_hold_changed_material_and_its_name() -> None:
     assert {loss["material"] for loss in losses} == {NAME}
     glb = next(loss for loss in losses if loss["format"] == "gltf")
     subject, brdf = _principled_error(coefficients)
-    stated = glb["errors"]["the Principled BSDF it was made of"]
+    stated = glb["errors"]["the Principled BSDF in Blender"]
     assert abs(stated - subject) < 0.01 * subject, "the loss is that of the material as measured"
     record = json.loads((out / "result.json").read_text("utf-8"))
     assert record["materials"][0]["name"] == "surface", "the record is that of the fit"

@@ -25,6 +25,7 @@ Array = NDArray[np.floating]
 LAYER_GAIN = 0.97  # a coat or a fuzz must reduce the error below this fraction of that without
 PURE_TOLERANCE = 1.05  # allowed error of a pure dielectric or metal relative to a mixture
 MAX_EVALUATIONS = 40  # of a descent
+PULL = 1e-3  # weight of the distance from the start: inputs that change nothing stay where they are
 NEGLIGIBLE_WEIGHT = 2e-3  # weights below are set to 0
 GLASS = 1.5  # index of refraction that is kept where the specular weight can set the reflectance
 
@@ -178,9 +179,15 @@ def _descend(goal: FitObjective, start: Array, free: Sequence[int]) -> Array:
         return x
 
     margin = 1e-3 * (high - low)
+    first = np.clip(start[places], low + margin, high - margin)
+
+    def residual(part: Array) -> Array:
+        found = goal.residual(_surface(whole(part)).at(goal.where))
+        return np.concatenate([found, PULL * (part - first)])
+
     result = least_squares(
-        lambda part: goal.residual(_surface(whole(part)).at(goal.where)),
-        np.clip(start[places], low + margin, high - margin),
+        residual,
+        first,
         bounds=(low, high),
         diff_step=1e-4,
         xtol=1e-5,
