@@ -115,7 +115,8 @@ def materials_by_name(
     """The objects' measured materials by their names in the export, those of ``names`` only. A
     material and its copies have one name."""
     found: dict[str, list[bpy.types.Material]] = {}
-    for material in {s.material for thing in objects for s in thing.material_slots if s.material}:
+    slots = [slot for thing in objects for slot in thing.material_slots]
+    for material in dict.fromkeys(slot.material for slot in slots if slot.material):
         if MEASURED_NAME in material:
             for name in (export_name(material), str(material[MEASURED_NAME])):
                 if name in names:

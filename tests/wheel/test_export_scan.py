@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests import make_capture as made
+from tests.make_result import subjects
 
 pytestmark = pytest.mark.blender
 
@@ -37,8 +38,9 @@ def test_fit_is_exported_with_its_mesh(root: Path, tmp_path: Path) -> None:
     fitted = json.loads((tmp_path / "fit" / "result.json").read_text("utf-8"))["materials"][0]
     material = gltf["materials"][0]
     assert material["name"] == fitted["name"] == "surface"
+    (subject,) = subjects(tmp_path / "fit")
     assert material["pbrMetallicRoughness"]["baseColorFactor"][:3] == pytest.approx(
-        fitted["principled"]["base_color"], abs=1e-4
+        subject.gltf.principled.base_color, abs=1e-4
     )
     primitive = gltf["meshes"][0]["primitives"][0]
     assert primitive["material"] == 0
