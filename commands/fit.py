@@ -22,6 +22,7 @@ from ..core.report.diagnosis_json import CheckRecord
 from ..core.report.figures import reach
 from ..core.report.held_out import varied_quality
 from ..core.varying import storage
+from ..core.viewer.page import has_program
 from . import capture_arguments
 from .needs_blender import has_blender
 from .progress import Progress, print_note
@@ -87,9 +88,8 @@ def write_results(
             merl_file.write(folder / f"{material.name}.binary", material.fit.brdf.table())
     with timed(stages, "report", progress, 0.92):
         back = "" if report == "report" else "../index.html"
-        layers = (
-            check_layers(check.found, check.context) if check is not None and result.effects else ()
-        )
+        corrected = check if result.effects and has_program() else None
+        layers = check_layers(corrected.found, corrected.context) if corrected else ()
         for _ in write_report(folder / report, result, back=back, layers=layers):
             pass
     notes: Sequence[str] = ()

@@ -50,6 +50,11 @@ class Principled(LayeredModel):
     coat_tint: Array = field(default_factory=lambda: np.ones(3))
     diffuse_roughness: float = 0.0
 
+    @property
+    def dielectric_f0(self) -> float:
+        """Reflectance of the dielectric at normal incidence, without its tint."""
+        return f0_from_ior(self.ior) * 2.0 * self.specular_ior_level
+
     def at(self, where: Configuration) -> Array:
         """f (..., 3) in 1/sr."""
         total = np.zeros((*where.cos_i.shape, 3))
@@ -84,10 +89,8 @@ class Principled(LayeredModel):
 
     def _dielectric(self, where: Configuration, lobe: Array, tint: Array) -> Array:
         """f (..., 3) in 1/sr of the specular layer over the diffuse base."""
-        ior, scalar_f0 = self.ior, f0_from_ior(self.ior)
-        if self.specular_ior_level != 0.5:
-            scalar_f0 *= 2.0 * self.specular_ior_level
-            ior = ior_from_f0(scalar_f0)
+        scalar_f0 = self.dielectric_f0
+        ior = self.ior if self.specular_ior_level == 0.5 else ior_from_f0(scalar_f0)
         diffuse = oren_nayar(
             self.base_color, self.diffuse_roughness, where.cos_i, where.cos_o, where.cos_io
         )

@@ -7,7 +7,7 @@ import numpy as np
 from ..diagnose.effects.labels import cause_label
 from ..diagnose.forward.diagnosis_context import DiagnosisContext
 from ..diagnose.selection.diagnosis import Diagnosis
-from ..viewer.photo_layers import DIFFERENCE, PHOTO, PREDICTION, PhotoLayers
+from ..viewer.photo_layers import DIFFERENCE, PHOTO, PREDICTION, PhotoLayers, shown_places
 from .residual_picture import (
     change_by,
     radiance_picture,
@@ -25,8 +25,8 @@ DIFFERENCE_TEXT = (
 
 
 def check_layers(found: Diagnosis, context: DiagnosisContext) -> list[PhotoLayers]:
-    """The photos that the check uses, at the pixels that it uses. Predictions and differences are
-    those after correction."""
+    """The photos that the check uses, as many as a page shows, at the pixels that it uses.
+    Predictions and differences are those after correction."""
     pixels, layers = context.pixels, []
     after = scaled_residual(found, found.after)
     changes = {cause_label(t.effect.cause): -change_by(found, t) for t in found.named}
@@ -40,7 +40,8 @@ def check_layers(found: Diagnosis, context: DiagnosisContext) -> list[PhotoLayer
         label: f"what the cause '{label}' changes: red is brighter because of it, blue darker"
         for label in changes
     }
-    for photo in np.unique(pixels.photo).tolist():
+    photos = np.unique(pixels.photo).tolist()
+    for photo in (photos[place] for place in sorted(shown_places(len(photos)))):
         white, names = white_of(pixels, photo), found.photo_names
         name = names[photo] if photo < len(names) else f"photo {photo + 1}"
         pictures = {

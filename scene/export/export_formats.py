@@ -105,11 +105,14 @@ def to_usd(
     file = folder / f"{stem}.usdc"
     with_materialx = write_usd(file, objects)
     fitted = fitted_materials(objects, subjects)
+    has_open_pbr = with_materialx and bpy.app.version >= OPEN_PBR_SINCE
     replaced = Replaced(frozenset(), frozenset())
     if can_replace():
         exported = {s.material.name for o in objects for s in o.material_slots if s.material}
         surfaces = {
-            material.name: UsdSurfaces(s.preview_surface.principled, s.open_pbr.surface)
+            material.name: UsdSurfaces(
+                s.preview_surface.principled, s.open_pbr.surface if has_open_pbr else None
+            )
             for s in subjects
             for material in fitted.get(s.name, ())
         }
@@ -123,7 +126,7 @@ def to_usd(
         errors = {}
         if names and names <= replaced.open_pbr:
             errors["MaterialX (OpenPBR)"] = subject.error(subject.open_pbr.surface.evaluate)
-        elif with_materialx and bpy.app.version >= OPEN_PBR_SINCE:
+        elif has_open_pbr:
             errors["MaterialX (OpenPBR, values of the Principled)"] = subject.error(
                 from_principled(own).evaluate
             )

@@ -27,10 +27,11 @@ MATERIALX_CONTEXT = "mtlx"
 
 @dataclass(frozen=True)
 class UsdSurfaces:
-    """Fitted inputs of one material. preview: as a UsdPreviewSurface computes them."""
+    """Fitted inputs of one material. preview: as a UsdPreviewSurface computes them; open_pbr: None
+    where Blender writes no OpenPBR."""
 
     preview: Principled
-    open_pbr: OpenPBR
+    open_pbr: OpenPBR | None
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,12 @@ def replace_surfaces(
         )
         for (context, kind, values), names in zip(kinds, done, strict=True):
             shader = UsdShade.Material(prim).ComputeSurfaceSource(context)[0]
-            if shader and shader.GetIdAttr().Get() == kind and _set_inputs(shader, values):
+            if (
+                values
+                and shader
+                and shader.GetIdAttr().Get() == kind
+                and _set_inputs(shader, values)
+            ):
                 names.add(name)
     stage.GetRootLayer().Save()
     return Replaced(frozenset(done[0]), frozenset(done[1]))
@@ -116,5 +122,7 @@ def _preview_inputs(principled: Principled) -> dict[str, Any]:
     }
 
 
-def _open_pbr_inputs(surface: OpenPBR) -> dict[str, Any]:
+def _open_pbr_inputs(surface: OpenPBR | None) -> dict[str, Any]:
+    if surface is None:
+        return {}
     return {field.name: getattr(surface, field.name) for field in fields(surface)}

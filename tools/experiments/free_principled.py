@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from patina.core.appearance.layer_albedo import f0_from_ior, ior_from_f0
+from patina.core.appearance.layer_albedo import ior_from_f0
 from patina.core.appearance.layered_model import Configuration
 from patina.core.appearance.principled import MIN_ROUGHNESS, Principled
 from patina.core.appearance.principled_fit import BLENDER
@@ -85,9 +85,12 @@ def reflectance(x: Array, where: Configuration) -> Array:
 def _start(fitted: Principled, coat: float) -> Array:
     """Return the unknowns of a fitted Principled BSDF, with at least this weight of the coat."""
     x = np.zeros(21)
-    f0 = f0_from_ior(fitted.ior) * 2 * fitted.specular_ior_level
     x[:3], x[3], x[4] = np.sqrt(fitted.base_color), fitted.metallic, fitted.roughness
-    x[5], x[6], x[7:10] = np.sqrt(f0), fitted.diffuse_roughness, fitted.specular_tint
+    x[5], x[6], x[7:10] = (
+        np.sqrt(fitted.dielectric_f0),
+        fitted.diffuse_roughness,
+        fitted.specular_tint,
+    )
     x[10] = max(fitted.coat_weight, coat)
     x[11] = fitted.coat_roughness if fitted.coat_weight > 0 else max(0.4 * fitted.roughness, 0.05)
     x[COAT_F0], x[COAT_TINT] = 0.3, 1.0

@@ -11,7 +11,6 @@ export function connectPhotos(data, state, changed) {
   if (!photos.length) return () => "";
   const name = element("name");
   name.append(...photos.map((photo, index) => new Option(photo.name, index)));
-  let connected = false; // the description is made after this function has returned
   const show = () => {
     const photo = photos[state.photo];
     name.value = state.photo;
@@ -21,17 +20,20 @@ export function connectPhotos(data, state, changed) {
       element(id).src = `data:image/jpeg;base64,${photo.layers[layer]}`;
       element(id).alt = `${photo.name}: ${layer}`;
     }
-    if (connected) changed();
+  };
+  const change = () => {
+    show();
+    changed();
   };
   const go = (step) => {
     state.photo = (state.photo + step + photos.length) % photos.length;
-    show();
+    change();
   };
   element("previous").addEventListener("click", () => go(-1));
   element("next").addEventListener("click", () => go(1));
   name.addEventListener("change", () => {
     state.photo = Number(name.value);
-    show();
+    change();
   });
   for (const layer of Object.keys(photos[0].layers).slice(1)) {
     const label = document.createElement("label");
@@ -40,14 +42,13 @@ export function connectPhotos(data, state, changed) {
     });
     input.addEventListener("change", () => {
       state.layer = layer;
-      show();
+      change();
     });
     label.append(input, Object.assign(document.createElement("span"), { textContent: layer }));
     element("layer").append(label);
   }
   connectZoom(element("photos"), element("stack"), element("divider"), element("right"));
   show();
-  connected = true;
   return () => {
     const [first] = Object.keys(photos[state.photo].layers);
     return `Left of the divider: ${data.layer_texts[first]}. Right: ${data.layer_texts[state.layer]}.`;

@@ -90,7 +90,7 @@ def from_principled(principled: Principled) -> OpenPBR:
 
 def _unknowns(principled: Principled) -> Array:
     """Start values from a Principled BSDF."""
-    f0 = f0_from_ior(principled.ior) * 2.0 * principled.specular_ior_level
+    f0 = principled.dielectric_f0
     x = np.zeros(FUZZ.stop)
     x[:3] = np.sqrt(np.clip(principled.base_color, 0, 1))
     x[METALNESS], x[ROUGHNESS] = principled.metallic, principled.roughness
